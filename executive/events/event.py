@@ -18,8 +18,8 @@ class Event:
     """
 
     is_recorded: ClassVar[bool] = True
-    # Pydantic validates events that are read from a journal.
 
+    # Pydantic validates the events of a journal without converting types.
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True)
 
 
@@ -39,10 +39,10 @@ class TimedEvent:
 
 
 Emit = Callable[[Event], None]
-"""Adds the time to an event and passes it to all observers."""
+"""Function that adds the time to an event and passes the timed event to all observers."""
 
 Observer = Callable[[TimedEvent], None]
-"""Receives an event on the tick thread and returns at once."""
+"""Function that receives an event on the tick thread and returns at once."""
 
 
 def ignore(event: Event) -> None:

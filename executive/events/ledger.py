@@ -61,12 +61,12 @@ class ItemChanged(Event):
 
     Attributes:
         item: Name of the item.
-        label: Its class.
+        label: Class of the item.
         state: `seen`, `held`, `dropped`, `placed`, `rejected`, `skipped`, `lost` or `phantom`.
-        position: Its position `(3,)` [m].
+        position: Position of the item `(3,)` [m].
         looks: Number of looks that showed the item.
-        attempts: Number of failed attempts to pick it.
-        bin: Bin in which it was placed, or "".
+        attempts: Number of failed attempts to pick the item.
+        bin: Bin that contains the placed item, or "".
         why: Reason of the state, or "".
     """
 
@@ -86,9 +86,9 @@ class TargetSelected(Event):
 
     Attributes:
         item: Name of the item.
-        label: Its class.
-        frame: Number of the frame that showed it last.
-        bin: Bin to which it goes.
+        label: Class of the item.
+        frame: Number of the last frame that showed the item.
+        bin: Destination of the item.
     """
 
     item: str

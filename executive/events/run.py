@@ -23,7 +23,7 @@ class RunStarted(Event):
     Attributes:
         mission: Name of the mission.
         file: Path of the mission file.
-        seed: Seed of everything random.
+        seed: Seed of all random numbers.
         params: Values of the params of the mission.
         overrides: Params as given on the command line.
         requests: Scripted answers of the operator; None if a person answers.
@@ -69,7 +69,7 @@ class RequestGiven(Event):
 
 @dataclass(frozen=True)
 class RunHalted(Event):
-    """The tick loop ended; from now on the arm only brakes.
+    """The tick loop ended, and the arm begins to brake.
 
     Attributes:
         ticked: True if the tree was ticked in this control step.
@@ -99,7 +99,7 @@ class FaultRaised(Event):
     """An exception ended the run.
 
     Attributes:
-        traceback: Its traceback.
+        traceback: Traceback of the exception.
     """
 
     traceback: str

@@ -18,7 +18,7 @@ MAX_ROLL_DISTANCE = 0.002
 def list_obstacles(cell: Cell, excluded: Item | None = None) -> tuple[Obstacle, ...]:
     """Return the objects on the table and in the bins as obstacles, without the item `excluded`."""
     targets = [one for one in cell.ledger.find_objects_on_table() if one.item != excluded]
-    return (*(obstacle_of(cell, target) for target in targets), *_list_bin_contents(cell, excluded))
+    return (*(make_obstacle(cell, target) for target in targets), *_list_bin_contents(cell, excluded))
 
 
 def shows_bin_content(cell: Cell, detection: Detection, frame: Frame) -> bool:
@@ -40,7 +40,7 @@ def count_used_slots(cell: Cell, bin: str, excluded: Item | None = None) -> int:
     return cell.ledger.count_in(bin) + is_arriving
 
 
-def obstacle_of(cell: Cell, target: Target) -> Obstacle:
+def make_obstacle(cell: Cell, target: Target) -> Obstacle:
     """Return a target as an obstacle."""
     x, y, middle = (float(value) for value in target.position)
     kind = cell.classes[target.label]

@@ -17,8 +17,8 @@ from executive.manipulation.obstacles import (
     count_used_slots,
     layer_height,
     list_obstacles,
+    make_obstacle,
     max_object_height,
-    obstacle_of,
 )
 
 DROP_HEIGHT = 0.01
@@ -65,7 +65,7 @@ def approach(
         overtravel=overtravel,
         spacing=spacing,
     )
-    return goal, Task(around=list_obstacles(cell, target.item), target=obstacle_of(cell, target))
+    return goal, Task(around=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
 
 
 def goal_on_object(

@@ -14,9 +14,9 @@ from executive.events import JOURNAL_FORMAT, Event, InputRead, RunStarted, Timed
 from executive.replay.recorded_cell import check_input
 
 MAX_TICK = 10**9
-"""Largest number of a control step: 48 days in simulation."""
+"""Maximum number of control steps: 48 days in simulation."""
 CLOCK_TOLERANCE = 1e-5
-"""Largest difference between the clock of an event and its control step [s]."""
+"""Maximum difference between the clock of an event and the time of its control step [s]."""
 
 KINDS: Mapping[str, type[Event]] = {
     kind.__name__: kind
@@ -58,15 +58,15 @@ def journal_schema() -> dict[str, JsonValue]:
 
 
 def encode(timed: TimedEvent) -> bytes:
-    """Return the line of an event, with its line end.
+    """Return the line of an event, with a line feed.
 
     Raises:
-        Fault: JSON cannot hold a value of the event.
+        Fault: JSON cannot represent a value of the event.
     """
     kind = type(timed.event).__name__
     entry = {"kind": kind, "tick": timed.tick, "clock": timed.clock, **vars(timed.event)}
     try:
-        # Half of a surrogate pair, as in a file name that is not UTF-8, becomes a question mark.
+        # A lone surrogate, as in a file name that is not UTF-8, becomes a question mark.
         return (_ENCODER.encode(entry) + "\n").encode(errors="replace")
     except (TypeError, ValueError, RecursionError) as error:
         raise Fault(f"the journal cannot hold an event of kind {kind}: {error}") from error
@@ -76,7 +76,7 @@ def decode(line: bytes) -> TimedEvent:
     """Return the event of a line.
 
     Raises:
-        ValueError: The line holds no event of this format; the message says why.
+        ValueError: The line holds no event of this format.
     """
     entry = from_json(line, allow_inf_nan=False)
     if not isinstance(entry, dict):
@@ -88,9 +88,9 @@ def decode(line: bytes) -> TimedEvent:
         raise ValueError(f'"tick" is {tick!r}, not an integer from 0 to {MAX_TICK}')
     if isinstance(clock, bool) or not isinstance(clock, int | float) or clock < 0:
         raise ValueError(f'"clock" is {clock!r}, not a time in seconds')
-    if wrong := entry.keys() ^ _KEYS[kind]:
-        problem = "has no" if wrong <= _KEYS[kind] else "has the unknown"
-        raise ValueError(f'{kind} {problem} key "{min(wrong)}"; its keys are {", ".join(_KEYS[kind])}')
+    if differing := entry.keys() ^ _KEYS[kind]:
+        problem = "has no" if differing <= _KEYS[kind] else "has the unknown"
+        raise ValueError(f'{kind} {problem} key "{min(differing)}"; its keys are {", ".join(_KEYS[kind])}')
     try:
         event = _ADAPTERS[kind].validate_json(line)
     except ValidationError as error:
@@ -118,7 +118,7 @@ def decode_all(lines: Iterable[bytes], name: str) -> list[TimedEvent]:
             if step and abs(timed.clock - timed.tick * step - ahead) > CLOCK_TOLERANCE:
                 raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
             if isinstance(event, InputRead) and event.name == "clock" and not event.raised:
-                ahead = _offset(event.value)
+                ahead = _read_clock_offset(event.value)
             elif isinstance(event, InputRead) and not event.raised:
                 check_input(event.name, event.value)
         except ValueError as error:
@@ -132,7 +132,7 @@ def decode_all(lines: Iterable[bytes], name: str) -> list[TimedEvent]:
     return events
 
 
-def _offset(value: JsonValue) -> float:
+def _read_clock_offset(value: JsonValue) -> float:
     """Return the recorded time of the cell's clock minus the time of all control steps [s].
 
     Raises:

@@ -1,4 +1,4 @@
-"""Execution of a run with its record, as `executive run` and sweeps do it."""
+"""Execution of a run with its record and its views."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from executive.mission.text.files import read_source
 from executive.record.diagnosis.diagnose import diagnose
 from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder
-from executive.record.result import ENDED, ItemCounts, Result, audit_of, requests_of, write_result
+from executive.record.result import ENDED, ItemCounts, Result, list_requests, make_audit, write_result
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
 
@@ -39,7 +39,7 @@ class View(Protocol):
         """Take an event and return at once."""
 
     def close(self) -> None:
-        """Stop showing the run; called however the run ends."""
+        """Stop showing the run; called after each end of the run, also after an exception."""
 
     def note(self, sentence: str) -> None:
         """Show a sentence about the record."""
@@ -47,12 +47,12 @@ class View(Protocol):
 
 @dataclass(frozen=True)
 class RecordOptions:
-    """Options of the record of a run, and its displays.
+    """Options of the record of a run, and its views.
 
     Attributes:
-        views: Displays of the run.
-        paused: Pause the run before its first step.
-        frames: Keep the images behind the decisions, and the log of the world after the end of the run.
+        views: Views of the run.
+        paused: True to pause the run before its first step.
+        frames: True to save pictures, and to keep the log of the world after the end of the run.
     """
 
     views: Sequence[View] = ()
@@ -67,7 +67,7 @@ def record_run(
     runs: Path,
     record: RecordOptions = RecordOptions(),
 ) -> Result:
-    """Run a mission once, leave its run directory below `runs`, and return the result.
+    """Run a mission, record the run in a new directory below `runs`, and return the result.
 
     Args:
         loaded: The mission and its cell.
@@ -87,17 +87,17 @@ def record_run(
     with closing(run):
         if record.paused:
             run.control.pause()
-        directory = new_directory(run, loaded, options, runs)
+        directory = make_run_directory(run, loaded, options, runs)
         recorder = Recorder(directory, frames=record.frames)
         recording = Recording(run, loaded, skills, directory, recorder, record.views)
         result = recording.execute(options.seed, began)
     if not record.frames and result.status in ENDED:
-        # The log of the world is needed to resume a run and to make a film with its images: neither applies.
+        # The log of the world is needed only for the resumption and for a film.
         directory.world.unlink(missing_ok=True)
     return result
 
 
-def new_directory(run: Run, loaded: LoadedMission, options: RunOptions, runs: Path) -> RunDirectory:
+def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, runs: Path) -> RunDirectory:
     """Make the directory of a run below `runs`, write the inputs of the run into it, and return it.
 
     Raises:
@@ -121,17 +121,17 @@ def new_directory(run: Run, loaded: LoadedMission, options: RunOptions, runs: Pa
 
 @dataclass
 class Recording:
-    """A run with its recorder and its displays.
+    """A run with its recorder and its views.
 
     Attributes:
         run: The run.
-        loaded: Its mission.
+        loaded: Mission of the run.
         skills: Installed skills by name.
-        directory: Directory of its record.
+        directory: The run directory.
         recorder: Recorder of the run.
-        views: Displays of the run.
+        views: Views of the run.
         past: Events that the observers get before the run.
-        remark: Sentence for the displays at the start of the run, or "".
+        remark: Sentence that the views show at the start of the run, or "".
     """
 
     run: Run
@@ -155,21 +155,21 @@ class Recording:
             ExecutiveError: The result cannot be written.
         """
         outcome, audit = self._execute_observed()
-        result = self._result(seed, outcome, audit, time.perf_counter() - began)
+        result = self._make_result(seed, outcome, audit, time.perf_counter() - began)
         problems = [self.recorder.problem]
         try:
             write_result(self.directory.result, result)
         except ExecutiveError as error:
             problems.append(str(error))
             if result.status != "FAULT":
-                # Then only `--json` prints the result.
+                # Without the file, only the output of `--json` contains the result.
                 result = replace(result, status="FAULT", reason="fault", message=str(error), node="")
         if any(problems):
             for view in self.views:
                 view.note("; ".join(filter(None, problems)))
         return result
 
-    def _result(
+    def _make_result(
         self, seed: int, outcome: RunEnded, audit: Mapping[str, int] | None, wall_time: float
     ) -> Result:
         workcell, path, timeline = self.run.workcell, self.directory.path, self._timeline
@@ -187,9 +187,9 @@ class Recording:
             unknown=accounts.unknown,
             doubts=accounts.doubts,
             empty=outcome.empty,
-            audit=None if audit is None else audit_of(balance, audit, outcome.empty),
+            audit=None if audit is None else make_audit(balance, audit, outcome.empty),
             planning=timeline.planning,
-            requests=requests_of(timeline),
+            requests=list_requests(timeline),
             ticks=outcome.ticks,
             robot_time_s=outcome.robot_time,
             wall_time_s=round(wall_time, 3),
@@ -203,17 +203,17 @@ class Recording:
     def _execute_observed(self) -> tuple[RunEnded, Mapping[str, int] | None]:
         """Execute the run with all observers attached, and close them afterwards."""
         run, completed = self.run, False
-        watchers: list[Observer] = [self._timeline, *self.views]
+        observers: list[Observer] = [self._timeline, *self.views]
         try:
             for view in self.views:
                 view.open(run)
                 if self.remark:
                     view.note(self.remark)
-            for watcher in watchers:
-                run.observe(watcher)
+            for observer in observers:
+                run.observe(observer)
             for event in self.past:
-                for watcher in watchers:
-                    watcher(event)
+                for observer in observers:
+                    observer(event)
             run.record(self.recorder)
             ended = run.execute(), run.audit()
             completed = True

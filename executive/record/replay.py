@@ -35,8 +35,8 @@ class Replay:
     Attributes:
         decisions: Number of equal decisions.
         ticks: Number of control steps of the replay.
-        recorded: The first recorded decision that the replay did not repeat, or None; without its messages.
-        replayed: The decision of the replay instead, or None if there was none.
+        recorded: First recorded decision that the replay did not repeat, without messages, or None.
+        replayed: First decision of the replay that differs from the record, or None.
         edited: True if the mission is not the recorded one.
         unanswered: Message of the question without a recorded answer that ended the replay, or "".
         is_complete: True if the replay repeated the last control step of the record, too.
@@ -63,7 +63,7 @@ class Replay:
         both = f"the record says {_describe(self.recorded)}, and now it is {_describe(self.replayed)}"
         if not self.unanswered:
             return both
-        return f"{both}: {self.unanswered}; what would come of it only a run can tell"
+        return f"{both}: {self.unanswered}; only a run can show the consequences"
 
     def as_json(self) -> dict[str, JsonValue]:
         """Return the attributes as JSON; a decision has its tick, clock, kind and the fields that are set."""
@@ -77,11 +77,11 @@ def replay(
     """Replay a recorded run and return the first decision that differs.
 
     Skills, tree and ledger are the present ones; the answers of arm, tool, camera, detectors and operator
-    come from the journal. After the first difference the journal has no answers any more.
+    come from the journal. The replay ends at the first difference.
 
     Args:
         path: The run directory.
-        events: Events of its journal.
+        events: Events of the journal.
         skills: Installed skills by name.
         mission: Another mission file to replay, or None for the recorded mission. For another mission only
             the decisions of skills and the states of items are compared.
@@ -137,7 +137,7 @@ class _Comparison:
         self._log = log
         self._edited = edited
         self._recorded = [d for timed in log.events if (d := _decision(timed, edited))]
-        # Of an interrupted run, the last control step may be incomplete.
+        # The last control step of an interrupted run may be incomplete.
         self._has_ended = any(isinstance(timed.event, RunEnded) for timed in log.events)
         self._is_over = False
         self.same = 0

@@ -20,7 +20,7 @@ from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 QUIT = "quit"
-"""Word of the operator who wants nothing more."""
+"""Request of the operator to end the requests."""
 
 VERSION = 2
 """Version of the schema of `result.json`; the first had no `version`, no skipped items and no `agrees`."""
@@ -30,7 +30,7 @@ MISTAKES = {
     "fell_in_wrong_bin": "fallen into a wrong bin",
     "unseen": "never seen",
 }
-"""Words for the mistakes that the audit counts."""
+"""Description of each kind of mistake that the audit counts."""
 
 EXIT_CODES = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "INCOMPLETE": 4, "HALTED": 130}
 """Exit code by the status of the run, unless the audit disagrees (`exit_code`)."""
@@ -76,13 +76,13 @@ class Result:
         version: Version of the schema.
         mission: Name of the mission.
         status, reason, message, node, empty, holds, ticks: As in `RunEnded`.
-        seed: Seed of everything random.
+        seed: Seed of all random numbers.
         items: Counts of the ledger.
         unknown: Largest number of boxes in a look for each label that the cell file does not declare.
         doubts: Reasons why error rates of detectors were assumed.
         audit: Counts of the audit; None in a cell without ground truth.
         planning: Planned motions.
-        requests: Requests of the operator, by `requests_of`.
+        requests: Requests of the operator, by `list_requests`.
         robot_time_s: Time on the clock of the run [s].
         wall_time_s: Wall time of the run [s].
         trace: Hash of all decisions.
@@ -114,13 +114,13 @@ class Result:
 
 
 def write_result(path: Path, result: Result) -> None:
-    """Write `result` to `path`, whole or not at all.
+    """Write `result` to `path`, atomically.
 
     Raises:
-        ExecutiveError: The disk does not take it.
+        ExecutiveError: The file cannot be written.
     """
-    elsewhere = "the journal beside it tells how the run ended, and so does what --json prints"
-    with explained(ExecutiveError, f'cannot write the result "{path}"', elsewhere):
+    hint = "the journal beside it tells how the run ended, and so does what --json prints"
+    with explained(ExecutiveError, f'cannot write the result "{path}"', hint):
         write_atomically(
             path, json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
         )
@@ -138,16 +138,16 @@ def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result
     ending = find_end(events)
     if ending is not None:
         return result if (result.status, result.ticks) == (ending.status, ending.ticks) else None
-    # If the disk did not take the end, only the result contains it.
+    # If the end could not be written to the journal, only the result contains the end.
     is_resumed = any(isinstance(timed.event, RunResumed) for timed in events)
     return result if result.status in EXIT_CODES and not is_resumed else None
 
 
-def requests_of(timeline: Timeline) -> list[str]:
-    """Return the requests that make the operator's answers the same again.
+def list_requests(timeline: Timeline) -> list[str]:
+    """Return a list of requests with which a scripted operator repeats the answers of the run.
 
-    An operator who is asked after the end of the list wants nothing more: that need not be listed, unless the
-    list would be empty without it.
+    Trailing requests to quit are omitted, because the scripted operator quits at the end of the list; a list
+    with only requests to quit keeps the first.
     """
     words = [wanted or QUIT for wanted in timeline.requests]
     while len(words) > 1 and words[-1] == QUIT:
@@ -155,18 +155,18 @@ def requests_of(timeline: Timeline) -> list[str]:
     return words
 
 
-def audit_of(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> Audit:
+def make_audit(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> Audit:
     """Return the counts of an audit with the result of `agrees`."""
     return Audit(agrees(items, audit, empty), **{place: int(audit[place]) for place in PLACES})
 
 
 def agrees(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> bool:
-    """Return True if the audit found each object where the ledger says that it is.
+    """Return True if the audit confirms the counts of the ledger.
 
     Args:
         items: Counts of the ledger.
         audit: Counts of the audit.
-        empty: True if the run reported the table as empty: then no object may be unseen.
+        empty: True if the run reported an empty table, which excludes unseen objects.
     """
     left = items["rejected"] + items["skipped"]
     return bool(

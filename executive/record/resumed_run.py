@@ -38,15 +38,15 @@ def resume_run(
     """Resume the run in a directory, and return the result object.
 
     First, the journal is replayed up to the interruption, which restores the tree, the variables and the
-    ledger; a simulated world is rebuilt from its log, with the arm braking. Nothing observed the cell since
-    the interruption: the tool's sensor decides whether it holds its item, every position on the table is
-    doubted until the next look, and each skill that was running starts again.
+    ledger; a simulated world is rebuilt from its log, with the arm braking. After the interruption, the
+    sensor of the tool decides whether the tool holds its item, all positions on the table are invalid until
+    the next look, and each interrupted skill is restarted.
 
-    A run that ended as INCOMPLETE is resumed as well: the tree starts again, and rejected and skipped items
-    are searched anywhere. Placed items stay placed and counted. Of a run that ended otherwise, but whose
-    result was not written any more, the result is written.
+    For a run that ended as INCOMPLETE, the tree is restarted, and rejected and skipped items are searched
+    everywhere; placed items stay placed and counted. For a run that ended as SUCCESS or FAILURE without a
+    result file, the result is written.
 
-    If the world did more than the journal knows, the scene is observed before the run continues.
+    If the journal lacks actions of the world, the scene is observed before the run continues.
 
     Args:
         path: The run directory.
@@ -55,27 +55,27 @@ def resume_run(
         record: Options of the record.
 
     Raises:
-        InputError: The run cannot be resumed: it is still being executed, has succeeded or failed, left too
-            short a record, or the present skills would decide differently.
+        InputError: The run is being executed, has a result of SUCCESS or FAILURE, or has an incomplete
+            record, or the installed skills decide differently.
         ExecutiveError: The result cannot be written.
     """
     from executive.run.assembly import assemble_resumed
 
     began = time.perf_counter()
     directory = RunDirectory(path)
-    # Before anything else: from here on no other process writes to the directory.
+    # The recorder locks the journal, so that no other process writes to the directory.
     recorder = Recorder(directory, frames=record.frames, resume=True)
     try:
         events = read_journal(directory.journal)
         log, start = InputLog.of(events), find_start(events, path, "run the mission again")
         has_ended, seed = _has_ended(directory, events), start.seed
         loaded = read_mission_of_run(path, start, skills)
-        # Without the step of a halt or of a bug in a skill: a corrected skill may continue there.
+        # The control step of a halt or fault is not compared, so that a corrected skill can repeat the step.
         certain = log if log.halt is None else log.before(log.halt.tick)
         replay = compare(loaded, skills, certain, seed)
         if not replay.same:
             raise InputError(
-                f'the run in "{path}" cannot be taken up again: {replay.difference}. The executive or a '
+                f'the run in "{path}" cannot be resumed: {replay.difference}. The executive or a '
                 "skill has been changed since; go back to what it was run with, or run the mission again"
             )
         options = replace(options, seed=seed, requests=start.requests, scene=directory.scene)
@@ -90,7 +90,7 @@ def resume_run(
             run.control.pause()
         replayed = run.replayed.log
         recorder.remember(replayed.events)
-        past = [one for one in replayed.events if isinstance(one.event, NOT_REPEATED)]
+        past = [timed for timed in replayed.events if isinstance(timed.event, NOT_REPEATED)]
         recording = Recording(
             run, loaded, skills, directory, recorder, record.views, past, _describe_gap(run.replayed)
         )
@@ -98,29 +98,28 @@ def resume_run(
 
 
 def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
-    """Return True if a run has ended and only its result was not written any more.
+    """Return True if a run has ended as SUCCESS or FAILURE without a result file.
 
     Raises:
         InputError: The run cannot be resumed.
     """
-    ending = find_end(events)
-    if ending is None:
+    end = find_end(events)
+    if end is None:
         return False
-    if ending.status == "INCOMPLETE" and ending.holds:
+    if end.status == "INCOMPLETE" and end.holds:
         raise InputError(
-            f'the run in "{directory.path}" ended with {ending.holds} in the tool and cannot be '
+            f'the run in "{directory.path}" ended with {end.holds} in the tool and cannot be '
             "resumed; take it out and run the mission again"
         )
-    if ending.status in ENDED and read_result(directory, events) is not None:
+    if end.status in ENDED and read_result(directory, events) is not None:
         raise InputError(
-            f'the run in "{directory.path}" came to its end: {ending.status}; '
-            "there is nothing to take up again"
+            f'the run in "{directory.path}" came to its end: {end.status}; there is nothing to resume'
         )
-    return ending.status in ENDED
+    return end.status in ENDED
 
 
 def _describe_gap(replayed: ReplayedCell) -> str:
-    """Return a warning if the world of a run did more than the journal knows, else ""."""
+    """Return a warning if the journal lacks actions of the tool, else ""."""
     last = replayed.last
     if last is None or last.last_action != UNKNOWN_ACTION:
         return ""

@@ -98,7 +98,7 @@ def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Pat
     assert (done.replayed.event.node, done.replayed.event.status) == ("MoveToScan", "INVALID")
     assert done.difference.endswith(
         "reason fault: the record holds no answer to what is asked here first: plan.ready; "
-        "what would come of it only a run can tell"
+        "only a run can show the consequences"
     )
 
 

@@ -12,11 +12,11 @@ from executive.errors import ExecutiveError
 from executive.record.result import (
     ItemCounts,
     Result,
-    audit_of,
     disagreement,
     exit_code,
+    list_requests,
+    make_audit,
     read_result,
-    requests_of,
     write_result,
 )
 from executive.record.run_directory import RunDirectory
@@ -29,7 +29,7 @@ AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "fell_in_wrong_b
 def result(audit=AUDIT, status="SUCCESS", empty=True) -> Result:
     return Result(
         mission="sort", seed=7, status=status, reason="", message="", node="", empty=empty, items=ITEMS,
-        audit=None if audit is None else audit_of(asdict(ITEMS), audit, empty), ticks=240, run="r",
+        audit=None if audit is None else make_audit(asdict(ITEMS), audit, empty), ticks=240, run="r",
     )  # fmt: skip
 
 
@@ -39,7 +39,7 @@ def result(audit=AUDIT, status="SUCCESS", empty=True) -> Result:
      (["cube", None, "duck", None, None], ["cube", "quit", "duck"])],
 )  # fmt: skip
 def test_the_end_of_the_list_is_a_wish_to_quit_and_goes_without_saying(wanted, words):
-    assert requests_of(Timeline(requests=wanted)) == words
+    assert list_requests(Timeline(requests=wanted)) == words
 
 
 def test_is_written_and_can_be_read_again(tmp_path):

@@ -224,7 +224,7 @@ def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(missions: Path, tm
 
 def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> None:
     path = Path(run_of(load(missions, "sort_overhead"), tmp_path).run)
-    with pytest.raises(InputError, match=r"came to its end: SUCCESS; there is nothing to take up again"):
+    with pytest.raises(InputError, match=r"came to its end: SUCCESS; there is nothing to resume"):
         resumed(path)
     (path / "journal.jsonl").write_text("")
     with pytest.raises(InputError, match=r"had not begun when it was cut off; run the mission again"):
@@ -288,7 +288,7 @@ def test_the_result_of_a_run_that_was_killed_after_its_end_is_written(missions: 
     assert completed == replace(result, wall_time_s=completed.wall_time_s)
     assert json.loads((path / "result.json").read_text()) == plain(completed)
     assert (path / "journal.jsonl").read_bytes() == journal
-    with pytest.raises(InputError, match="there is nothing to take up again"):
+    with pytest.raises(InputError, match="there is nothing to resume"):
         resumed(path)
 
 
@@ -298,7 +298,7 @@ def test_a_mission_that_is_decided_otherwise_now_is_not_gone_on_with(missions: P
     old, new = "try: {SelectTarget: {prefer: surest}}", "try: SelectTarget"
     assert old in file.read_text()
     file.write_text(file.read_text().replace(old, new))
-    with pytest.raises(InputError, match=r"cannot be taken up again: the record says at .* and now it is"):
+    with pytest.raises(InputError, match=r"cannot be resumed: the record says at .* and now it is"):
         resumed(path)
 
 

@@ -26,7 +26,7 @@ from executive.events import (
     TimedEvent,
 )
 from executive.record.journal import Journal, read_journal
-from executive.record.timeline.activation import by_node, count_ends, last_failure, skill_name
+from executive.record.timeline.activation import count_ends, find_last_failure, group_by_node, skill_name
 from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 
@@ -102,9 +102,9 @@ def test_the_ends_of_a_node_are_counted_and_its_last_failure_is_found() -> None:
           for event in (skill_started("tree/Grasp"), skill_ended("tree/Grasp", status, reason=reason))),
         skill_started("tree/Wait"),
     )  # fmt: skip
-    grasp, wait = by_node(timeline.activations).values()
-    assert (count_ends(grasp), last_failure(grasp)) == ("1 done, 2 failed, 1 halted", "blocked")
-    assert (count_ends(wait), last_failure(wait)) == ("1 under way", "")
+    grasp, wait = group_by_node(timeline.activations).values()
+    assert (count_ends(grasp), find_last_failure(grasp)) == ("1 done, 2 failed, 1 halted", "blocked")
+    assert (count_ends(wait), find_last_failure(wait)) == ("1 under way", "")
     assert timeline.counts == {"tree/Grasp": {"FAILURE": 2, "INVALID": 1, "SUCCESS": 1}}
 
 

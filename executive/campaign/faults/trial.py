@@ -24,7 +24,7 @@ from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
 from executive.events import FaultInjected, InputRead, NodeEnded, RunEnded, TimedEvent
 from executive.plugins import cell_kind
-from executive.record.recorded_run import Recording, new_directory
+from executive.record.recorded_run import Recording, make_run_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults import FaultyCell, with_faults
@@ -52,7 +52,7 @@ def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path)
     began, loaded = time.perf_counter(), subject.loaded
     trying = _Trying(subject, rehearsal, faults)
     with closing(trying.run):
-        directory = new_directory(trying.run, loaded, trying.options, runs)
+        directory = make_run_directory(trying.run, loaded, trying.options, runs)
         recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), ())
         result = recording.execute(subject.seed, began)
         leave_report(result.run)

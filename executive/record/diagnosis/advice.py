@@ -18,24 +18,24 @@ from executive.tree.registry import control_nodes
 REMEDIES: Mapping[str, str] = {
     "camera_moved": "mount camera and bins as the cell file says, or measure the pose again"
 }
-"""Advice by the reason of a failure after which no mission can go on: every further look would mislead it."""
+"""Advice by the reason of a failure after which all looks mislead, so that no mission can continue."""
 
 
-def advice(case: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
-    """Yield advice for a person, the most pressing first.
+def give_advice(case: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
+    """Yield advice for a person, the most urgent first.
 
     Args:
         case: The run.
-        arm: The state of the arm in words.
-        reads: Answers of the cell that the failed skill had.
+        arm: State of the arm in words.
+        reads: Answers of the cell to the failed skill.
     """
     if arm != "at rest":
         yield f"keep away from the arm until you have seen it stand still: {arm}"
     if case.end.holds:
-        what = "what is in it" if case.end.holds == "something" else case.end.holds
-        ended = case.end.status == "FAILURE"
-        to_go_on = "" if ended else f"to go on with this run leave {what} in the tool; "
-        yield f"{to_go_on}take {what} out of the tool before another run"
+        content = "what is in it" if case.end.holds == "something" else case.end.holds
+        can_resume = case.end.status != "FAILURE"
+        resumption = f"to go on with this run leave {content} in the tool; " if can_resume else ""
+        yield f"{resumption}take {content} out of the tool before another run"
     else:
         for name in case.timeline.items.unfinished("held"):
             yield f"see where {name} lies: it was let go as the run ended"
@@ -50,45 +50,45 @@ def advice(case: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[str]
         yield "mend what is broken, in the code or in the cell: a fault is never tried again"
     if remedy := REMEDIES.get(case.end.reason.rpartition(".")[2]):
         yield remedy
-    elif ways := list(_ways_on(case)):
-        yield f"to let the mission go on after {case.end.reason}: {', or '.join(ways)}"
+    elif changes := list(_suggest_changes(case)):
+        yield f"to let the mission go on after {case.end.reason}: {', or '.join(changes)}"
     for name, item in case.lost.items():
-        yield f"look for {name} by hand, {_whereabouts(item)}"
+        yield f"look for {name} by hand, {_describe_position(item)}"
 
 
-def _whereabouts(item: ItemTimeline) -> str:
+def _describe_position(item: ItemTimeline) -> str:
     if item.dropped is not None and (item.sighting is None or item.sighting.clock < item.dropped):
         return "below where it was dropped"
     return "around ({:.2f}, {:.2f}) m".format(*item.now.position)
 
 
-def _ways_on(case: FailedRun) -> Iterator[str]:
-    """Yield what the mission would have to say for this failure not to end it."""
+def _suggest_changes(case: FailedRun) -> Iterator[str]:
+    """Yield changes of the mission with which the failure would not end the run."""
     if not case.links:
         return
-    advice = [(link, one) for link in reversed(case.links) if link.model for one in _advice_of(link)]
-    handlers = [(link, one) for link, one in advice if link.model and link.model.remedy]
+    advice = [
+        (link, change)
+        for link in reversed(case.links)
+        if link.model
+        for change in link.model.advise(link.failure)
+    ]
+    handlers = [(link, change) for link, change in advice if link.model and link.model.remedy]
     if handlers:
-        yield _located(case, *handlers[0])
+        yield _add_place(case, *handlers[0])
     else:
         remedy = next(kind.remedy for kind in control_nodes().values() if kind.remedy)
-        yield f"{remedy} {case.place(case.links[-1].node)}"
-    for link, one in advice:
-        if (link, one) not in handlers:
-            yield _located(case, link, one)
+        yield f"{remedy} {case.locate(case.links[-1].node)}"
+    for link, change in advice:
+        if (link, change) not in handlers:
+            yield _add_place(case, link, change)
             if link.attempt:
                 return
 
 
-def _advice_of(link: Link) -> Iterator[Advice]:
-    if link.model:
-        yield from link.model.advise(link.failure)
-
-
-def _located(case: FailedRun, link: Link, advice: Advice) -> str:
-    """Return an advice with the place to change: the command line if the value is a param, else the file."""
+def _add_place(case: FailedRun, link: Link, advice: Advice) -> str:
+    """Return advice with the place of the change: option `--set` for a param, else the line of the node."""
     at = node_of(advice.child) if advice.child else link.node
     value = link.node.values.get(advice.key) if isinstance(link.node, InnerNode) else None
     params = case.loaded.mission.params.items() if isinstance(value, Literal) else ()
     name = next((name for name, param in params if param.value.mark == getattr(value, "mark", None)), "")
-    return f"{advice.text} {f'with --set {name}=...' if name else f'at {case.place(at)}'}"
+    return f"{advice.text} {f'with --set {name}=...' if name else f'at {case.locate(at)}'}"

@@ -1,8 +1,7 @@
-"""The way of a failure from the root of the tree to the node that decided, and why nothing stopped it."""
+"""Path of a failure through the tree, from the root to its origin, with explanations of the control nodes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from executive.mission.model.instance import inspection_instance, node_of
@@ -16,18 +15,18 @@ from executive.tree.keys import Child
 from executive.tree.node import ControlNode
 
 _NEVER = Activation("", 0, "", "", "INVALID", 0, 0.0, 0, 0.0)
-"""Stands for the activation of a node that never started."""
+"""Activation of a node that never started."""
 
 
 @dataclass(frozen=True)
 class Link:
-    """One node on the way.
+    """Node that a failure passed.
 
     Attributes:
         node: The node of the mission.
-        subtree: Name of the subtree it stands in, or "".
-        model: Its control node, which explains failures; None for any other node.
-        failure: The failure as this node saw it.
+        subtree: Name of the subtree that contains the node, or "".
+        model: Control node that explains failures; None for other nodes.
+        failure: The failure as input of the node.
     """
 
     node: Node
@@ -37,72 +36,66 @@ class Link:
 
     @property
     def name(self) -> str:
-        """Its name in a report: `look: retry`."""
+        """Name of the node in a report: `look: retry`."""
         name = name_of(self.node)
         return f"{self.subtree}: {name}" if self.subtree else name
 
     @property
     def why(self) -> str:
-        """The reason why a control node did not handle the failure; "" for any other node."""
+        """Reason why a control node did not handle the failure; "" for other nodes."""
         return self.model.explain(self.failure) if self.model and self.failure.child else ""
 
     @property
     def attempt(self) -> tuple[int, int] | None:
-        """Number of the failed attempt and of the allowed ones; None for a node that does not count."""
+        """Number of the failed attempt and number of allowed attempts; None if the node counts none."""
         return self.model.count_attempts(self.failure) if self.model else None
 
 
-def chain(tree: Node, timeline: Timeline, origin: str, failure: str) -> tuple[Link, ...]:
-    """Return the nodes that a failure passed, from the root to the one at the path `origin`.
+def trace_failure(tree: Node, timeline: Timeline, origin: str, failure: str) -> tuple[Link, ...]:
+    """Return the nodes that a failure passed, from the root to the origin.
 
     Args:
         tree: The mission's tree.
         timeline: Timeline of the run.
-        origin: Path of the node in which it began.
-        failure: Its name: `Grasp.missed`.
+        origin: Path of the node in which the failure began.
+        failure: Name of the failure: `Grasp.missed`.
     """
-    passed = way(tree, origin)
+    passed = find_nodes_on_path(tree, origin)
     source, _, reason = failure.rpartition(".")
     names = {source}
     links: list[Link] = []
     for index in reversed(range(len(passed))):
         node = passed[index]
         below = passed[index + 1] if index + 1 < len(passed) else None
-        subtree = next((one.name for one in reversed(passed[:index]) if isinstance(one, UseNode)), "")
+        subtree = next((above.name for above in reversed(passed[:index]) if isinstance(above, UseNode)), "")
         model = inspection_instance(node) if isinstance(node, InnerNode) else None
-        named = frozenset(Reason(name, reason) for name in names)
-        links.append(Link(node, subtree, model, _passed(timeline, node, model, below, named)))
+        reasons = frozenset(Reason(name, reason) for name in names)
+        links.append(Link(node, subtree, model, _make_passed_failure(timeline, node, model, below, reasons)))
         names |= {node.label} if node.label else set()
     return tuple(reversed(links))
 
 
-def _passed(
-    timeline: Timeline, node: Node, model: ControlNode | None, below: Node | None, names: frozenset[Reason]
+def _make_passed_failure(
+    timeline: Timeline, node: Node, model: ControlNode | None, below: Node | None, reasons: frozenset[Reason]
 ) -> PassedFailure:
-    """Return the failure as a node saw it that came from the node `below`, None if it began there."""
+    """Return the failure as input of a node; `below` is the child that failed, or None at the origin."""
     ran = timeline.nodes.get(node.path) or _NEVER
     children = [child for key in model.keys for child in model.children_of(key)] if model else []
 
     def has_failed(child: Child) -> bool:
-        other = timeline.nodes.get(node_of(child).path)
-        return other is not None and other.number > ran.number and other.status == "FAILURE"
+        last = timeline.nodes.get(node_of(child).path)
+        return last is not None and last.number > ran.number and last.status == "FAILURE"
 
     return PassedFailure(
         next((child for child in children if node_of(child) is below), None),
-        ran.reason, names, ran.handled, ran.messages, ran.last_handled, ran.choice, ran.end - ran.start,
+        ran.reason, reasons, ran.handled, ran.messages, ran.last_handled, ran.choice, ran.end - ran.start,
         has_failed,
     )  # fmt: skip
 
 
-def way(tree: Node, path: str) -> list[Node]:
-    """Return the nodes from the root down to the innermost one at a path; none where there is none."""
-    return next(_ways(tree, path), [])
-
-
-def _ways(node: Node, path: str) -> Iterator[list[Node]]:
-    """Yield the way down to the innermost node at a path."""
-    for child in node.children:
-        for way in _ways(child, path):
-            yield [node, *way]
-    if node.path == path:
-        yield [node]
+def find_nodes_on_path(tree: Node, path: str) -> list[Node]:
+    """Return the nodes from the root to the innermost node at a path; empty if there is no such node."""
+    for child in tree.children:
+        if nodes := find_nodes_on_path(child, path):
+            return [tree, *nodes]
+    return [tree] if tree.path == path else []

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from executive.events import RunEnded
 from executive.mission.model.nodes import Node, SkillNode
 from executive.mission.model.paths import name_of
-from executive.record.diagnosis.advice import advice
+from executive.record.diagnosis.advice import give_advice
 from executive.record.diagnosis.case import FailedRun, verdict
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
 from executive.record.frames import find_picture
@@ -53,7 +53,8 @@ def diagnose(
         loaded: The mission.
         skills: Installed skills by name.
         run: The run directory with all its pictures.
-        is_at_rest: Asks the arm; called only after a fault, because otherwise the arm is at rest.
+        is_at_rest: Function that reads the state of the arm; called only after a fault, because after any
+            other end the arm is at rest.
     """
     if end.status in ("SUCCESS", "INCOMPLETE"):
         return None
@@ -80,7 +81,7 @@ def diagnose(
         reads=reads,
         look=_last_look(case),
         lost=[_lost_item(name, item) for name, item in case.lost.items()],
-        running=[case.named(path) for path in case.running],
+        running=[case.name_skill(path) for path in case.running],
         left=[name for name, item in left.items() if item.now.label in loaded.routes],
         arm=arm,
         holds=end.holds,
@@ -88,26 +89,26 @@ def diagnose(
         recorded=not case.is_unrecorded,
         resumes=end.status not in ENDED and (not case.is_unrecorded or has_begun),
         picture=_picture(case, run),
-        next=list(advice(case, arm, reads)),
+        next=list(give_advice(case, arm, reads)),
     )
 
 
 def _deciding_reads(case: FailedRun, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
-    """Yield the exceptions of the cell for the deciding skill, else its deciding inputs, the latest first."""
+    """Yield exceptions of the cell in the failed skill, or else its deciding inputs, the latest first."""
     node, ran = case.node, case.decided
     if ran is None or not isinstance(node, SkillNode):
         return
-    refused = [reading for reading in ran.readings if reading.raised and reading.tick == ran.end_tick]
+    raised = [reading for reading in ran.readings if reading.raised and reading.tick == ran.end_tick]
     names = [name for part in skills[node.skill].uses for name in DECIDING_INPUTS.get(part, ())]
     read = [reading for reading in ran.readings if reading.name in names and not reading.raised]
-    yield from reversed(refused or read)
+    yield from reversed(raised or read)
 
 
 def _deciding_node(case: FailedRun) -> DecidingNode | None:
     node = case.node
     if node is None:
         return None
-    name = case.named(node.path) if isinstance(node, SkillNode) else name_of(node)
+    name = case.name_skill(node.path) if isinstance(node, SkillNode) else name_of(node)
     return DecidingNode(node.path, name, _place(node))
 
 
@@ -130,13 +131,13 @@ def _lost_item(name: str, item: ItemTimeline) -> LostItem:
 
 
 def _picture(case: FailedRun, run: Path) -> str:
-    """Return the picture of the failure, else of the last decision about the item."""
+    """Return the file of the picture of the failure, or else of the last selection of the item."""
     reason = case.end.reason.rpartition(".")[2] if case.end.status == "FAILURE" else ""
     item = case.timeline.items.by_name.get(case.item)
     if case.lost and item is not None and item.failure is not None:
         reason = item.failure.reason
-    for about in dict.fromkeys([(case.item, reason), (case.item, "")]):
-        file = find_picture(run / "frames", *about)
+    for picture_reason in dict.fromkeys([reason, ""]):
+        file = find_picture(run / "frames", case.item, picture_reason)
         if file is not None:
             return file.relative_to(run).as_posix()
     return ""
@@ -146,16 +147,16 @@ def _state_of_arm(is_at_rest: Callable[[], bool]) -> str:
     try:
         return "at rest" if is_at_rest() else "it was commanded to brake and is not at rest"
     except Exception as error:
-        # The arm may be broken.
+        # A broken arm may raise an exception.
         return f"it does not say whether it is at rest ({type(error).__name__}: {error})"
 
 
 def _place_of_exception(traceback: str) -> str:
     """Return the place at which the first exception was raised: `skills/grasp.py:45, in run`; "" if none."""
-    cause, _, whole = traceback.rpartition(_CAUSED)
-    places = [place.group("file", "line", "function") for place in _PLACE.finditer(cause or whole)]
+    cause, _, last_part = traceback.rpartition(_CAUSED)
+    places = [place.group("file", "line", "function") for place in _PLACE.finditer(cause or last_part)]
     if len(places) > 1 and places[-1][0].endswith(_SKILL) and places[-1][2] == Skill.failed.__name__:
-        places.pop()  # The line of the skill says more.
+        places.pop()  # The caller in the skill is more informative.
     if not places:
         return ""
     file, line, function = places[-1]

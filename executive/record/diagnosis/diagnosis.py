@@ -60,10 +60,10 @@ class LostItem:
 
     Attributes:
         item: Name of the item.
-        look: The last look that showed it, or None.
-        unseen: Number of looks since then.
-        held, dropped: Last times at which the tool got and lost it [s], or None.
-        failed: The last failure that concerned it, or None.
+        look: Last look that showed the item, or None.
+        unseen: Number of looks after `look`.
+        held, dropped: Last times at which the tool picked and lost the item [s], or None.
+        failed: Last failure of a skill that worked on the item, or None.
     """
 
     item: str
@@ -84,21 +84,21 @@ class Diagnosis:
         clock: Time of the end [s].
         mission: The mission file.
         verdict: The cause in one sentence.
-        node: The deciding node, or None.
-        item: Item that the deciding node worked on, or "".
+        node: Node that determined the status, or None.
+        item: Item that this node worked on, or "".
         chain: The nodes that did not handle the failure, from the root, and its origin.
-        reads: Answers of the cell that the failed skill had, the latest first.
-        look: The last look that showed the item, else the last look; None before the first.
+        reads: Answers of the cell to the failed skill, the latest first.
+        look: Last look that showed the item, or else the last look; None if there was no look.
         lost: Lost items.
         running: Skills that were halted, in words.
-        left: Names of the items that were left to do.
+        left: Names of the items that are not sorted.
         arm: `at rest`, or a sentence about the arm.
         holds: Content of the tool, or "".
         raised_at: File, line and function in which the exception of a fault was raised, or "".
         recorded: True if the journal is complete.
         resumes: True if the run can be resumed.
-        picture: File of the best picture below the run directory, or "".
-        next: Advice in sentences, the most pressing first.
+        picture: File of the picture of the failure, relative to the run directory, or "".
+        next: Advice in sentences, the most urgent first.
     """
 
     status: str

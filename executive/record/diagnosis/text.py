@@ -12,10 +12,10 @@ from executive.record.timeline.activation import Reading
 from executive.record.timeline.items import Look, Sighting
 
 WIDTH = 110
-"""Length at which long lines are wrapped [columns]."""
+"""Maximum length of a line [columns]."""
 
 MAX_NODES = 5
-"""Largest number of control nodes that are shown; those next to the root are left out first."""
+"""Maximum number of control nodes in the text; nodes next to the root are omitted first."""
 
 _MAX_READINGS = 3
 _MAX_LOST = 3
@@ -30,7 +30,7 @@ def resume_command(run: str) -> str:
 
 
 def diagnosis_lines(diagnosis: Diagnosis, run: str, repeat: str, report: str = "") -> list[str]:
-    """Return the lines of a diagnosis, the most important first; commands are not wrapped.
+    """Return the lines of a diagnosis, in the order of importance; commands are not wrapped.
 
     Args:
         diagnosis: The diagnosis.
@@ -38,12 +38,12 @@ def diagnosis_lines(diagnosis: Diagnosis, run: str, repeat: str, report: str = "
         repeat: The command that repeats the run.
         report: File of the report of the run, or "".
     """
-    lines = wrapped(
-        f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}", "", "  ", most=3
+    lines = wrap_lines(
+        f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}", "", "  ", max_lines=3
     )
     lines += _passed_nodes(diagnosis)
     for label, text in facts(diagnosis):
-        lines += wrapped(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, most=3)
+        lines += wrap_lines(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, max_lines=3)
     commands = {"record": run, "report": report, "repeat": repeat}
     if diagnosis.resumes:
         commands["go on"] = resume_command(run)
@@ -51,21 +51,21 @@ def diagnosis_lines(diagnosis: Diagnosis, run: str, repeat: str, report: str = "
 
 
 def facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
-    """Yield a word and a sentence for each fact besides the verdict and the nodes."""
+    """Yield a label and a sentence for each fact other than the verdict and the passed nodes."""
     node = diagnosis.node
     if node is not None and not any(link.why for link in diagnosis.chain):
         yield "where", f"{node.path} ({node.place})"
     if diagnosis.raised_at:
-        whole = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.recorded else ""
-        yield "raised at", diagnosis.raised_at + whole
+        hint = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.recorded else ""
+        yield "raised at", diagnosis.raised_at + hint
     if diagnosis.reads:
         reads = diagnosis.reads[:_MAX_READINGS]
-        yield "the cell", ", ".join(_read(reading, diagnosis.verdict) for reading in reads)
+        yield "the cell", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in reads)
     for lost in diagnosis.lost[:_MAX_LOST]:
-        yield "lost", _lost(lost)
+        yield "lost", _format_lost_item(lost)
     # The fact about a lost item contains its last look.
     if not diagnosis.lost:
-        yield "last look", _look(diagnosis.look)
+        yield "last look", _format_look(diagnosis.look)
     if diagnosis.picture:
         yield "picture", diagnosis.picture
     holds = {"": "is empty", "something": "holds something that nobody knows"}
@@ -78,7 +78,7 @@ def facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
 
 
 def _passed_nodes(diagnosis: Diagnosis) -> list[str]:
-    """Return a line for each node that did not handle the failure, and one for the deciding node."""
+    """Return a line for each node that did not handle the failure, and for the origin of the failure."""
     here = f"{diagnosis.mission}:"
     passed = [(link.name, link.why, link.place) for link in diagnosis.chain if link.why]
     node = diagnosis.node
@@ -90,21 +90,21 @@ def _passed_nodes(diagnosis: Diagnosis) -> list[str]:
     lines = [f"why nothing in {diagnosis.mission} stopped it, from the root down{above}:"]
     for name, why, place in shown:
         line = f"line {place.removeprefix(here)}" if place.startswith(here) else place
-        lines += wrapped(f"{why} ({line})", f"  {name:{width}}  ", " " * (width + 4))
+        lines += wrap_lines(f"{why} ({line})", f"  {name:{width}}  ", " " * (width + 4))
     return lines
 
 
-def wrapped(text: str, first: str, others: str, *, most: int = 2) -> list[str]:
-    """Return a text in at most `most` lines of `WIDTH`; numbers stay on the line of their units."""
+def wrap_lines(text: str, first: str, others: str, *, max_lines: int = 2) -> list[str]:
+    """Return a text in at most `max_lines` lines; a number and its unit stay on one line."""
     lines = textwrap.wrap(
-        _UNIT.sub(_JOINED, text), WIDTH, initial_indent=first, subsequent_indent=others, max_lines=most,
+        _UNIT.sub(_JOINED, text), WIDTH, initial_indent=first, subsequent_indent=others, max_lines=max_lines,
         placeholder=" ...", break_on_hyphens=False,
     )  # fmt: skip
     return [line.replace(_JOINED, " ") for line in lines]
 
 
-def _read(reading: Reading, verdict: str) -> str:
-    """Return an answer of the cell; the message of an exception only if the verdict lacks it."""
+def _format_reading(reading: Reading, verdict: str) -> str:
+    """Return an answer of the cell as text, without a message that the verdict contains."""
     name, value, when = reading.name, reading.value, f"({reading.clock:.2f} s)"
     if reading.raised:
         text = "" if str(value) in verdict else f": {value}"
@@ -112,23 +112,23 @@ def _read(reading: Reading, verdict: str) -> str:
     return f"{name} = {value:g} {when}" if isinstance(value, float) else f"{name} = {value} {when}"
 
 
-def _look(look: Sighting | Look | None) -> str:
+def _format_look(look: Sighting | Look | None) -> str:
     if look is None:
         return "none so far"
     where = f"frame {look.frame}, camera {look.camera}, by {look.detector}, at {look.clock:.2f} s"
     if isinstance(look, Look):
-        return f"{where}: {_counted(look.found, 'box', 'boxes')}"
+        return f"{where}: {_format_count(look.found, 'box', 'boxes')}"
     seen = "" if look.confidence is None else f" as {look.label} {look.confidence:.2f}"
-    known = f"{_counted(look.looks, 'look')}, {_counted(look.attempts, 'failed attempt')} in all"
-    return f"{look.item}{seen}{_at(look.position)}: {where}; {known}"
+    known = f"{_format_count(look.looks, 'look')}, {_format_count(look.attempts, 'failed attempt')} in all"
+    return f"{look.item}{seen}{_format_position(look.position)}: {where}; {known}"
 
 
-def _lost(lost: LostItem) -> str:
+def _format_lost_item(lost: LostItem) -> str:
     look, failed, dropped = lost.look, lost.failed, lost.dropped
     facts = [lost.item]
     if look is not None:
-        facts[0] += f" seen last{_at(look.position)} at {look.clock:.2f} s"
-        facts[0] += f", not in the {_counted(lost.unseen, 'look')} since"
+        facts[0] += f" seen last{_format_position(look.position)} at {look.clock:.2f} s"
+        facts[0] += f", not in the {_format_count(lost.unseen, 'look')} since"
     if dropped is not None and (failed is None or failed.clock != dropped):
         facts.append(f"dropped at {dropped:.2f} s")
     if failed is not None:
@@ -136,9 +136,9 @@ def _lost(lost: LostItem) -> str:
     return "; ".join(facts)
 
 
-def _at(position: Sequence[float] | None) -> str:
+def _format_position(position: Sequence[float] | None) -> str:
     return "" if position is None else " at ({:.3f}, {:.3f}, {:.3f}) m".format(*position)
 
 
-def _counted(count: int, one: str, many: str = "") -> str:
+def _format_count(count: int, one: str, many: str = "") -> str:
     return f"{count} {one if count == 1 else many or one + 's'}"

@@ -78,12 +78,12 @@ class Activation:
         return self.reason or self.item
 
 
-def by_node(activations: Iterable[Activation]) -> dict[str, list[Activation]]:
+def group_by_node(activations: Iterable[Activation]) -> dict[str, list[Activation]]:
     """Return the activations of each node by its path."""
-    found: dict[str, list[Activation]] = {}
+    grouped: dict[str, list[Activation]] = {}
     for activation in activations:
-        found.setdefault(activation.node, []).append(activation)
-    return found
+        grouped.setdefault(activation.node, []).append(activation)
+    return grouped
 
 
 def count_ends(activations: Iterable[Activation]) -> str:
@@ -92,9 +92,9 @@ def count_ends(activations: Iterable[Activation]) -> str:
     return ", ".join(f"{ends[status]} {word}" for status, word in _WORDS.items() if ends[status])
 
 
-def last_failure(activations: Sequence[Activation]) -> str:
+def find_last_failure(activations: Sequence[Activation]) -> str:
     """Return reason and message of the last activation that failed; "" if none failed."""
-    failures = (one.failure for one in reversed(activations) if one.status == "FAILURE")
+    failures = (activation.failure for activation in reversed(activations) if activation.status == "FAILURE")
     return next(failures, "")
 
 

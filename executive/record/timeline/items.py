@@ -59,13 +59,13 @@ class ItemTimeline:
     """Events of one item.
 
     Attributes:
-        now: Its last change.
-        changed: Number of its last change of state among all changes of state in the run.
-        final_state: Its state when the tree ended, before the ledger closed its accounts.
-        sighting: The last look that showed it, or None.
-        unseen: Number of looks since then.
-        held, dropped: Last times at which the tool got and lost it [s], or None.
-        failure: The last activation of a skill that worked on it and failed, or None.
+        now: Last change of the item.
+        changed: Number of the last change of state of the item, among all changes of state in the run.
+        final_state: State of the item at the end of the tree, before the ledger closed its accounts.
+        sighting: Last look that showed the item, or None.
+        unseen: Number of looks after `sighting`.
+        held, dropped: Last times at which the tool picked and lost the item [s], or None.
+        failure: Last failed activation of a skill that worked on the item, or None.
     """
 
     now: ItemChanged
@@ -116,17 +116,17 @@ class ItemsTimeline:
     def add_look(self, event: FrameSearched, clock: float) -> None:
         """Add a look at the time `clock` [s]; the items that it showed have changed before."""
         self.look = Look(event.frame, event.camera, event.detector, clock, len(event.found))
-        # Sorted, so that most runs have the same order.
-        self.classes |= dict.fromkeys(sorted(one.label for one in event.found))
+        # The classes are sorted, so that most runs have the same order.
+        self.classes |= dict.fromkeys(sorted(found.label for found in event.found))
         for item in self.by_name.values():
             item.unseen += 1
         for name in self._seen_now:
             item = self.by_name[name]
-            item.sighting, item.unseen = _sighting(self.look, item.now, event.found), 0
+            item.sighting, item.unseen = _make_sighting(self.look, item.now, event.found), 0
         self._seen_now.clear()
 
     def unfinished(self, *states: str) -> dict[str, ItemTimeline]:
-        """Return the items by name that had one of these states when the tree ended.
+        """Return the items by name that had one of the given states at the end of the tree.
 
         The accounts of the ledger may prove afterwards that an item is placed or was a phantom.
         """
@@ -141,8 +141,8 @@ class ItemsTimeline:
         return [item.now for item in self.by_name.values()]
 
 
-def _sighting(look: Look, now: ItemChanged, found: Sequence[DetectedObject]) -> Sighting:
-    box = min(found, key=lambda one: math.dist(one.position, now.position), default=None)
-    shown = (None, None, None) if box is None else (box.label, box.confidence, box.position)
-    where = (look.frame, look.camera, look.detector, look.clock)
-    return Sighting(*where, now.item, now.attempts, now.looks, *shown)
+def _make_sighting(look: Look, now: ItemChanged, found: Sequence[DetectedObject]) -> Sighting:
+    nearest = min(found, key=lambda seen: math.dist(seen.position, now.position), default=None)
+    detection = (None,) * 3 if nearest is None else (nearest.label, nearest.confidence, nearest.position)
+    look_fields = (look.frame, look.camera, look.detector, look.clock)
+    return Sighting(*look_fields, now.item, now.attempts, now.looks, *detection)

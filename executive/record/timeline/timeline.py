@@ -1,4 +1,4 @@
-"""Timeline of a run: the only fold of its events, for live and for recorded runs."""
+"""Timeline of a run: the fold of its events, for running and recorded runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.record.timeline.items import ItemsTimeline
 
 @dataclass
 class PlanningTotals:
-    """Planned motions, including those planned again and those for which the planner found no solution.
+    """Planned motions, including repeated plans and plans without a solution.
 
     Attributes:
         motions: Number of planned motions.
@@ -31,7 +31,7 @@ class Timeline:
     """Fold of the events of a run; an observer.
 
     Attributes:
-        history: Keep all activations and selections. Without them, the memory depends only on the size of
+        history: True to keep all activations and selections; otherwise the memory depends only on the size of
             the mission and on the number of items.
         started, ended: Start and end of the run, or None.
         tick, clock: Control step and time of the last event [s].
@@ -45,7 +45,7 @@ class Timeline:
         selections: Time of each selection [s], and its item.
         planning: Counts of the planned motions.
         question: The question that the operator has not answered, or None.
-        requests: Answers of the operator; None for the wish to quit.
+        requests: Requests of the operator; None for the request to quit.
         faults: Time of each injected fault [s], and its name.
         traceback: Traceback of the exception that ended the run, or "".
     """
@@ -74,7 +74,7 @@ class Timeline:
 
     @staticmethod
     def of(recorded: Iterable[events.TimedEvent]) -> Timeline:
-        """Return the timeline of a recorded run; activations that were running at its end last until then."""
+        """Return the timeline of a recorded run; running activations last until the last event."""
         timeline = Timeline()
         for timed in recorded:
             timeline(timed)
@@ -189,7 +189,7 @@ class Timeline:
 
     def _add_reading(self, event: events.InputRead) -> None:
         self._readings.pop(event.name, None)
-        # The sentences of the diagnosis can quote these types, but no poses, images and lists.
+        # The diagnosis quotes values of these types, but no poses, images or lists.
         if isinstance(event.value, (bool, int, float, str)):
             reading = Reading(event.name, event.value, event.raised, self.tick, self.clock)
             self._readings[event.name] = reading

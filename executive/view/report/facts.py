@@ -9,7 +9,7 @@ from executive.mission.text.files import shipped_folder
 from executive.record.diagnosis.text import resume_command
 from executive.record.journal import find_end, find_start, read_journal
 from executive.record.recorded_mission import read_tree
-from executive.record.result import ENDED, read_result, requests_of
+from executive.record.result import ENDED, list_requests, read_result
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
 from executive.view.report.pictures import pictures
@@ -60,7 +60,7 @@ class ReportFacts:
         self.objects = [item for item in items if item.state != "phantom"]
         self.shares = shares(self.timeline, self.nodes)
         self.pictures = pictures(directory.frames, [item.item for item in items])
-        self.requests = requests_of(self.timeline)
+        self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
         mission = file.stem if file.parent == shipped_folder() else str(file)
         origin = mission, self.start.seed, self.start.overrides

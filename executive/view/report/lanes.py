@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation, by_node, count_ends, last_failure
+from executive.record.timeline.activation import Activation, count_ends, find_last_failure, group_by_node
 from executive.record.timeline.timeline import Timeline
 from executive.view.text import extent, fitted, render
 
@@ -58,7 +58,7 @@ def draw_lanes(timeline: Timeline, nodes: Sequence[OutlineNode]) -> str:
     lane are one bar, in the colour of the worst of them, so the size of the document has a bound however long
     the run was.
     """
-    ran, end = by_node(timeline.activations), timeline.clock
+    ran, end = group_by_node(timeline.activations), timeline.clock
     shown = [node for node in nodes if node.path in ran]
     names = {node.path: "".join(fitted(node.name, _COLUMNS)) for node in shown}
     left = max((_STEP * node.depth + extent(names[node.path], _LETTERS) for node in shown), default=0.0) + 12
@@ -114,6 +114,6 @@ def _bar(node: OutlineNode, blot: Sequence[Activation]) -> Bar:
     item = f" of {blot[0].item}" if blot[0].item and len(items) == 1 else ""
     how = blot[0].status if len(blot) == 1 else count_ends(blot)
     when = f"{start:.2f} s to {end:.2f} s ({end - start:.2f} s)"
-    words = "\n".join(filter(None, (f"{node.name}{item}: {how}", when, last_failure(blot))))
+    words = "\n".join(filter(None, (f"{node.name}{item}: {how}", when, find_last_failure(blot))))
     worst = min((one.status for one in blot), key=_WORST.index)
     return Bar(start, end, worst.lower(), words)

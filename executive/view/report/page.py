@@ -17,7 +17,7 @@ from executive.record.diagnosis import text
 from executive.record.pictures.palette import PALETTE
 from executive.record.result import disagreement
 from executive.record.run_directory import RunDirectory, convert_os_errors
-from executive.record.timeline.activation import by_node, count_ends, last_failure
+from executive.record.timeline.activation import count_ends, find_last_failure, group_by_node
 from executive.view.report.facts import ReportFacts
 from executive.view.report.lanes import draw_lanes
 from executive.view.report.shares import LOOK, RETRY, WAITING
@@ -128,6 +128,6 @@ def _colours(activities: Sequence[str]) -> dict[str, str]:
 def _notes(facts: ReportFacts) -> dict[str, Note]:
     """Return the note of each node in the picture of the tree."""
     return {
-        path: Note(ran[-1].status, tuple(filter(None, (count_ends(ran), last_failure(ran)))))
-        for path, ran in by_node(facts.timeline.activations).items()
+        path: Note(ran[-1].status, tuple(filter(None, (count_ends(ran), find_last_failure(ran)))))
+        for path, ran in group_by_node(facts.timeline.activations).items()
     }
