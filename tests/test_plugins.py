@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from executive.errors import InputError
-from executive.perception.detectors.registry import installed
+from executive.perception.detectors.registry import find_detector_kinds
 from executive.plugins import cell_kind, discover, registered
 
 Write = Callable[..., Path]
@@ -78,7 +78,7 @@ def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None
         cells='bench = "hall_four.part:Bench"', detectors='eye = "hall_four.part:Eye"',
     )  # fmt: skip
     assert cell_kind("bench").__name__ == "Bench"
-    assert installed()["eye"].load().__name__ == "Eye"
+    assert find_detector_kinds()["eye"].load().__name__ == "Eye"
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None
     [
         ("skills", "skill", discover),
         ("cells", "kind of cell", lambda: cell_kind("wave")),
-        ("detectors", "kind of detector", lambda: installed()["wave"].load()),
+        ("detectors", "kind of detector", lambda: find_detector_kinds()["wave"].load()),
     ],
 )
 def test_what_cannot_be_loaded_is_named_with_place_and_file(

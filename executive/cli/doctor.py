@@ -135,7 +135,7 @@ def check_plugins() -> Iterator[Diagnosed]:
     from executive.plugins import CELL_KINDS, discover, project_here, registered
 
     skills, project = discover(), project_here()
-    kinds, detectors = registered(CELL_KINDS, "kind of cell"), registry.installed()
+    kinds, detectors = registered(CELL_KINDS, "kind of cell"), registry.find_detector_kinds()
     for entry in (*kinds.values(), *detectors.values()):
         entry.load()
     message = f"{len(skills)} skills, {len(kinds)} kinds of cells, {len(detectors)} kinds of detectors"
@@ -209,7 +209,7 @@ def prepare_drawing(renderer: str) -> Callable[[], object]:
     from executive.cells.sim.camera import CELL_LIGHT, camera_pose, render
     from executive.cells.sim.world import World
     from executive.cli.cells import load_cells
-    from executive.perception.camera_model import calibrated
+    from executive.perception.camera_model import compute_calibration
 
     if renderer == "egl":
         pybullet.connect(pybullet.DIRECT)
@@ -220,7 +220,7 @@ def prepare_drawing(renderer: str) -> Callable[[], object]:
     config = load_cells(("overhead",))["overhead"]
     camera = next(iter(config.cameras.values()))
     world = World(config)
-    matrix, _ = calibrated(camera)
+    matrix, _ = compute_calibration(camera)
     return lambda: render(world, matrix, camera_pose(world, camera), (0, 0, *FRAME_SIZE), CELL_LIGHT)
 
 

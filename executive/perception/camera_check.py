@@ -1,4 +1,4 @@
-"""Check of a camera's declared pose: do the bins appear in a frame where they should?"""
+"""Check of a camera's declared pose against the outlines of the bins in a frame."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from executive.cell.bins import Bin
 from executive.cell.frame import Frame
 from executive.geometry import Array
+from executive.perception.camera_model import project
 from executive.perception.outline_fit import Fit, OutlineFitter
 
 MAX_DISTANCE = 0.005
@@ -76,21 +77,21 @@ def estimate_offset(frame: Frame, bins: Sequence[Bin]) -> CameraOffset | None:
     fitting = OutlineFitter(frame, bins)
     near = fitting.refine(np.zeros(6))
     if near is not None and near.support >= MIN_CLEAR_SUPPORT:
-        offset = _offset(near, frame, bins)
+        offset = _convert_fit(near, frame, bins)
         if offset.distance <= MAX_DISTANCE:
             return offset
-    # The nearest edges may belong to something else: search the pose that explains most of the outlines.
+    # The nearest edges may belong to other things: search for the pose that explains most of the outlines.
     fits = [fit for fit in (near, *fitting.search()) if fit is not None]
     best = max(fits, key=lambda fit: fit.support, default=None)
-    least = max(MIN_SUPPORT, fitting.support(np.zeros(6)) + MIN_GAIN)
-    return None if best is None or best.support < least else _offset(best, frame, bins)
+    min_support = max(MIN_SUPPORT, fitting.support(np.zeros(6)) + MIN_GAIN)
+    return None if best is None or best.support < min_support else _convert_fit(best, frame, bins)
 
 
-def _offset(fit: Fit, frame: Frame, bins: Sequence[Bin]) -> CameraOffset:
+def _convert_fit(fit: Fit, frame: Frame, bins: Sequence[Bin]) -> CameraOffset:
     """Return a fit as an offset in the world."""
     samples, R_WC = fit.samples, frame.X_WC.rotation
-    declared = frame.X_WC.inverse().apply(samples.points) @ frame.matrix.T
-    pixels = np.linalg.norm(samples.pixels - declared[:, :2] / declared[:, 2:], axis=1)
+    declared = project(frame.matrix, frame.X_WC, samples.points)
+    pixels = np.linalg.norm(samples.pixels - declared, axis=1)
     return CameraOffset(
         shift=R_WC @ fit.offset[3:],
         shift_std=np.sqrt(np.diag(R_WC @ fit.covariance[3:, 3:] @ R_WC.T)),

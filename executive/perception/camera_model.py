@@ -1,4 +1,4 @@
-"""The pinhole camera: where a point in the world appears in an image, and back.
+"""Pinhole camera model: projection of points into an image, and rays through its pixels.
 
 Camera frames follow OpenCV (z along the optical axis, x to the right, y down). Image coordinates are
 continuous: pixel i covers [i, i + 1), so the principal point of a centred camera is (W / 2, H / 2).
@@ -19,7 +19,7 @@ NEAR, FAR = 0.02, 5.0
 """Clipping planes of rendered cameras [m]."""
 
 
-def camera_matrix(width: int, height: int, fov_deg: float) -> Array:
+def compute_camera_matrix(width: int, height: int, fov_deg: float) -> Array:
     """Return the camera matrix `(3, 3)` [pixel] of a centred camera with square pixels.
 
     Args:
@@ -31,18 +31,18 @@ def camera_matrix(width: int, height: int, fov_deg: float) -> Array:
     return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
 
 
-def field_of_view(matrix: Array, height: int) -> float:
+def compute_field_of_view(matrix: Array, height: int) -> float:
     """Return the vertical field of view [degree] of a camera matrix `(3, 3)` and an image height [pixel]."""
     return 2 * math.degrees(math.atan(height / 2 / float(matrix[1, 1])))
 
 
-def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
+def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
     """Return the pose of a camera at `position` whose optical axis passes through `target`.
 
-    `up` `(3,)` is the direction that the top of the image shows; it need not be square to the axis.
+    `up` `(3,)` is the direction towards the top of the image; it need not be perpendicular to the axis.
 
     Raises:
-        ValueError: The three do not determine a pose.
+        ValueError: The three arguments do not determine a pose.
     """
     origin = np.asarray(position, dtype=float)
     axis = np.asarray(target, dtype=float) - origin
@@ -58,35 +58,35 @@ def looking_at(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
     return Pose(np.column_stack([x, np.cross(z, x), z]), origin)
 
 
-def from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Array, Pose]:
-    """Return camera matrix `(3, 3)` [pixel] and pose `X_WC` of a camera that OpenCV describes.
+def convert_from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Array, Pose]:
+    """Return camera matrix `(3, 3)` [pixel] and pose `X_WC` of a camera calibrated with OpenCV.
 
-    The way back from `Frame.opencv`. OpenCV's pixels have their centres at whole numbers, ours half a
-    pixel further; its rvec [rad] and tvec [m], as `cv2.solvePnP` returns them, lead from W to C.
+    The inverse of `Frame.opencv`. Pixel centres have integer coordinates in OpenCV, and are half a pixel
+    further here; rvec [rad] and tvec [m] of `cv2.solvePnP` transform points from W to C.
     """
-    # Loading scipy.spatial takes a third of a second, and few cells are calibrated by OpenCV.
+    # The import takes a third of a second, and few cells have a camera calibrated with OpenCV.
     from scipy.spatial.transform import Rotation
 
-    ours = np.array(matrix, dtype=float)
-    ours[:2, 2] += 0.5
+    shifted = np.array(matrix, dtype=float)
+    shifted[:2, 2] += 0.5
     X_CW = Pose(Rotation.from_rotvec(rvec).as_matrix(), np.asarray(tvec, dtype=float))
-    return ours, X_CW.inverse()
+    return shifted, X_CW.inverse()
 
 
-def calibrated(config: CameraConfig) -> tuple[Array, Pose]:
-    """Return the camera matrix `(3, 3)` [pixel] of a cell file's camera and its pose `X_MC`.
+def compute_calibration(config: CameraConfig) -> tuple[Array, Pose]:
+    """Return the camera matrix `(3, 3)` [pixel] and the pose `X_MC` of a camera in a cell file.
 
-    M is what it is mounted on: the world of a fixed camera, the flange of one on the wrist.
+    Frame M is the world for a fixed camera, and the flange for a wrist camera.
     """
-    given = config.calibration
-    if given is None:
-        assert config.position and config.look_at and config.up and config.fov_deg, "CameraConfig sees to it"
-        matrix = camera_matrix(config.width, config.height, config.fov_deg)
-        return matrix, looking_at(config.position, config.look_at, config.up)
-    transform = given.mount_to_camera or given.camera_to_mount
-    assert transform is not None, "CalibrationConfig sees to it"
-    matrix, X_MC = from_opencv(given.matrix, transform.rotation, transform.translation)
-    return matrix, X_MC if given.mount_to_camera else X_MC.inverse()
+    calibration = config.calibration
+    if calibration is None:
+        assert config.position and config.look_at and config.up and config.fov_deg, "checked by CameraConfig"
+        matrix = compute_camera_matrix(config.width, config.height, config.fov_deg)
+        return matrix, compute_look_at_pose(config.position, config.look_at, config.up)
+    transform = calibration.mount_to_camera or calibration.camera_to_mount
+    assert transform is not None, "checked by CalibrationConfig"
+    matrix, X_MC = convert_from_opencv(calibration.matrix, transform.rotation, transform.translation)
+    return matrix, X_MC if calibration.mount_to_camera else X_MC.inverse()
 
 
 def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
@@ -98,8 +98,8 @@ def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
     return np.asarray(p[..., :2] / p[..., 2:])
 
 
-def pixel_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:
-    """Return the direction `(3,)` in the world, of length 1, in which the camera sees `pixel` `(2,)`."""
+def compute_pixel_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:
+    """Return the unit vector `(3,)` in the world along the ray through `pixel` `(2,)`."""
     u, v = np.asarray(pixel, dtype=float)
     direction = X_WC.rotation @ np.linalg.solve(matrix, np.array([u, v, 1.0]))
     return np.asarray(direction / np.linalg.norm(direction))
@@ -109,7 +109,7 @@ def intersect_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Ar
     """Return the point `(3,)` [m] at height `z` [m] in the world that appears at `pixel` `(2,)`.
 
     Raises:
-        ValueError: The camera does not look towards that height there.
+        ValueError: The ray through the pixel does not meet that height in front of the camera.
     """
     u, v = np.asarray(pixel, dtype=float)
     direction = X_WC.rotation @ np.linalg.solve(matrix, np.array([u, v, 1.0]))
@@ -122,19 +122,21 @@ def intersect_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Ar
     return np.asarray(X_WC.position + drop / direction[2] * direction)
 
 
-def view_matrix(X_WC: Pose) -> tuple[float, ...]:
-    """Return OpenGL's view matrix, 16 numbers column by column, as PyBullet takes it."""
+def compute_view_matrix(X_WC: Pose) -> tuple[float, ...]:
+    """Return the view matrix of OpenGL and PyBullet: 16 numbers, column by column."""
     X_CW = X_WC.inverse()
     view = np.eye(4)
     view[:3, :3], view[:3, 3] = X_CW.rotation, X_CW.position
     return tuple((np.diag([1.0, -1.0, -1.0, 1.0]) @ view).T.ravel().tolist())
 
 
-def projection_matrix(matrix: Array, part: Box, near: float = NEAR, far: float = FAR) -> tuple[float, ...]:
-    """Return OpenGL's projection matrix, 16 numbers column by column, of a part of an image.
+def compute_projection_matrix(
+    matrix: Array, part: Box, near: float = NEAR, far: float = FAR
+) -> tuple[float, ...]:
+    """Return OpenGL's projection matrix of a part of an image: 16 numbers, column by column.
 
-    A renderer that uses it draws just `part` (left, top, right, bottom [pixel]) of the camera's image,
-    with the pixels the full image would have there. `near` and `far` are the clipping planes [m].
+    A renderer with this matrix draws `part` (left, top, right, bottom [pixel]) of the camera's image; the
+    pixels are those of the full image. `near` and `far` are the clipping planes [m].
     """
     (left, top), (right, bottom) = (
         ((x - matrix[0, 2]) / matrix[0, 0] * near, (matrix[1, 2] - y) / matrix[1, 1] * near)

@@ -13,6 +13,7 @@ from executive.cell.frame import Box, Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
+from executive.perception.camera_model import project
 from executive.perception.depth_image import measure_top
 
 MAX_HEIGHT_ERROR = 0.003
@@ -109,7 +110,7 @@ def describe_wrong_top(
     except NoDepth:
         return ""
     expected = _list_tops(detection.label, classes)
-    tolerance = TOP_TOLERANCE * max(1.0, (_depth_of(position, frame) / REFERENCE_DISTANCE) ** 2)
+    tolerance = TOP_TOLERANCE * max(1.0, (frame.depth_of(position) / REFERENCE_DISTANCE) ** 2)
     if min(abs(top - height) for height in expected) <= tolerance:
         return ""
     *lower, highest = [f"{height * 1000:.0f}" for height in expected]
@@ -145,7 +146,7 @@ def describe_wrong_size(
         return ""
     left, top, right, bottom = detection.box
     sides = _project_cylinder(position, frame, object_class)
-    scale = float(frame.matrix[0, 0]) / _depth_of(position, frame)
+    scale = float(frame.matrix[0, 0]) / frame.depth_of(position)
     shortest = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_MARGIN
     longest = max(sides) * (1 + SIZE_TOLERANCE) + SIZE_MARGIN
     measured = max(right - left, bottom - top)
@@ -164,16 +165,10 @@ def _is_whole(detection: Detection, frame: Frame, area: Box) -> bool:
     return border_distance >= MIN_BORDER_DISTANCE and frame.visible_share(detection.box) >= 1.0
 
 
-def _depth_of(position: Array, frame: Frame) -> float:
-    """Return the distance [m] of a point `(3,)` [m] from the camera, along the optical axis."""
-    return float(frame.X_WC.inverse().apply(position)[2])
-
-
 def _project_cylinder(position: Array, frame: Frame, object_class: ObjectClass) -> tuple[float, float]:
     """Return width and height [pixel] of the box around the image of the cylinder that encloses a class."""
     angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
     x, y = object_class.radius * np.cos(angles), object_class.radius * np.sin(angles)
     rims = [np.stack((x, y, np.full(16, level * object_class.height)), axis=1) for level in (-0.5, 0.5)]
-    points = frame.X_WC.inverse().apply(position + np.concatenate(rims)) @ frame.matrix.T
-    width, height = np.ptp(points[:, :2] / points[:, 2:], axis=0)
+    width, height = np.ptp(project(frame.matrix, frame.X_WC, position + np.concatenate(rims)), axis=0)
     return float(width), float(height)

@@ -13,7 +13,7 @@ from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
-from executive.perception.camera_model import intersect_plane, pixel_ray
+from executive.perception.camera_model import compute_pixel_ray, intersect_plane
 from executive.perception.depth_image import measure_top
 from executive.perception.evidence import describe_wrong_size, describe_wrong_top
 
@@ -139,7 +139,7 @@ def _height_by_ray(cast: Cast, detection: Detection, frame: Frame, kind: ObjectC
     Raises:
         NoDepth: The ray hits nothing.
     """
-    hit = cast(frame.X_WC.position, pixel_ray(frame.matrix, frame.X_WC, detection.centre))
+    hit = cast(frame.X_WC.position, compute_pixel_ray(frame.matrix, frame.X_WC, detection.centre))
     if hit is None:
         column, row = detection.centre
         raise NoDepth(f"the ray through pixel ({column:.0f}, {row:.0f}) of frame {frame.id} hits nothing")

@@ -1,4 +1,4 @@
-"""Part of a camera that follows from its section of the cell file alone."""
+"""Base class of the cameras of cells: pose, calibration and numbering of frames."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from executive.cell.config import CameraConfig
 from executive.cell.frame import Box, Frame
 from executive.cell.protocols import Clock
 from executive.geometry import Array, Pose
-from executive.perception.camera_model import calibrated
+from executive.perception.camera_model import compute_calibration
 
 
 class MountedCamera:
-    """Base of the cameras of cells, whose frames are numbered from 1; part of `cell.protocols.Camera`.
+    """Base of the cameras of cells, with frames numbered from 1; implements part of `cell.protocols.Camera`.
 
     Args:
-        name: Its name in the cell file.
-        config: Its section of the cell file.
-        flange: Returns the pose of the arm's flange, on which it may be mounted.
-        clock: The run's clock, which gives the capture time of a frame.
+        name: Name of the camera in the cell file.
+        config: Section of the camera in the cell file.
+        flange: Returns the pose of the arm's flange, on which a wrist camera is mounted.
+        clock: Clock of the run, for the capture times of frames.
         epoch: Returns the number of changes of the table.
 
     Attributes:
-        name: Its name in the cell file.
-        config: Its section of the cell file.
+        name: Name of the camera in the cell file.
+        config: Section of the camera in the cell file.
         matrix: Camera matrix `(3, 3)` [pixel].
     """
 
@@ -39,26 +39,26 @@ class MountedCamera:
         epoch: Callable[[], int] = lambda: 0,
     ) -> None:
         self.name, self.config, self._clock, self._epoch = name, config, clock, epoch
-        self.matrix, self._X_MC = calibrated(config)
+        self.matrix, self._X_MC = compute_calibration(config)
         self._flange = flange
         self._frames = self._turn = 0
 
     @property
     def scan_poses(self) -> Sequence[str]:
-        """Names of the arm poses from which it sees the table, best first."""
+        """Names of the arm poses from which the camera sees the table, best first."""
         return self.config.scan_poses
 
     def next_pose(self) -> str:
-        """Return the scan pose after the one this returned last, for a look from elsewhere."""
+        """Advance to the next scan pose and return its name."""
         self._turn += 1
         return self.scan_poses[self._turn % len(self.scan_poses)]
 
     def area(self, view: str) -> Box:
-        """Return the part of the image [pixel] that `view` (`table` or `full`) means."""
+        """Return the box [pixel] of a view of the image: `table` or `full`."""
         return self.config.area(view)
 
     def capture(self) -> Frame:
-        """Return a new frame."""
+        """Capture a frame."""
         self._frames += 1
         X_WC = self._pose()
         image, depth = self._sense()
@@ -75,7 +75,7 @@ class MountedCamera:
         )
 
     def _sense(self) -> tuple[NDArray[np.uint8], Array | None]:
-        """Return the image `(H, W, 3)` and the depth `(H, W)` [m] of the frame being taken."""
+        """Return the image `(H, W, 3)` and the depth `(H, W)` [m] of a new frame."""
         raise NotImplementedError
 
     def _find_visible(self, X_WC: Pose) -> NDArray[np.bool_]:
@@ -83,7 +83,7 @@ class MountedCamera:
         raise NotImplementedError
 
     def skip(self, frames: int, turns: int) -> None:
-        """Go on as if so many frames had been taken and next poses been asked for."""
+        """Count `frames` captured frames and `turns` calls of `next_pose`, for the resumption of a run."""
         self._frames, self._turn = frames, turns
 
     def _pose(self) -> Pose:

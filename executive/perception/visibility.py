@@ -1,4 +1,4 @@
-"""Which pixels of a camera the arm hides, from its kinematics alone."""
+"""Masks of the pixels that the arm may hide, and of those inside an outline in the world."""
 
 from __future__ import annotations
 
@@ -10,33 +10,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.geometry import Array, Pose
+from executive.perception.camera_model import project
 
-TOOL_SHADOW = 0.02
-"""Radius of the spheres that stand for the tool: its tube with fittings [m]."""
+TOOL_RADIUS = 0.02
+"""Radius of the spheres that enclose the tool, its tube with fittings [m]."""
 
 
-Bone = tuple[Sequence[Array], float]
-"""Points `(3,)` [m] along a part of the arm, and the radius of the spheres that stand for it [m]."""
+ArmPart = tuple[Sequence[Array], float]
+"""Points `(3,)` [m] along a part of the arm, and the radius of the spheres that enclose the part [m]."""
 
 
 def find_hidden_pixels(
-    bones: Sequence[Bone], matrix: Array, X_WC: Pose, size: tuple[int, int]
+    parts: Sequence[ArmPart], matrix: Array, X_WC: Pose, size: tuple[int, int]
 ) -> NDArray[np.bool_]:
-    """Return which pixels `(H, W)` the arm may cover, as the shadow of spheres along its bones.
+    """Return the mask `(H, W)` of the pixels that the arm may hide: the images of spheres along its parts.
 
     Args:
-        bones: The links, the tool, and what it holds.
+        parts: The links, the tool, and the held object.
         matrix: Camera matrix `(3, 3)` [pixel].
         X_WC: Camera pose.
         size: Image width and height [pixel].
     """
     mask = np.zeros((size[1], size[0]), dtype=np.uint8)
-    for points, radius in bones:
+    for points, radius in parts:
         for start, end in itertools.pairwise(points):
-            for share in np.linspace(0.0, 1.0, 9):
-                x, y, z = X_WC.inverse().apply(start + share * (end - start))
-                # What is beside or behind the lens, or closer than its own size, covers nothing we
-                # look at: the wrist camera is bolted to the very link it would be said to hide.
+            for fraction in np.linspace(0.0, 1.0, 9):
+                x, y, z = X_WC.inverse().apply(start + fraction * (end - start))
+                # A sphere behind the camera or around it is skipped: the sphere of the link that carries
+                # the wrist camera would hide the whole image.
                 if z <= radius:
                     continue
                 column, row, _ = matrix @ np.array([x / z, y / z, 1.0])
@@ -49,15 +50,13 @@ def find_hidden_pixels(
 def find_outline_pixels(
     corners: Array, matrix: Array, X_WC: Pose, size: tuple[int, int]
 ) -> NDArray[np.bool_] | None:
-    """Return the pixels `(H, W)` inside the convex outline of world points `(N, 3)` [m].
+    """Return the mask `(H, W)` of the pixels inside the convex hull of points `(N, 3)` [m] in the world.
 
-    None where any of the points lies outside the image: the outline is not wholly in view.
+    None if any of the points lies outside the image.
     """
-    in_camera = X_WC.inverse().apply(corners)
-    if np.any(in_camera[:, 2] <= 0):
+    if np.any(X_WC.inverse().apply(corners)[:, 2] <= 0):
         return None
-    projected = in_camera @ matrix.T
-    pixels = projected[:, :2] / projected[:, 2:]
+    pixels = project(matrix, X_WC, corners)
     if np.any(pixels < 0) or np.any(pixels >= np.array(size)):
         return None
     mask = np.zeros((size[1], size[0]), dtype=np.uint8)

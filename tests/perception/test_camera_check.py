@@ -14,10 +14,10 @@ from executive.cell.frame import Frame
 from executive.cell.layout import as_bin
 from executive.geometry import Array, Pose
 from executive.perception.camera_check import MAX_DISTANCE, describe_displacement, estimate_offset
-from executive.perception.camera_model import camera_matrix, project
+from executive.perception.camera_model import compute_camera_matrix, project
 from tests.camera_poses import looking_down
 
-MATRIX = camera_matrix(640, 480, 55.0)
+MATRIX = compute_camera_matrix(640, 480, 55.0)
 DECLARED = looking_down([0.5, 0.0, 1.2])
 COLOURS = {"red": (190, 40, 40), "blue": (40, 60, 190), "yellow": (215, 190, 40)}
 PLACES = {"red": (0.24, -0.48, 0.0), "blue": (0.24, 0.48, 0.0), "yellow": (0.49, 0.46, 0.0)}
@@ -97,7 +97,7 @@ def test_a_rotation_is_measured(turn_deg: tuple[float, float, float]) -> None:
 
 @pytest.mark.parametrize("fov", [0.85 * 55, 1.15 * 55])
 def test_another_lens_is_found(fov: float) -> None:
-    assert describe_displacement(draw(DECLARED, matrix=camera_matrix(640, 480, fov)), BINS)
+    assert describe_displacement(draw(DECLARED, matrix=compute_camera_matrix(640, 480, fov)), BINS)
 
 
 def test_the_words_say_where_the_bins_are_and_how_the_camera_has_moved() -> None:

@@ -15,23 +15,23 @@ from executive.cell.config import CameraConfig
 from executive.cell.frame import Frame
 from executive.perception.camera_model import (
     NEAR,
-    calibrated,
-    camera_matrix,
-    from_opencv,
+    compute_calibration,
+    compute_camera_matrix,
+    compute_look_at_pose,
+    compute_pixel_ray,
+    compute_projection_matrix,
+    compute_view_matrix,
+    convert_from_opencv,
     intersect_plane,
-    looking_at,
-    pixel_ray,
     project,
-    projection_matrix,
-    view_matrix,
 )
 from tests.camera_poses import looking_down
 
-K = camera_matrix(640, 480, 55)
+K = compute_camera_matrix(640, 480, 55)
 GIVEN = [[461.0, 0, 310.0], [0, 470.0, 250.0], [0, 0, 1]]
 coordinate = st.floats(-0.4, 0.4)
 cameras = st.builds(
-    lambda x, y, z, *target: looking_at([x, y, z], [*target, 0.0], (1.0, 0.1, 0.0)),
+    lambda x, y, z, *target: compute_look_at_pose([x, y, z], [*target, 0.0], (1.0, 0.1, 0.0)),
     *(coordinate, coordinate, st.floats(0.5, 1.5), coordinate, coordinate),
 )
 points = st.builds(lambda *point: np.array(point), coordinate, coordinate, st.floats(0.0, 0.2))
@@ -50,7 +50,7 @@ def test_the_field_of_view_is_vertical_and_the_principal_point_in_the_middle():
 
 
 def test_looking_straight_down_agrees_with_looking_at_a_point_below():
-    down = looking_at([0.5, 0.1, 1.2], [0.5, 0.1, 0.0], [1, 0, 0])
+    down = compute_look_at_pose([0.5, 0.1, 1.2], [0.5, 0.1, 0.0], [1, 0, 0])
     assert down.rotation == pytest.approx(looking_down([0.5, 0.1, 1.2]).rotation)
 
 
@@ -61,15 +61,15 @@ def test_a_point_is_found_again_on_the_plane_it_lies_in(X_WC, point):
     towards = point - X_WC.position
     # A point behind the camera has a pixel too, on the way to the other side.
     towards *= np.sign(X_WC.inverse().apply(point)[2])
-    assert pixel_ray(K, X_WC, pixel) == pytest.approx(towards / np.linalg.norm(towards), abs=1e-9)
+    assert compute_pixel_ray(K, X_WC, pixel) == pytest.approx(towards / np.linalg.norm(towards), abs=1e-9)
 
 
 @given(cameras, points)
 def test_opengl_matrices_draw_a_point_where_it_is_projected(X_WC, point):
     assume(X_WC.inverse().apply(point)[2] > NEAR)
     left, top, right, bottom = part = (100.0, 50.0, 356.0, 306.0)
-    view = np.array(view_matrix(X_WC)).reshape(4, 4).T
-    clip = np.array(projection_matrix(K, part)).reshape(4, 4).T @ view @ [*point, 1.0]
+    view = np.array(compute_view_matrix(X_WC)).reshape(4, 4).T
+    clip = np.array(compute_projection_matrix(K, part)).reshape(4, 4).T @ view @ [*point, 1.0]
     ndc = clip[:3] / clip[3]
     drawn = (left + (ndc[0] + 1) / 2 * (right - left), top + (1 - ndc[1]) / 2 * (bottom - top))
     assert drawn == pytest.approx(project(K, X_WC, point), abs=1e-6)
@@ -80,7 +80,7 @@ def test_what_determines_no_ray_or_pose_is_refused():
     with pytest.raises(ValueError, match=r"1\.200 m high looks away from the plane z = 2\.000 m"):
         intersect_plane(K, looking_down([0, 0, 1.2]), (320, 240), 2.0)
     with pytest.raises(ValueError, match="up must not lie along the axis"):
-        looking_at([0, 0, 1], [0, 0, 0], [0, 0, 1])
+        compute_look_at_pose([0, 0, 1], [0, 0, 0], [0, 0, 1])
 
 
 @given(matrices, cameras, points)
@@ -89,7 +89,7 @@ def test_opencv_projects_where_we_do_half_a_pixel_aside_and_its_camera_is_ours(m
     theirs, rvec, tvec = opencv
     (((u, v),),), _ = cv2.projectPoints(point[None], rvec, tvec, theirs, None)
     assert (u + 0.5, v + 0.5) == pytest.approx(project(matrix, X_WC, point), abs=1e-6)
-    back, X_WB = from_opencv(*opencv)
+    back, X_WB = convert_from_opencv(*opencv)
     assert back == pytest.approx(matrix)
     assert X_WB.rotation == pytest.approx(X_WC.rotation, abs=1e-9)
     assert X_WB.position == pytest.approx(X_WC.position, abs=1e-9)
@@ -108,12 +108,12 @@ def by_calibration(**calibration):
 
 
 def test_solve_pnp_finds_the_calibration_of_a_camera():
-    _, X_WC = calibrated(CameraConfig(**PLAIN))
+    _, X_WC = compute_calibration(CameraConfig(**PLAIN))
     marks = np.random.default_rng(1).uniform((0.3, -0.3, 0.0), (0.7, 0.3, 0.2), (20, 3))
-    seen = project(from_opencv(GIVEN, np.zeros(3), np.zeros(3))[0], X_WC, marks) - 0.5
+    seen = project(convert_from_opencv(GIVEN, np.zeros(3), np.zeros(3))[0], X_WC, marks) - 0.5
     _, rvec, tvec = cv2.solvePnP(marks, seen, np.array(GIVEN), None)
     measured = {"rotation": rvec.ravel().tolist(), "translation": tvec.ravel().tolist()}
-    found_matrix, found = calibrated(by_calibration(matrix=GIVEN, mount_to_camera=measured))
+    found_matrix, found = compute_calibration(by_calibration(matrix=GIVEN, mount_to_camera=measured))
     assert found.rotation == pytest.approx(X_WC.rotation, abs=1e-5)
     assert found.position == pytest.approx(X_WC.position, abs=1e-5)
     assert project(found_matrix, found, marks) == pytest.approx(seen + 0.5, abs=1e-3)
@@ -121,8 +121,8 @@ def test_solve_pnp_finds_the_calibration_of_a_camera():
 
 def test_a_hand_eye_calibration_is_the_way_back():
     there = {"rotation": [0.3, -0.2, 1.1], "translation": [0.1, 0.2, 0.3]}
-    _, X_MC = calibrated(by_calibration(matrix=GIVEN, camera_to_mount=there))
-    _, X_CM = calibrated(by_calibration(matrix=GIVEN, mount_to_camera=there))
+    _, X_MC = compute_calibration(by_calibration(matrix=GIVEN, camera_to_mount=there))
+    _, X_CM = compute_calibration(by_calibration(matrix=GIVEN, mount_to_camera=there))
     assert X_MC.position == pytest.approx([0.1, 0.2, 0.3])
     assert X_MC.rotation == pytest.approx(cv2.Rodrigues(np.array([0.3, -0.2, 1.1]))[0])
     assert (X_MC @ X_CM).rotation == pytest.approx(np.eye(3))

@@ -37,7 +37,7 @@ def ended(clock):
 def test_an_answer_that_is_in_early_shows_only_when_it_is_due(ended, clock):
     request = ended(FOUND)
     assert not request.ready
-    with pytest.raises(RuntimeError, match=r"due at 0\.050 s and it is 0\.000 s"):
+    with pytest.raises(RuntimeError, match=r"due at 0\.050 s, and the time is 0\.000 s"):
         request.result()
     clock.now = 0.05 - 1e-12
     assert request.ready
@@ -56,7 +56,7 @@ def test_the_clock_waits_for_an_answer_that_is_late(clock):
 
 @pytest.mark.parametrize("error", [Unavailable("the model is gone"), ZeroDivisionError("a bug")])
 def test_what_the_search_raises_comes_out_of_the_result_as_it_is(ended, clock, error):
-    request = ended(error, given_up=1.0)
+    request = ended(error, expiry=1.0)
     clock.now = 0.05
     assert request.ready
     with pytest.raises(type(error)) as raised:
@@ -65,7 +65,7 @@ def test_what_the_search_raises_comes_out_of_the_result_as_it_is(ended, clock, e
 
 
 def test_that_a_deadline_has_passed_shows_when_it_has_passed_on_the_runs_clock_too(ended, clock):
-    request = ended(DeadlinePassed("no answer within 1.0 s"), given_up=1.0)
+    request = ended(DeadlinePassed("no answer within 1.0 s"), expiry=1.0)
     clock.now = 0.9
     assert not request.ready
     clock.now = 1.0 - 1e-12

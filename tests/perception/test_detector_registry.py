@@ -10,9 +10,9 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.errors import InputError
 from executive.perception.detectors import registry
-from executive.perception.detectors.registry import build_detectors, find_problems, known_labels
+from executive.perception.detectors.registry import build_detectors, find_known_labels, find_problems
 
-INSTALLED = ", ".join(sorted(registry.installed()))
+INSTALLED = ", ".join(sorted(registry.find_detector_kinds()))
 
 
 class Oracle:
@@ -46,9 +46,9 @@ def build(base=None, **configs):
 @pytest.fixture
 def oracle_installed(monkeypatch):
     """The kind `oracle` is installed beside the shipped ones."""
-    found = registry.installed()
+    found = registry.find_detector_kinds()
     oracle = EntryPoint("oracle", f"{__name__}:Oracle", registry.GROUP)
-    monkeypatch.setattr(registry, "installed", lambda: {**found, "oracle": oracle})
+    monkeypatch.setattr(registry, "find_detector_kinds", lambda: {**found, "oracle": oracle})
     monkeypatch.setattr(Oracle, "made", [])
 
 
@@ -70,7 +70,7 @@ def test_a_wrong_option_is_found_at_its_key(tmp_path):
 
 def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, oracle_installed):
     configs = {kind: DetectorConfig(kind=kind) for kind in ("embedded", "oracle", "yolo")}
-    known = known_labels(configs, tmp_path)
+    known = find_known_labels(configs, tmp_path)
     assert known == {"embedded": ("cube", "sphere", "duck"), "oracle": None, "yolo": None}
     assert [keys for keys, _ in find_problems(configs, tmp_path)] == [("detectors", "yolo", "kind")]
 
@@ -95,7 +95,7 @@ def test_detectors_are_built_once_in_the_files_order_whoever_needs_them(oracle_i
 
 @pytest.mark.parametrize(
     ("beside", "text"),
-    [("a", "the detectors a -> b -> a rest on each other"), ("c", 'no detector "c"; it has: a, b')],
+    [("a", "the detectors a -> b -> a depend on each other"), ("c", 'no detector "c"; it has: a, b')],
 )
 def test_a_detector_cannot_rest_on_itself_or_on_nobody(oracle_installed, beside, text):
     with pytest.raises(InputError, match=text):

@@ -11,8 +11,8 @@ from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.views import (
     ViewDetection,
+    list_parts,
     merge_findings,
-    parts_of,
     remove_duplicates,
     search_parts,
 )
@@ -26,10 +26,10 @@ def found(box, confidence=0.9, part=(0, 0, 256, 256), label="cube"):
 
 
 def test_the_table_view_is_the_square_of_the_cell_file_and_a_smaller_frame_is_one_tile():
-    assert parts_of("table", TABLE, SIZE) == [TABLE]
-    assert parts_of("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
+    assert list_parts("table", TABLE, SIZE) == [TABLE]
+    assert list_parts("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
     with pytest.raises(InputError, match='no view "ceiling"; there are table and full'):
-        parts_of("ceiling", TABLE, SIZE)
+        list_parts("ceiling", TABLE, SIZE)
 
 
 def test_a_detection_keeps_the_confidence_of_its_second_class_and_gets_the_name_of_the_cell():
@@ -51,7 +51,7 @@ def test_every_small_object_is_whole_in_some_tile_of_the_full_view(sizes, data):
     extent = side // 5
     left = data.draw(st.integers(0, width - extent))
     top = data.draw(st.integers(0, height - extent))
-    parts = parts_of("full", (0, 0, side, side), (width, height))
+    parts = list_parts("full", (0, 0, side, side), (width, height))
     assert all(part[2] - part[0] == side and part[3] - part[1] == side for part in parts)
     assert any(
         part[0] <= left and part[1] <= top and left + extent <= part[2] and top + extent <= part[3]

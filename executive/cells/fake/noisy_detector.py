@@ -12,9 +12,13 @@ from executive.cell.config import DetectorConfig, Section
 from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Frame
 from executive.cell.protocols import Detector
-from executive.perception.detectors.options import OptionFaults, find_wrong_options, read_options
 from executive.perception.detectors.requests import ChangedRequest
-from executive.perception.detectors.setting import DetectorSetting
+from executive.perception.detectors.setting import (
+    DetectorSetting,
+    OptionFaults,
+    find_wrong_options,
+    read_options,
+)
 
 MAX_CONFUSED_CONFIDENCE = 0.75
 """Largest confidence of a detection with a wrong class."""

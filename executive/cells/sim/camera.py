@@ -20,7 +20,13 @@ from executive.cells.sim.view import ArmShadow
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.perception.camera_check import describe_displacement
-from executive.perception.camera_model import FAR, NEAR, calibrated, projection_matrix, view_matrix
+from executive.perception.camera_model import (
+    FAR,
+    NEAR,
+    compute_calibration,
+    compute_projection_matrix,
+    compute_view_matrix,
+)
 from executive.perception.mounted_camera import MountedCamera
 
 Image = NDArray[np.uint8]
@@ -77,7 +83,7 @@ class Render:
 
 def camera_pose(world: World, config: CameraConfig) -> Pose:
     """Return `X_WC` of a camera where it is mounted now."""
-    _, X_MC = calibrated(config)
+    _, X_MC = compute_calibration(config)
     return X_MC if config.mount == "fixed" else world.flange_pose() @ X_MC
 
 
@@ -90,8 +96,8 @@ def render(world: World, matrix: Array, X_WC: Pose, part: tuple[int, int, int, i
     _, _, rgba, buffer, segmentation = world.client.getCameraImage(
         width,
         height,
-        view_matrix(X_WC),
-        projection_matrix(matrix, sampled),
+        compute_view_matrix(X_WC),
+        compute_projection_matrix(matrix, sampled),
         lightDirection=light.direction,
         lightColor=light.colour,
         lightDistance=3.0,
@@ -202,7 +208,7 @@ class SimCamera(MountedCamera):
 
     def _true_view(self) -> tuple[Array, Pose]:
         """Return the camera matrix and the pose `X_WC` that the images really have."""
-        return calibrated(self._true)[0], camera_pose(self._world, self._true)
+        return compute_calibration(self._true)[0], camera_pose(self._world, self._true)
 
     def _sense(self) -> tuple[Image, Array | None]:
         """Return the image and, with a depth sensor, the depth of the frame being taken."""

@@ -29,7 +29,7 @@ from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.text.files import shipped_folder
 from executive.motion.arms import build_planner, find_unsupported_arm
-from executive.perception.detectors.registry import find_problems, known_labels
+from executive.perception.detectors.registry import find_known_labels, find_problems
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.rated_detectors import build_rated_detectors
@@ -131,7 +131,7 @@ class SimCell(CellWithoutHardware):
     @staticmethod
     def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
         """Return the classes that each detector knows, None where it does not say; loads no model."""
-        return known_labels(config.detectors, base)
+        return find_known_labels(config.detectors, base)
 
     @staticmethod
     def least_times(config: CellConfig) -> SimLeastTimes:

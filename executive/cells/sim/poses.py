@@ -19,7 +19,7 @@ from executive.cells.sim.view import ArmShadow
 from executive.cells.sim.world import World
 from executive.geometry import Array
 from executive.motion.arms import build_planner
-from executive.perception.camera_model import calibrated
+from executive.perception.camera_model import compute_calibration
 
 POINTS_PER_SIDE = 9
 """Number of places along each side of the workspace where every camera must see an object."""
@@ -71,7 +71,7 @@ def _find_blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPat
     planner = build_planner(config)
     shadow = ArmShadow(SimArm(world, planner, config, StepClock(lambda: 0.0)), planner.kinematics, config)
     for name, camera in config.cameras.items():
-        matrix, _ = calibrated(camera)
+        matrix, _ = compute_calibration(camera)
         for index, pose in enumerate(camera.scan_poses):
             if pose not in config.arm.poses_deg:
                 continue

@@ -18,7 +18,7 @@ from executive.mission.findings import Finding, MissionError, alternatives, erro
 from executive.mission.parse.validate import mark_of, validate
 from executive.mission.text.files import read_source
 from executive.mission.text.yaml_text import Node, parse_yaml
-from executive.perception.camera_model import calibrated, field_of_view
+from executive.perception.camera_model import compute_calibration, compute_field_of_view
 
 ANY = "any"
 """Key of `objects` for every class without a section."""
@@ -197,7 +197,7 @@ def _find_mismatches(scene: SceneConfig, root: Node, config: CellConfig) -> Iter
 
 def _check_field_of_view(scene: SceneConfig, root: Node, camera: CameraConfig) -> Iterator[Finding]:
     """Yield a finding if the field of view of the scene exceeds `MAX_FOV_DEG`."""
-    declared = field_of_view(calibrated(camera)[0], camera.height)
+    declared = compute_field_of_view(compute_calibration(camera)[0], camera.height)
     if declared * scene.camera.fov_factor > MAX_FOV_DEG:
         yield error(
             mark_of(root, ("camera", "fov_factor")), "out-of-range",

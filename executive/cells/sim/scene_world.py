@@ -21,7 +21,12 @@ from executive.cells.sim.scene_file import (
 from executive.cells.sim.table_top import WOOD
 from executive.cells.sim.world import World
 from executive.geometry import Pose
-from executive.perception.camera_model import calibrated, camera_matrix, field_of_view, intersect_plane
+from executive.perception.camera_model import (
+    compute_calibration,
+    compute_camera_matrix,
+    compute_field_of_view,
+    intersect_plane,
+)
 
 
 def true_cell(config: CellConfig, scene: SceneConfig) -> CellConfig:
@@ -81,13 +86,13 @@ def _true_camera(camera: CameraConfig, error: SceneCameraConfig) -> CameraConfig
         camera = camera.model_copy(update={"noise": error.noise})
     if not any((*error.shift, *error.turn_deg, *error.orbit_deg)) and error.fov_factor == 1:
         return camera
-    matrix, X_MC = calibrated(camera)
+    matrix, X_MC = compute_calibration(camera)
     if any(error.orbit_deg):
         centre = intersect_plane(matrix, X_MC, matrix[:2, 2], 0.0)
         X_MC = Pose.of(centre) @ _make_rotation(error.orbit_deg) @ Pose.of(-centre) @ X_MC
     X_MC = Pose.of(error.shift) @ X_MC @ _make_rotation(error.turn_deg)
-    fov = field_of_view(matrix, camera.height) * error.fov_factor
-    zoom = camera_matrix(camera.width, camera.height, fov)[1, 1] / matrix[1, 1]
+    fov = compute_field_of_view(matrix, camera.height) * error.fov_factor
+    zoom = compute_camera_matrix(camera.width, camera.height, fov)[1, 1] / matrix[1, 1]
     (fx, fy), (cx, cy) = zoom * matrix.diagonal()[:2], matrix[:2, 2] - 0.5
     mounted = TransformConfig(rotation=tuple(X_MC.rotation_vector), translation=tuple(X_MC.position))
     rows = ((fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0))

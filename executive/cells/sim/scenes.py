@@ -35,7 +35,7 @@ from executive.cells.sim.variations import (
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Array, Pose
-from executive.perception.camera_model import calibrated, intersect_plane, project
+from executive.perception.camera_model import compute_calibration, intersect_plane, project
 
 IMAGE_SIZE = 256
 """Side of a sample's image [pixel]: what a detector is given."""
@@ -127,7 +127,7 @@ class SceneRenderer:
         self._camera = self._config.cameras[camera]
         self._world = World(self._config)
         paint_table(self._world, scene)
-        self._matrix, _ = calibrated(self._camera)
+        self._matrix, _ = compute_calibration(self._camera)
 
     def sample(self, seed: int) -> Sample:
         """Return the sample of `seed`: the first of its random scenes with few half-hidden objects.
@@ -202,7 +202,7 @@ class SceneRenderer:
         if sample is None:
             return None
         # A run takes the camera for what the cell file declares.
-        sample = replace(sample, matrix=calibrated(self._declared)[0], X_WC=declared)
+        sample = replace(sample, matrix=compute_calibration(self._declared)[0], X_WC=declared)
         image = _resized(frame[top:bottom, left:right])
         return replace(sample, image=image, frame=frame, depth=depth, second=second)
 

@@ -14,8 +14,8 @@ from executive.cells.sim.robot_models import ROBOT_MODELS
 from executive.geometry import Array, Pose
 from executive.motion.arm_model import Kinematics
 from executive.perception.visibility import (
-    TOOL_SHADOW,
-    Bone,
+    TOOL_RADIUS,
+    ArmPart,
     find_hidden_pixels,
     find_outline_pixels,
 )
@@ -57,10 +57,10 @@ class ArmShadow:
         q = self._arm.q
         flange, X_WT = self._kinematics.flange(q).position, self._kinematics.forward(q)
         joints = [np.zeros(3), *(frame.position for frame in self._kinematics.joint_frames(q)), flange]
-        bones: list[Bone] = [(joints, self._link_radius), ([flange, X_WT.position], TOOL_SHADOW)]
+        parts: list[ArmPart] = [(joints, self._link_radius), ([flange, X_WT.position], TOOL_RADIUS)]
         if self._loaded():
-            bones.append(([X_WT.position, X_WT.apply(np.array([0.0, 0.0, self._top]))], self._load))
-        return ~find_hidden_pixels(bones, matrix, X_WC, size)
+            parts.append(([X_WT.position, X_WT.apply(np.array([0.0, 0.0, self._top]))], self._load))
+        return ~find_hidden_pixels(parts, matrix, X_WC, size)
 
     def sees_table(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
         """Tell whether the whole workspace is in view and the arm not in front of it."""

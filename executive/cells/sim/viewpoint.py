@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.config import CellConfig
 from executive.cell.frame import Box
 from executive.geometry import Array, Pose
-from executive.perception.camera_model import camera_matrix, looking_at
+from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose
 
 AZIMUTH, ELEVATION = math.radians(-37), math.radians(29)
 """From where, seen from the cell: in front of the arm, to its right, and above."""
@@ -43,13 +43,13 @@ def overview(config: CellConfig, size: tuple[int, int], part: Box) -> Viewpoint:
         size: Width and height of the image [pixel].
         part: Left, top, right and bottom of what they are to fill [pixel].
     """
-    matrix = camera_matrix(*size, FIELD_OF_VIEW_DEG)
+    matrix = compute_camera_matrix(*size, FIELD_OF_VIEW_DEG)
     away = [
         math.cos(ELEVATION) * math.cos(AZIMUTH),
         math.cos(ELEVATION) * math.sin(AZIMUTH),
         math.sin(ELEVATION),
     ]
-    R_WC = looking_at(away, [0, 0, 0], [0, 0, 1]).rotation
+    R_WC = compute_look_at_pose(away, [0, 0, 0], [0, 0, 1]).rotation
     points = _outline(config) @ R_WC
     # A camera at p sees a point q within the slopes low and high where
     # low (q_z - p_z) <= q_x - p_x <= high (q_z - p_z): the nearest such p_z, then the middle for p_x.

@@ -1,4 +1,4 @@
-"""The detector that comes with this project: a small RF-DETR trained on its own rendered scenes."""
+"""Shipped detector: a small RF-DETR that was trained on rendered scenes."""
 
 from __future__ import annotations
 
@@ -7,9 +7,13 @@ from pathlib import Path
 
 from executive.cell.config import DetectorConfig, Section
 from executive.perception.detectors.onnx_model import OnnxModel, read_labels
-from executive.perception.detectors.options import OptionFaults, find_wrong_options, read_options
 from executive.perception.detectors.rfdetr import RfdetrDetector
-from executive.perception.detectors.setting import DetectorSetting
+from executive.perception.detectors.setting import (
+    DetectorSetting,
+    OptionFaults,
+    find_wrong_options,
+    read_options,
+)
 
 WEIGHTS = Path(__file__).parent.parent / "weights"
 MODEL = WEIGHTS / "embedded.onnx"
@@ -21,17 +25,17 @@ class EmbeddedDetector(RfdetrDetector):
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> EmbeddedDetector:
-        """Return the detector; its weights are the project's own.
+        """Return the detector with the shipped weights.
 
         Raises:
-            InputError: An option was given: there are none.
+            InputError: The cell file gives an option; this kind of detector has none.
         """
         read_options(Section, config)
         return cls(OnnxModel(MODEL, read_labels(LABELS)), config, setting)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
-        """Yield every option that was given, with a sentence: there are none."""
+        """Yield each given option with an error message: this kind of detector has no options."""
         del base, others
         yield from find_wrong_options(Section, config)
 

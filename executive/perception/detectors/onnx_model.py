@@ -1,8 +1,8 @@
-"""RF-DETR without torch: an exported model, its pre-processing and post-processing.
+"""Exported RF-DETR model, run by onnxruntime, with its pre-processing and post-processing.
 
 Conventions of rfdetr's export: input `(1, 3, R, R)`, RGB in 0..1, normalized with ImageNet's mean and
-deviation; outputs `dets` `(1, Q, 4)`, centre x, y, width, height in 0..1, and `labels` `(1, Q, C + 1)`,
-logits with the background last.
+standard deviation; outputs `dets` `(1, Q, 4)`, centre x, y, width, height in 0..1, and `labels`
+`(1, Q, C + 1)`, logits with the background last.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from executive.geometry import Array
 from executive.perception.detectors.views import remove_duplicates
 
 MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
-DEVIATION = np.array([0.229, 0.224, 0.225], dtype=np.float32)
+STANDARD_DEVIATION = np.array([0.229, 0.224, 0.225], dtype=np.float32)
 
 
 class OnnxModel:
@@ -29,19 +29,19 @@ class OnnxModel:
 
     Args:
         path: The ONNX file.
-        labels: Class names in the order of its outputs.
-        threads: Threads one inference may use.
+        labels: Class names in the order of the model's outputs.
+        threads: Maximum number of threads of one inference.
 
     Raises:
         InputError: The file cannot be read, is no RF-DETR, or has another number of classes.
     """
 
     def __init__(self, path: Path, labels: Sequence[str], threads: int = 2) -> None:
-        # Takes a tenth of a second and 40 MB: only who runs a model pays for it.
+        # The import takes 0.1 s and 40 MB, which only runs with a model need.
         import onnxruntime
 
         if not path.is_file():
-            raise InputError(no_model(path))
+            raise InputError(describe_missing_model(path))
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
@@ -58,10 +58,12 @@ class OnnxModel:
         self.size = self._check_shapes(path)
 
     def detect(self, image: NDArray[np.uint8], floor: float) -> list[Detection]:
-        """Return what the model finds in `image` `(H, W, 3)` RGB at or above `floor`, most confident first.
+        """Return the detections in an RGB image `(H, W, 3)`, most confident first.
+
+        Detections with a confidence below `floor` are left out.
 
         Raises:
-            Unavailable: The runtime could not finish.
+            Unavailable: onnxruntime failed.
         """
         try:
             boxes, logits = self._session.run(["dets", "labels"], {"input": self._prepare(image)})
@@ -76,7 +78,7 @@ class OnnxModel:
             image = np.asarray(
                 cv2.resize(image, (self.size, self.size), interpolation=cv2.INTER_LINEAR), dtype=np.uint8
             )
-        normalized = (image.astype(np.float32) / 255 - MEAN) / DEVIATION
+        normalized = (image.astype(np.float32) / 255 - MEAN) / STANDARD_DEVIATION
         return np.ascontiguousarray(normalized.transpose(2, 0, 1)[None])
 
     def _decode(
@@ -94,9 +96,9 @@ class OnnxModel:
         return sorted(found, key=lambda detection: -detection.confidence)
 
     def _check_shapes(self, path: Path) -> int:
-        """Return the side of the input [pixel], after checking that this is an RF-DETR of these classes."""
-        inputs = {put.name: put.shape for put in self._session.get_inputs()}
-        outputs = {put.name: put.shape for put in self._session.get_outputs()}
+        """Return the side of the input [pixel], after a check of all inputs and outputs."""
+        inputs = {node.name: node.shape for node in self._session.get_inputs()}
+        outputs = {node.name: node.shape for node in self._session.get_outputs()}
         if list(inputs) != ["input"] or not {"dets", "labels"} <= set(outputs):
             raise InputError(
                 f"{path} is no exported RF-DETR: it takes {', '.join(inputs)} and gives "
@@ -113,16 +115,16 @@ class OnnxModel:
         return size
 
 
-def no_model(path: Path) -> str:
-    """Return the sentence about a model file that is not there."""
+def describe_missing_model(path: Path) -> str:
+    """Return the error message for a missing model file."""
     return f"there is no model file {path}; check the path, relative to the cell file"
 
 
 def read_labels(path: Path) -> tuple[str, ...]:
-    """Return the class names in a text file, one a line.
+    """Return the class names in a text file, one per line.
 
     Raises:
-        InputError: The file does not exist, is no text, or is empty.
+        InputError: The file does not exist, is not a text file, or is empty.
     """
     if not path.is_file():
         raise InputError(f"there is no label file {path}; it has one class name a line, in the model's order")

@@ -1,4 +1,4 @@
-"""Finding installed detectors and building those that a cell file asks for."""
+"""Installed kinds of detectors, and construction of the detectors of a cell file."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from executive.perception.detectors.setting import ClosableDetector, DetectorSet
 from executive.plugins import PluginEntry, registered
 
 GROUP = "executive.detectors"
-RATES = frozenset({"misses", "confused", "invented", "jitter"})
-"""Keys of the error rates that only a fake detector states."""
+FAKE_ERROR_RATES = frozenset({"misses", "confused", "invented", "jitter"})
+"""Keys of the error rates that only the section of a fake detector may have."""
 
 
-def installed() -> dict[str, PluginEntry]:
-    """Return the kinds of detectors by name."""
+def find_detector_kinds() -> dict[str, PluginEntry]:
+    """Return the installed kinds of detectors by name."""
     return registered(GROUP, "kind of detector")
 
 
@@ -29,32 +29,32 @@ def build_detectors(
 
     Args:
         configs: The detectors section of the cell file.
-        camera: The camera whose frames they search.
-        clock: The run's clock, on which their answers become visible.
-        base: Folder that paths in their options start from.
-        seed: Seed of whatever is random in them.
+        camera: The camera whose frames the detectors search.
+        clock: Clock of the run, for the times at which answers become visible.
+        base: Folder to which paths in options are relative.
+        seed: Random seed of the detectors.
 
     Raises:
-        InputError: A kind is not installed, an option is wrong, or one rests on itself.
+        InputError: A kind is not installed, an option is invalid, or a detector depends on itself.
     """
-    kinds = installed()
+    kinds = find_detector_kinds()
     built: dict[str, ClosableDetector] = {}
-    under_way: list[str] = []
+    in_progress: list[str] = []
 
     def build(name: str) -> ClosableDetector:
         if name in built:
             return built[name]
         if name not in configs:
             raise InputError(f'the cell has no detector "{name}"; it has: {", ".join(configs)}')
-        if name in under_way:
-            raise InputError(f"the detectors {' -> '.join([*under_way, name])} rest on each other")
+        if name in in_progress:
+            raise InputError(f"the detectors {' -> '.join([*in_progress, name])} depend on each other")
         kind = configs[name].kind
         if kind not in kinds:
-            raise InputError(_not_installed(name, kind, kinds))
-        under_way.append(name)
+            raise InputError(_describe_missing_kind(name, kind, kinds))
+        in_progress.append(name)
         setting = DetectorSetting(name, camera, clock, base, seed, build)
         built[name] = kinds[kind].load().from_config(configs[name], setting)
-        under_way.remove(name)
+        in_progress.remove(name)
         return built[name]
 
     try:
@@ -66,40 +66,40 @@ def build_detectors(
 
 
 def find_problems(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key of the cell file and a sentence for everything that keeps a detector from being built.
+    """Yield the key in the cell file and an error message for each reason why a detector cannot be built.
 
-    A kind that is not installed, and whatever the kind itself finds: one may have, beside `from_config`,
-    a static method `check(config, base, others)` that yields options and sentences, `others` being all
-    detectors of the cell. No model is loaded.
+    A kind may check its options in a static method `check(config, base, others)`, where `others` are the
+    sections of all detectors of the cell. No model is loaded.
     """
-    kinds = installed()
+    kinds = find_detector_kinds()
     for name, config in configs.items():
         if config.kind not in kinds:
-            yield ("detectors", name, "kind"), _not_installed(name, config.kind, kinds)
+            yield ("detectors", name, "kind"), _describe_missing_kind(name, config.kind, kinds)
             continue
         kind = kinds[config.kind].load()
-        for key in sorted(RATES & config.model_fields_set) if not getattr(kind, "is_fake", False) else ():
+        measured = FAKE_ERROR_RATES if not getattr(kind, "is_fake", False) else frozenset()
+        for key in sorted(measured & config.model_fields_set):
             remedy = "remove the key and run `executive evaluate --cell` with this cell"
             yield ("detectors", name, key), f"error rates of this kind of detector are measured; {remedy}"
         check = getattr(kind, "check", None)
-        for option, sentence in check(config, base, configs) if check else ():
-            yield ("detectors", name, option), sentence
+        for option, message in check(config, base, configs) if check else ():
+            yield ("detectors", name, option), message
 
 
-def known_labels(configs: Mapping[str, DetectorConfig], base: Path) -> dict[str, tuple[str, ...] | None]:
-    """Return the classes that each detector of a cell file finds, by the cell's names; loads no model.
+def find_known_labels(configs: Mapping[str, DetectorConfig], base: Path) -> dict[str, tuple[str, ...] | None]:
+    """Return the labels of the classes that each detector of a cell file finds, None if unknown.
 
-    None where that is not known: a kind says it in a static method `labels(config, base)`, if it can.
+    A kind may return them from a static method `labels(config, base)`. No model is loaded.
     """
-    kinds = installed()
-    labels = {
-        name: getattr(kinds[config.kind].load(), "labels", None) if config.kind in kinds else None
-        for name, config in configs.items()
-    }
-    return {name: find(configs[name], base) if find else None for name, find in labels.items()}
+    kinds = find_detector_kinds()
+    known: dict[str, tuple[str, ...] | None] = {}
+    for name, config in configs.items():
+        find = getattr(kinds[config.kind].load(), "labels", None) if config.kind in kinds else None
+        known[name] = find(config, base) if find else None
+    return known
 
 
-def _not_installed(name: str, kind: str, kinds: Mapping[str, PluginEntry]) -> str:
+def _describe_missing_kind(name: str, kind: str, kinds: Mapping[str, PluginEntry]) -> str:
     return (
         f'detector "{name}" is of kind "{kind}", which is not installed; '
         f"installed: {', '.join(sorted(kinds)) or 'none'}"

@@ -1,10 +1,10 @@
-"""Detections under way: worked on by another thread, visible on the run's clock."""
+"""Searches of frames in another thread, whose answers become visible at a time of the run."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, TimeoutError
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,22 +17,22 @@ from executive.cell.frame import Frame
 from executive.cell.protocols import Clock, Request
 from executive.errors import DeadlinePassed, Unavailable
 from executive.perception.detectors.setting import DetectorSetting
-from executive.perception.detectors.views import Part, parts_of
+from executive.perception.detectors.views import Part, list_parts
 
 MAX_BLOCKING_TIME = 0.05
-"""Longest time the caller is held at once while an answer is overdue [s]; a second Ctrl-C ends it."""
+"""Longest uninterrupted wait for an overdue answer [s]; a second Ctrl-C ends the wait."""
 CLOCK_ROUNDING_ERROR = 1e-9
-"""Rounding allowed when two times on the clock are compared [s]."""
+"""Rounding error allowed in comparisons of two times on the clock [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChangedRequest:
-    """A request whose answer is changed before it is read; implements `executive.cell.protocols.Request`.
+    """Request whose answer is changed before it is returned; implements `executive.cell.protocols.Request`.
 
     Attributes:
         request: The request.
-        change: Returns the answer that is read instead.
-        detector: Name of the detector, with which the text of an error begins; "": the text is not changed.
+        change: Takes the answer and returns the changed one.
+        detector: Name of the detector, which is put before the text of an error; "" for no change.
     """
 
     request: Request
@@ -41,7 +41,7 @@ class ChangedRequest:
 
     @property
     def ready(self) -> bool:
-        """True once the answer can be read."""
+        """True if the answer is available."""
         return self.request.ready
 
     def result(self) -> Answer:
@@ -61,15 +61,15 @@ class ChangedRequest:
 
 @dataclass(eq=False)
 class Pending:
-    """A detection under way; implements `executive.cell.protocols.Request`.
+    """Search in progress; implements `executive.cell.protocols.Request`.
 
     Attributes:
-        work: What the worker will leave.
-        due: Time on the run's clock from which the answer is visible [s].
-        clock: The run's clock.
+        work: Future detections of the thread.
+        due: Time from which the answer is visible [s].
+        clock: Clock of the run.
         detector: Name of the detector.
-        error_rates: Error rates of that detector.
-        given_up: Time on the run's clock at which it shows that a deadline has passed [s].
+        error_rates: Error rates of the detector.
+        expiry: Time from which a missed deadline is visible [s].
     """
 
     work: Future[list[Detection]]
@@ -77,47 +77,43 @@ class Pending:
     clock: Clock
     detector: str
     error_rates: ErrorRates
-    given_up: float = -math.inf
+    expiry: float = -math.inf
 
     @property
     def ready(self) -> bool:
-        """True from the tick at which the answer is due.
+        """True from the control step at which the answer is due.
 
-        At that tick the caller waits for a worker that is not done yet, so that the tick at which an
-        answer becomes visible does not depend on the computer's speed. That a deadline has passed shows
-        when it has passed on the run's clock too.
+        At that control step the property waits for the thread, so that the time at which an answer becomes
+        visible does not depend on the computer's speed. A missed deadline is visible from `expiry`.
         """
         if self.clock.now < self.due - CLOCK_ROUNDING_ERROR:
             return False
         while not self.work.done():
-            try:
-                self.work.exception(MAX_BLOCKING_TIME)
-            except TimeoutError:
-                continue
-        expired = isinstance(self.work.exception(), DeadlinePassed)
-        return not expired or self.clock.now >= self.given_up - CLOCK_ROUNDING_ERROR
+            wait([self.work], MAX_BLOCKING_TIME)
+        is_late = isinstance(self.work.exception(), DeadlinePassed)
+        return not is_late or self.clock.now >= self.expiry - CLOCK_ROUNDING_ERROR
 
     def result(self) -> Answer:
-        """Return what the detector says.
+        """Return the answer of the detector.
 
         Raises:
             Unavailable: The detector gave no usable answer.
         """
         if not self.ready:
             raise RuntimeError(
-                f"the detection is due at {self.due:.3f} s and it is {self.clock.now:.3f} s; "
+                f"the answer is due at {self.due:.3f} s, and the time is {self.clock.now:.3f} s; "
                 "wait until `ready` is true"
             )
         return Answer(self.detector, tuple(self.work.result()), self.error_rates)
 
 
 class ThreadedDetector:
-    """Detector that searches in a thread of its own, beside the tick loop; base of `ClosableDetector`s.
+    """Detector that searches in its own thread, beside the control loop; base of `ClosableDetector`s.
 
     Args:
         config: Threshold, floor and latency.
         setting: Parts of the run that the detector needs.
-        deadline: Time after which a passed deadline shows on the run's clock [s].
+        deadline: Time from a request until a missed deadline is visible [s].
     """
 
     def __init__(self, config: DetectorConfig, setting: DetectorSetting, deadline: float = -math.inf) -> None:
@@ -125,21 +121,21 @@ class ThreadedDetector:
         self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
 
     def request(self, frame: Frame, view: str) -> Pending:
-        """Start to search `frame`: the `table` part or the `full` image."""
+        """Start a search of the `table` part of a frame or of the `full` image."""
         parts = self._parts(view, frame.image.shape[1::-1])
         work = self._thread.submit(lambda: self._search(frame.image, parts))
         clock, config = self._setting.clock, self._config
-        due, given_up = clock.now + config.latency, clock.now + self._deadline
-        return Pending(work, due, clock, self._setting.name, config.error_rates, given_up)
+        due, expiry = clock.now + config.latency, clock.now + self._deadline
+        return Pending(work, due, clock, self._setting.name, config.error_rates, expiry)
 
     def close(self) -> None:
-        """End the thread after the search under way; searches that have not begun are dropped."""
+        """End the thread after the search in progress; waiting searches are cancelled."""
         self._thread.shutdown(cancel_futures=True)
 
     def _parts(self, view: str, size: tuple[int, ...]) -> list[Part]:
-        """Return the parts of a frame of a width and height [pixel] that a view means."""
-        return parts_of(view, self._setting.camera.table_view, (size[0], size[1]))
+        """Return the parts of a frame to search, for a view and the width and height of the frame [pixel]."""
+        return list_parts(view, self._setting.camera.table_view, (size[0], size[1]))
 
     def _search(self, image: NDArray[np.uint8], parts: Sequence[Part]) -> list[Detection]:
-        """Return the objects in the parts of a frame, most confident first; called in the thread."""
+        """Return the objects in the parts of a frame, most confident first; runs in the thread."""
         raise NotImplementedError

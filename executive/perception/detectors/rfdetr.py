@@ -1,4 +1,4 @@
-"""Any exported RF-DETR model as a detector: an ONNX file, run by onnxruntime."""
+"""Detector that runs an exported RF-DETR model, an ONNX file."""
 
 from __future__ import annotations
 
@@ -14,47 +14,47 @@ from pydantic import Field
 from executive.cell.config import DetectorConfig, Section
 from executive.cell.detection import Detection
 from executive.errors import InputError
-from executive.perception.detectors.onnx_model import OnnxModel, no_model, read_labels
-from executive.perception.detectors.options import (
+from executive.perception.detectors.onnx_model import OnnxModel, describe_missing_model, read_labels
+from executive.perception.detectors.requests import ThreadedDetector
+from executive.perception.detectors.setting import (
+    DetectorSetting,
     OptionFaults,
     find_wrong_class_map,
     find_wrong_options,
     read_options,
 )
-from executive.perception.detectors.requests import ThreadedDetector
-from executive.perception.detectors.setting import DetectorSetting
 from executive.perception.detectors.views import Part, search_parts
 
 
 class RfdetrOptions(Section):
-    """What a detector of kind `rfdetr` has to know beside what every detector has."""
+    """Options of a detector of kind `rfdetr`."""
 
     model_path: str
-    """The exported model (`.onnx`), from the cell file's folder."""
+    """Path of the exported model (`.onnx`), relative to the folder of the cell file."""
     labels: tuple[str, ...] | str
-    """Class names in the order of the model's outputs, or a text file with one a line."""
+    """Class names in the order of the model's outputs, or the path of a text file with one name per line."""
     class_map: dict[str, str] = Field(default_factory=dict)
-    """From the model's class names to the cell's, where they differ."""
+    """Class names of the cell by those of the model, for names that differ."""
     threads: int = Field(2, ge=1, le=64)
-    """Threads one inference may use."""
+    """Maximum number of threads of one inference."""
 
-    def names(self, base: Path) -> tuple[str, ...]:
-        """Return the model's class names; `base` is the folder that paths start from.
+    def read_names(self, base: Path) -> tuple[str, ...]:
+        """Return the model's class names; `base` is the folder to which paths are relative.
 
         Raises:
-            InputError: The file they stand in cannot be read.
+            InputError: The text file cannot be read.
         """
         return read_labels(base / self.labels) if isinstance(self.labels, str) else self.labels
 
 
 class RfdetrDetector(ThreadedDetector):
-    """Runs a model over parts of a frame, beside the tick loop; implements `cell.protocols.Detector`.
+    """Runs a model on parts of a frame, beside the control loop; implements `cell.protocols.Detector`.
 
     Args:
-        model: What finds objects in an image.
+        model: The model.
         config: Threshold, floor and latency.
-        setting: What it is built into.
-        class_map: From the model's class names to the cell's, where they differ.
+        setting: Parts of the cell and of the run that the detector uses.
+        class_map: Class names of the cell by those of the model, for names that differ.
     """
 
     def __init__(
@@ -70,20 +70,22 @@ class RfdetrDetector(ThreadedDetector):
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> RfdetrDetector:
-        """Return the detector that a cell file describes.
+        """Return the detector for a section of a cell file.
 
         Raises:
-            InputError: An option is missing, unknown or wrong, or the model cannot be read.
+            InputError: An option is missing, unknown or invalid, or the model cannot be read.
         """
-        for _, sentence in cls.check(config, setting.base, {}):
-            raise InputError(sentence)
+        for _, message in cls.check(config, setting.base, {}):
+            raise InputError(message)
         options = read_options(RfdetrOptions, config)
-        model = OnnxModel(setting.base / options.model_path, options.names(setting.base), options.threads)
+        model = OnnxModel(
+            setting.base / options.model_path, options.read_names(setting.base), options.threads
+        )
         return cls(model, config, setting, options.class_map)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
-        """Yield every option because of which the detector could not be built, with a sentence.
+        """Yield each option that prevents the construction of the detector, with an error message.
 
         The model is not loaded.
         """
@@ -94,9 +96,9 @@ class RfdetrDetector(ThreadedDetector):
             return
         options = read_options(RfdetrOptions, config)
         if not (base / options.model_path).is_file():
-            yield "model_path", no_model(base / options.model_path)
+            yield "model_path", describe_missing_model(base / options.model_path)
         try:
-            names = options.names(base)
+            names = options.read_names(base)
         except InputError as error:
             yield "labels", str(error)
             return
@@ -104,10 +106,10 @@ class RfdetrDetector(ThreadedDetector):
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
-        """Return the classes it finds, by the cell's names; None where its options do not say."""
+        """Return the cell's names of the classes that the model finds; None if the options are invalid."""
         try:
             options = read_options(RfdetrOptions, config)
-            return tuple(options.class_map.get(name, name) for name in options.names(base))
+            return tuple(options.class_map.get(name, name) for name in options.read_names(base))
         except InputError:
             return None
 
@@ -123,12 +125,12 @@ class RfdetrDetector(ThreadedDetector):
         return search_parts(image, parts, self._find, self._class_map)
 
     def _find(self, crop: NDArray[np.uint8]) -> list[Detection]:
-        """Return what the model finds in a part of a frame, in that part's pixels."""
+        """Return the detections in a part of a frame, with boxes in pixels of the part."""
         height, width = crop.shape[:2]
         size = self._model.size
         if height <= size or width <= size:
             return self._model.detect(crop, self._config.floor)
-        # Averaging keeps edges where they are; the model's own bilinear resize would skip pixels.
+        # Area averaging uses all pixels and does not move edges; bilinear resizing would skip pixels.
         small = np.asarray(cv2.resize(crop, (size, size), interpolation=cv2.INTER_AREA), dtype=np.uint8)
         x, y = width / size, height / size
         return [

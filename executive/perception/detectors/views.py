@@ -39,7 +39,7 @@ class ViewDetection:
     part: Part
 
 
-def parts_of(view: str, table_view: Part, size: tuple[int, int]) -> list[Part]:
+def list_parts(view: str, table_view: Part, size: tuple[int, int]) -> list[Part]:
     """Return the parts of a frame to search.
 
     Args:

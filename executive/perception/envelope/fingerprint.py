@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
-from executive.perception.camera_model import calibrated
-from executive.perception.detectors.registry import installed
+from executive.perception.camera_model import compute_calibration
+from executive.perception.detectors.registry import find_detector_kinds
 
 Fingerprint = Mapping[str, str]
 """Text of each property by its name. A measurement applies to a detector if all texts are equal."""
@@ -51,13 +51,13 @@ def describe_change(measured: Fingerprint, current: Fingerprint) -> str:
 
 def _digest_weights(section: DetectorConfig, base: Path) -> str:
     """Return a digest of a detector's model file, "" for a detector without one."""
-    find_weights = getattr(installed()[section.kind].load(), "weights", None)
+    find_weights = getattr(find_detector_kinds()[section.kind].load(), "weights", None)
     path = find_weights(section, base) if find_weights else None
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path and path.is_file() else ""
 
 
 def _describe_camera(camera: CameraConfig, config: CellConfig) -> dict[str, str]:
-    matrix, X_MC = calibrated(camera)
+    matrix, X_MC = compute_calibration(camera)
     poses = (
         {name: config.arm.poses_deg[name] for name in camera.scan_poses} if camera.mount == "wrist" else {}
     )

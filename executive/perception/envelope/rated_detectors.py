@@ -11,7 +11,7 @@ from executive.cell.error_rates import ErrorRates, assume_rates
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
 from executive.errors import InputError
-from executive.perception.detectors.registry import build_detectors, installed
+from executive.perception.detectors.registry import build_detectors, find_detector_kinds
 from executive.perception.detectors.requests import ChangedRequest
 from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.fingerprint import describe_change, take_fingerprint
@@ -139,7 +139,7 @@ def find_unmeasured(
 
 def measurable_detectors(config: CellConfig) -> Iterator[str]:
     """Yield the names of the detectors whose errors can be measured: those installed and not fake."""
-    kinds = installed()
+    kinds = find_detector_kinds()
     for name, section in config.detectors.items():
         is_known = config.kind != FAKE and section.kind in kinds
         if is_known and not getattr(kinds[section.kind].load(), "is_fake", False):

@@ -31,7 +31,7 @@ from executive.errors import InputError
 from executive.events import ignore
 from executive.geometry import Pose
 from executive.mission.findings import MissionError
-from executive.perception.camera_model import calibrated, project
+from executive.perception.camera_model import compute_calibration, project
 from executive.testing.oracle import TrueFrame, oracle_cell
 
 Build = Callable[..., World]
@@ -216,7 +216,7 @@ def test_the_image_is_from_the_true_camera_and_the_frame_says_the_declared_one(
     made = cell(camera=error)
     frame = capture(made)
     assert isinstance(frame, TrueFrame)
-    matrix, X_WC = calibrated(overhead.cameras["overhead"])
+    matrix, X_WC = compute_calibration(overhead.cameras["overhead"])
     assert (frame.matrix == matrix).all()
     assert frame.X_WC.rounded() == X_WC.rounded()
     true = np.diag([zoom, zoom, 1.0]) @ matrix
@@ -240,7 +240,7 @@ def test_the_error_of_a_camera_on_the_wrist_moves_with_the_arm(
     camera = wrist.cameras["wrist"]
     for pose in ("scan", "aside_left"):
         made._world.set_arm(np.radians(wrist.arm.poses_deg[pose]))
-        flange, X_FC = made._world.flange_pose(), calibrated(camera)[1]
+        flange, X_FC = made._world.flange_pose(), compute_calibration(camera)[1]
         assert capture(made).X_WC.rounded() == (flange @ X_FC).rounded()
         true = made.cell.camera._true_view()[1]  # type: ignore[attr-defined]
         assert true.rounded() == (flange @ Pose.of([0.0, 0.01, 0.0]) @ X_FC).rounded()

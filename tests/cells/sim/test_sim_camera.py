@@ -11,7 +11,7 @@ from executive.cells.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise, c
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.world import World
 from executive.geometry import Pose, about_z
-from executive.perception.camera_model import calibrated, project
+from executive.perception.camera_model import compute_calibration, project
 
 Build = Callable[[CellConfig], World]
 
@@ -61,7 +61,7 @@ def test_projected_meshes_agree_with_the_rendered_silhouettes(
         mesh = load_mesh(config.objects[label])
         place = np.array([0.44 + 0.09 * (i % 3), -0.18 + 0.18 * (i // 3), -mesh.bottom])
         world.add_object(label, Pose(about_z(0.7 * i), place), (1, 0, 0))
-    matrix, X_WC = calibrated(camera)[0], camera_pose(world, camera)
+    matrix, X_WC = compute_calibration(camera)[0], camera_pose(world, camera)
     left, top, _, _ = camera.table_view
     bodies = render(world, matrix, X_WC, camera.table_view, CELL_LIGHT).bodies
     for body, label in world.bodies.items():

@@ -13,7 +13,7 @@ from executive.cells.sim.camera import camera_pose
 from executive.cells.sim.view import ArmShadow
 from executive.cells.sim.world import World
 from executive.motion.arms import build_planner
-from executive.perception.camera_model import calibrated, project
+from executive.perception.camera_model import compute_calibration, project
 
 Build = Callable[[CellConfig], World]
 
@@ -23,7 +23,7 @@ def test_what_the_tool_holds_hides_what_lies_under_it(build: Build, overhead: Ce
     arm = SimArm(world, planner, overhead, StepClock(lambda: 0.0))
     shadow = ArmShadow(arm, planner.kinematics, overhead, lambda: holds)
     camera = overhead.cameras["overhead"]
-    matrix, X_WC = calibrated(camera)[0], camera_pose(world, camera)
+    matrix, X_WC = compute_calibration(camera)[0], camera_pose(world, camera)
     x, y, z = world.tool_pose().position
     column, row = project(matrix, X_WC, np.array((x, y - 0.045, z - 0.03))).astype(int)
     empty = shadow.visible(matrix, X_WC, (camera.width, camera.height))

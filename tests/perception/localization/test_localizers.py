@@ -13,16 +13,16 @@ from executive.cell.detection import Detection
 from executive.cell.frame import Frame
 from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
-from executive.perception.camera_model import camera_matrix, looking_at, project
+from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose, project
 from executive.perception.localization import build_localizer
 
 SIDE = 0.05
 CLASSES = {"cube": ObjectClass("cube", SIDE, 0.0354)}
 PLANE, DEPTH = build_localizer("plane", CLASSES), build_localizer("depth", CLASSES)
-K = camera_matrix(640, 480, 55)
-ABOVE = looking_at([0.5, 0.0, 1.2], [0.5, 0.0, 0.0], [1, 0, 0])
-ASKEW = looking_at([0.3, 0.3, 1.0], [0.5, 0.0, 0.0], [1, 0, 0])
-UPWARDS = looking_at([0.5, 0, 1.2], [0.5, 0, 2.0], [1, 0, 0])
+K = compute_camera_matrix(640, 480, 55)
+ABOVE = compute_look_at_pose([0.5, 0.0, 1.2], [0.5, 0.0, 0.0], [1, 0, 0])
+ASKEW = compute_look_at_pose([0.3, 0.3, 1.0], [0.5, 0.0, 0.0], [1, 0, 0])
+UPWARDS = compute_look_at_pose([0.5, 0, 1.2], [0.5, 0, 2.0], [1, 0, 0])
 PIXELS = np.stack(np.meshgrid(np.arange(640) + 0.5, np.arange(480) + 0.5, [1.0]), axis=-1)[:, :, 0]
 IN_THE_MIDDLE = np.array([0.5, 0.0, SIDE / 2])
 

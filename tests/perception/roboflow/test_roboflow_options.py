@@ -109,11 +109,11 @@ def test_the_classes_are_known_where_labels_are_given(tmp_path):
 
 def test_a_key_is_hidden_wherever_it_stands():
     key = ApiKey({"ROBOFLOW_API_KEY": SECRET})
-    assert key.hidden_in(f"?api_key={SECRET}&x and {SECRET}") == "?api_key=***&x and ***"
+    assert key.redact(f"?api_key={SECRET}&x and {SECRET}") == "?api_key=***&x and ***"
     assert repr(key) == "ApiKey(***)"
     assert key.is_set
     odd = ApiKey({"ROBOFLOW_API_KEY": 'SECRET"\\12345'})
-    assert odd.hidden_in(r'{"said": "SECRET\"\\12345"}') == '{"said": "***"}'
+    assert odd.redact(r'{"said": "SECRET\"\\12345"}') == '{"said": "***"}'
     # A stand-in for a key is no secret.
-    assert ApiKey({"ROBOFLOW_API_KEY": "x"}).hidden_in('{"x": 1}') == '{"x": 1}'
+    assert ApiKey({"ROBOFLOW_API_KEY": "x"}).redact('{"x": 1}') == '{"x": 1}'
     assert not ApiKey({}).is_set

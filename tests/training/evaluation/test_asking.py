@@ -10,7 +10,7 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.errors import Unavailable
-from executive.perception.detectors.views import parts_of
+from executive.perception.detectors.views import list_parts
 from executive.training.evaluation import asking
 from executive.training.evaluation.asking import WHOLE_IMAGE, CellDetector
 
@@ -99,6 +99,6 @@ def test_frames_of_a_camera_are_searched_as_in_a_run_and_other_images_as_a_whole
     detector.ask(frame)
     assert eye.views == ["full"]
     for size in ((300, 100), (64, 900)):
-        assert parts_of("full", eye.camera.table_view, size) == [(0, 0, *size)]
+        assert list_parts("full", eye.camera.table_view, size) == [(0, 0, *size)]
     detector.close()
     assert eye.closed

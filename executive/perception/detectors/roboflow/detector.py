@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Detection
 from executive.errors import DeadlinePassed, InputError, Unavailable
-from executive.perception.detectors.options import OptionFaults
 from executive.perception.detectors.requests import ThreadedDetector
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
 from executive.perception.detectors.roboflow.complaints import (
@@ -27,7 +26,7 @@ from executive.perception.detectors.roboflow.options import (
     RoboflowOptions,
     find_wrong_roboflow_options,
 )
-from executive.perception.detectors.setting import DetectorSetting
+from executive.perception.detectors.setting import DetectorSetting, OptionFaults
 from executive.perception.detectors.views import Part, remove_duplicates, search_parts
 
 

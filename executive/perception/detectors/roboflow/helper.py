@@ -156,7 +156,7 @@ class Helper:
         if not line.endswith(b"\n"):
             self._raise_end(process)
         try:
-            message: Mapping[str, Any] = json.loads(self._key.hidden_in(line.decode()))
+            message: Mapping[str, Any] = json.loads(self._key.redact(line.decode()))
         except RecursionError:
             # The helper could just read and write it again; for this stack it may be too deep.
             return {"failure": "garbled", "said": "it is nested too deeply"}
@@ -174,7 +174,7 @@ class Helper:
         self._restart()
         if status < 0:
             raise Unavailable(f"its helper process was ended by signal {-status}")
-        last = self._key.hidden_in(lines[-1].strip() if lines else "")
+        last = self._key.redact(lines[-1].strip() if lines else "")
         raise Fault(f"the program {PROGRAM} ended with status {status}: {last}")
 
     def _restart(self) -> None:

@@ -26,7 +26,7 @@ class ApiKey:
         """Tell whether there is one."""
         return bool(self._key)
 
-    def hidden_in(self, text: str) -> str:
+    def redact(self, text: str) -> str:
         """Return `text`, plain or JSON, without the key."""
         if len(self._key) < MIN_KEY_LENGTH:
             return text

@@ -8,8 +8,8 @@ from urllib.parse import urlsplit
 from pydantic import Field
 
 from executive.cell.config import DetectorConfig, Section
-from executive.perception.detectors.options import OptionFaults, find_wrong_class_map, find_wrong_options
 from executive.perception.detectors.roboflow.key import VARIABLE
+from executive.perception.detectors.setting import OptionFaults, find_wrong_class_map, find_wrong_options
 
 HOSTED = "https://serverless.roboflow.com"
 """Where Roboflow serves models itself."""
