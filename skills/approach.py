@@ -78,14 +78,14 @@ class Approach(Skill):
             cell.ledger.invalidate_positions()
             met = f"the tool met something at {height * 1000:.0f} mm"
             raise self.failed("blocked", f"{met}, on its way to {item}, which was {expected}")
-        doubt = describe_wrong_height(self.target.label, height, cell.classes)
-        near_top = height >= lowest_contact(kind, middle, self.overtravel)
-        beside_top = near_top and may_miss_top(self.target.label, height, cell.classes)
-        if not cell.ledger.record_touch(item, doubt, beside_top=beside_top):
-            raise self.failed("contradicted", f"{item} may be no {self.target.label}: {doubt}")
-        if doubt and not near_top:
+        contradiction = describe_wrong_height(self.target.label, height, cell.classes)
+        is_near_top = height >= lowest_contact(kind, middle, self.overtravel)
+        missed_top = is_near_top and may_miss_top(self.target.label, height, cell.classes)
+        if not cell.ledger.record_touch(item, contradiction, may_miss_top=missed_top):
+            raise self.failed("contradicted", f"{item} may be no {self.target.label}: {contradiction}")
+        if contradiction and not is_near_top:
             cell.ledger.record_miss(item)
-            raise self.failed("no_contact", f"the top of {item} was {expected}; {doubt}")
+            raise self.failed("no_contact", f"the top of {item} was {expected}; {contradiction}")
 
 
 def _proves_absence(goal: Goal, target: Target, kind: ObjectClass) -> bool:

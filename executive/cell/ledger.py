@@ -73,13 +73,13 @@ class Ledger(Protocol):
     def count_in(self, bin: str) -> int:
         """Return the number of objects in a bin, which is the index of its next free slot."""
 
-    def record_touch(self, item: Item, contradiction: str = "", *, beside_top: bool = False) -> bool:
+    def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
         """Record that the tool touched an item, and return True if it may be of its class.
 
         Args:
             item: The item.
             contradiction: How the height of the touch contradicts the class, or ""; a rejection reports it.
-            beside_top: True if the touch may have missed the top of the object.
+            may_miss_top: True if the touch may have missed the top of the object.
         """
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
@@ -105,7 +105,7 @@ class Ledger(Protocol):
     def record_put_down(self, item: Item, position: Array) -> None:
         """Record that an item was put back on the table, with its centre at `position` `(3,)` [m]."""
 
-    def reject(self, item: Item, why: str) -> None:
+    def reject(self, item: Item, reason: str) -> None:
         """Reject an item: it is reported and not tried again."""
 
     def invalidate_positions(self) -> None:

@@ -24,7 +24,7 @@ class Accounts(Protocol):
     def reopen(self) -> None:
         """Forget the items that were left on the table; the next look adds those that still lie there."""
 
-    def balance(self) -> dict[str, int]:
+    def count_states(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`.
 
         `seen` is the sum of the next four.

@@ -9,9 +9,9 @@ from executive.ledger.certainty import Certainty
 from executive.ledger.item import LYING, REASON_NOT_FOUND, REASON_UNCERTAIN, REASON_UNTRACKED, Record, State
 
 MIN_EMPTY_PROBES = 3
-"""Number of times that the tool must find nothing but the table at an item's place to prove it a phantom."""
+"""Number of probes that find only the table at an item's place, from which the item may be a phantom."""
 FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
-"""Final states of an object; each item that was no phantom has one of them."""
+"""Final states of an object; each item that is no phantom gets one of these states."""
 
 
 def find_final_state(
@@ -22,15 +22,15 @@ def find_final_state(
     The first rule that applies decides:
 
     1. An item in the tool is rejected.
-    2. An item with uncertain detections only, whose place no look has found empty, is rejected.
-    3. An item that is likelier a false detection than an object is a phantom. So is an item that was detected
-       repeatedly, if the tool reached the table at its place without a contact at least `MIN_EMPTY_PROBES`
-       times, never touched it, and touched another item.
-    4. An item that was dropped, or whose place was found empty, is lost; it is rejected if the tool may have
-       moved it while nothing was recorded.
+    2. An item with low-confidence detections only, whose place no look has found empty, is rejected.
+    3. An item that is likelier a false detection than an object is a phantom. So is an item if the tool
+       reached the table at its place without a contact at least `MIN_EMPTY_PROBES` times, never touched the
+       item, and touched another item.
+    4. A dropped item that the tool may have moved while nothing was recorded is rejected. Another dropped
+       item, or an item whose place was found empty, is lost.
     5. An item without a route is skipped.
-    6. If the mission was completed, an item that is sure, not contradicted and not attempted is skipped: a
-       quota was reached, or the operator quit.
+    6. If the mission was completed, a certain item without contradiction and attempts is skipped: a quota was
+       reached, or the operator quit.
     7. Any other item is rejected.
 
     Args:
@@ -65,41 +65,41 @@ def find_final_state(
 
 
 def find_lost_elsewhere(records: Collection[Record], dropped: Collection[Record]) -> list[Record]:
-    """Set each lost item to PHANTOM if it is known as another item, and return those items.
+    """Set each lost item to PHANTOM if a person moved it and another item shows it; return these phantoms.
 
-    The other item certainly exists, is of the same class, and appeared at an empty place after the last
-    detection of the lost item: somebody moved the object. Each such item explains one lost item. The tool
-    held the items `dropped` after their last detection, so another item may have appeared before the drop.
+    The other item is proved, has the same class, and appeared at an empty place after the last detection of
+    the lost item. Each other item explains one lost item. Items in `dropped` do not count as moved by a
+    person: the tool held them after their last detection, so the other item may have appeared before.
     """
-    lost = [record for record in records if record.state is State.LOST and record not in dropped]
     appeared = [
         record
         for record in records
         if record.has_appeared and record.belief.is_proved and record.state in FINAL_STATES
     ]
-    found = []
-    for old in lost:
-        same = (new for new in appeared if new.label == old.label and new.first_stamp > old.stamp)
-        if new := next(same, None):
-            old.set_state(State.PHANTOM, f"it is {new.item}")
-            appeared.remove(new)
-            found.append(old)
-    return found
+    phantoms = []
+    for old in records:
+        if old.state is State.LOST and old not in dropped:
+            same = (new for new in appeared if new.label == old.label and new.first_stamp > old.stamp)
+            if new := next(same, None):
+                old.set_state(State.PHANTOM, f"it is {new.item}")
+                appeared.remove(new)
+                phantoms.append(old)
+    return phantoms
 
 
 def forget_rejected(records: Iterable[Record]) -> list[Record]:
-    """Set each rejected or skipped item to PHANTOM, and return those items.
+    """Set each rejected or skipped item to PHANTOM, and return these items.
 
-    Somebody may have moved the object. The next look creates a new item without earlier evidence.
+    A person may have moved the object. The next look creates a new item without earlier evidence.
     """
-    left = [record for record in records if record.state in (State.REJECTED, State.SKIPPED)]
-    for record in left:
+    phantoms = [record for record in records if record.state in (State.REJECTED, State.SKIPPED)]
+    for record in phantoms:
         record.set_state(State.PHANTOM, "the run was resumed, and looks search for it again")
-    return left
+    return phantoms
 
 
 def count_states(records: Iterable[Record]) -> dict[str, int]:
-    """Return the counts `seen, placed, rejected, skipped, lost, phantom`; phantoms are not among the seen."""
+    """Return the counts `seen, placed, rejected, skipped, lost, phantom`; `seen` excludes phantoms."""
     states = Counter(record.state for record in records)
     return {
         "seen": sum(states.values()) - states[State.PHANTOM],
@@ -108,5 +108,5 @@ def count_states(records: Iterable[Record]) -> dict[str, int]:
 
 
 def is_balanced(counts: Mapping[str, int]) -> bool:
-    """Return True if each item that was seen is placed, rejected, skipped or lost."""
+    """Return True if `seen` is the sum of `placed`, `rejected`, `skipped` and `lost`."""
     return counts["seen"] == sum(counts[state.value] for state in FINAL_STATES)

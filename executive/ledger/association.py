@@ -1,7 +1,7 @@
 """Association of observations with items: by position first, then by class.
 
 A look is matched to the items in three steps: each observation to an item near it (`associate`), a new item
-to an item that may have been moved there (`find_moved`), and an item to another one at the same position
+to an item that may have been moved there (`find_moved`), and an item to another item at the same position
 (`find_duplicate`).
 """
 
@@ -18,14 +18,14 @@ from executive.ledger.item import LYING, REASON_NOT_FOUND, Record, State
 from executive.ledger.staleness import Staleness
 
 MAX_STANDARD_DEVIATIONS = 3.5
-"""Number of standard deviations within which two measurements of one position lie, with probability 0.999."""
+"""Number of standard deviations within which two measurements of a position agree with probability 0.999."""
 AMBIGUITY_FACTOR = 1.5
 """Factor on the allowed distance up to which an observation may still show an item."""
 MAX_PUSH_DISTANCE = 0.12
 """Largest distance by which a person may push an item so that it still counts as the same item [m]."""
 MAX_MISS_PROBABILITY_OF_MOVED = 0.05
 """An item may have been moved elsewhere if the probability that looks missed it is at most this."""
-MIN_PROBABILITY = 0.9
+MIN_EXISTENCE_PROBABILITY = 0.9
 """Probability of existence from which an item is picked, and may be a moved item."""
 
 
@@ -35,7 +35,8 @@ def associate(
     """Return the item of each observation that shows a known item.
 
     Settled items come first, then items that may have been moved, but not far. Within both groups, an item of
-    the observed class precedes other items (the class is evidence, not identity), and a near item a far one.
+    the observed class precedes other items (the class is evidence, not identity), and a near item precedes a
+    far item.
 
     Args:
         observations: Confident observations on the table.
@@ -44,15 +45,15 @@ def associate(
         gate: Distance that is always allowed [m].
     """
     pairs = [
-        (not staleness.is_settled(record), record.label != one.detection.label, distance, one, record)
-        for one in observations
+        (not staleness.is_settled(record), record.label != seen.detection.label, distance, seen, record)
+        for seen in observations
         for record in records
-        if (distance := record.distance_to(one.position)) <= max_distance(record, one.std, gate)
+        if (distance := record.distance_to(seen.position)) <= max_distance(record, seen.std, gate)
     ]
     matches: dict[Observation, Record] = {}
-    for *_, one, record in sorted(pairs, key=lambda pair: pair[:3]):
-        if one not in matches and record not in matches.values():
-            matches[one] = record
+    for *_, observation, record in sorted(pairs, key=lambda pair: pair[:3]):
+        if observation not in matches and record not in matches.values():
+            matches[observation] = record
     return matches
 
 
@@ -69,9 +70,10 @@ def max_distance(record: Record, std: float, gate: float) -> float:
     return min(max(gate, MAX_STANDARD_DEVIATIONS * math.hypot(record.std, std)), 2 * gate)
 
 
-def may_show(one: Observation, record: Record, gate: float) -> bool:
+def may_show(observation: Observation, record: Record, gate: float) -> bool:
     """Return True if an observation may show an item, even with a large error of the measured position."""
-    return record.distance_to(one.position) <= AMBIGUITY_FACTOR * max_distance(record, one.std, gate)
+    allowed = AMBIGUITY_FACTOR * max_distance(record, observation.std, gate)
+    return record.distance_to(observation.position) <= allowed
 
 
 def find_moved(
@@ -82,27 +84,29 @@ def find_moved(
     The class of the new item must be certain: until then, the new item may be another object that fell
     nearby.
     """
-    is_candidate = new.state is State.SEEN and not new.attempts and new.belief.probability >= MIN_PROBABILITY
-    if not is_candidate or new.belief.class_error > config.misjudged:
+    if (
+        new.state is not State.SEEN
+        or new.attempts
+        or new.belief.probability < MIN_EXISTENCE_PROBABILITY
+        or new.belief.class_error > config.misjudged
+    ):
         return None
     missing = [old for old in records if _may_have_become(old, new, staleness, config)]
     return min(missing, key=lambda old: _horizontal_distance(old, new), default=None)
 
 
 def find_duplicate(record: Record, records: Iterable[Record], gate: float) -> Record | None:
-    """Return the first other item on the table that is too near to be another object, or None."""
-    for other in records:
-        is_near = other is not record and other.distance_to(record.position) < gate
-        if is_near and record.state is other.state is State.SEEN:
-            return other
-    return None
+    """Return the first other item on the table that is too near to an item to be another object, or None."""
+    open_items = [other for other in records if record.state is other.state is State.SEEN]
+    others = (other for other in open_items if other is not record)
+    return next((other for other in others if other.distance_to(record.position) < gate), None)
 
 
 def _may_have_become(old: Record, new: Record, staleness: Staleness, config: LedgerConfig) -> bool:
     """Return True if a new item may be an item that does not lie at its position any more.
 
-    The robot may have pushed it anywhere; a person, at most `MAX_PUSH_DISTANCE`. A phantom that the robot
-    tried to pick may have been an object until then.
+    The robot may push an item anywhere, a person by at most `MAX_PUSH_DISTANCE`. A phantom may have been an
+    object until the robot tried to pick the phantom.
     """
     if old is new or old.label != new.label:
         return False
@@ -115,7 +119,7 @@ def _may_have_become(old: Record, new: Record, staleness: Staleness, config: Led
         and new.first_stamp > old.stamp
         and old.belief.miss_probability <= config.overlooked
     )
-    is_phantom = old.state is State.PHANTOM and old.why == REASON_NOT_FOUND and old.attempts > 0
+    is_phantom = old.state is State.PHANTOM and old.reason == REASON_NOT_FOUND and old.attempts > 0
     is_missing = (
         (old.state in LYING or is_phantom)
         and old.belief.miss_probability <= MAX_MISS_PROBABILITY_OF_MOVED

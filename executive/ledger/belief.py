@@ -17,9 +17,9 @@ VIEWPOINT_PITCH = 0.02
 ITEM_AREA_SHARE = 0.02
 """Share of the searched area in which a false detection is assigned to a given item."""
 MAX_LOG_ODDS_OF_ALTERNATIVE = math.log(0.1)
-"""Largest log odds of existence of a new item that may be a false localization of a known item nearby."""
+"""Maximum log odds of existence of a new item that may be a false localization of a known item nearby."""
 LOG_ODDS_OF_PROOF = math.log(1e4)
-"""Log odds of existence from which an item is known to exist: two looks of a good detector agree."""
+"""Log odds of existence from which an item counts as proved: two looks of a good detector agree."""
 MAX_ABS_LOG_ODDS = 100.0
 """Limit of log odds before they are converted to a probability."""
 
@@ -49,12 +49,11 @@ class Belief:
         log_odds: Log odds that the item exists and is no false detection.
         is_proved: True if the item exists for certain: enough looks agree, or the tool has touched it.
         miss_probability: Probability that all looks at its position since the last detection missed it.
-        uncertain_looks: Number of looks since the last confident detection that showed it with low
-            confidence.
+        uncertain_looks: Number of looks with a low-confidence detection since the last confident detection.
         answers: Last detected class by viewpoint, since the item may have been moved.
         repeats: Number of looks that repeated the answer of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, up to a common constant.
-        counts: Number of looks by detected class.
+        label_counts: Number of looks by detected class.
         confusion: Largest share of wrong classes among the detectors that saw the item.
     """
 
@@ -66,18 +65,18 @@ class Belief:
     answers: dict[str, str] = field(default_factory=dict)
     repeats: int = 0
     log_likelihoods: dict[str, float] = field(default_factory=lambda: defaultdict(float))
-    counts: Counter[str] = field(default_factory=Counter)
+    label_counts: Counter[str] = field(default_factory=Counter)
     confusion: float = 0.0
 
     @property
     def looks(self) -> int:
         """Number of looks that detected the item."""
-        return self.counts.total()
+        return self.label_counts.total()
 
     @property
     def label(self) -> str:
         """Most probable class, the first in the alphabet among equals."""
-        if not self.counts:
+        if not self.label_counts:
             return self.first_label
         return min(self.log_likelihoods, key=lambda label: (-self.log_likelihoods[label], label))
 
@@ -85,13 +84,13 @@ class Belief:
     def class_error(self) -> float:
         """Probability that the item does not belong to the class `label`, 0 to 1.
 
-        The alternatives of Bayes' rule are the other detected classes, and all further classes as one.
+        The hypotheses of Bayes' rule are the detected classes, and all other classes together as one.
         """
-        if not self.counts:
+        if not self.label_counts:
             return 1.0
         best = self.log_likelihoods[self.label]
-        rivals = (value for label, value in self.log_likelihoods.items() if label != self.label)
-        odds = sum(math.exp(value - best) for value in (0.0, *rivals))
+        others = (value for label, value in self.log_likelihoods.items() if label != self.label)
+        odds = sum(math.exp(value - best) for value in (0.0, *others))
         return odds / (1.0 + odds)
 
     @property
@@ -101,7 +100,7 @@ class Belief:
         A small value shows that the detector errs more often than its error rates state.
         """
         n, p = self.looks, self.confusion
-        wrong = n - self.counts[self.label]
+        wrong = n - self.label_counts[self.label]
         return 1.0 - sum(math.comb(n, k) * p**k * (1.0 - p) ** (n - k) for k in range(wrong))
 
     @property
@@ -138,7 +137,7 @@ class Belief:
         elif not is_ambiguous and (self.looks or self.uncertain_looks):
             false_detection = min(rates.invented * ITEM_AREA_SHARE, 1.0)
             self.log_odds += _log_ratio(1.0 - rates.misses, false_detection, repeated)
-        self.counts[label] += 1
+        self.label_counts[label] += 1
         self.uncertain_looks = 0
         self.is_proved = self.is_proved or self.log_odds >= LOG_ODDS_OF_PROOF
 
@@ -151,7 +150,7 @@ class Belief:
         """Add the detections of an item that proved to be this one."""
         for label, value in other.log_likelihoods.items():
             self.log_likelihoods[label] += value
-        self.counts += other.counts
+        self.label_counts += other.label_counts
         self.miss_probability = 1.0
 
 
@@ -160,5 +159,5 @@ def _probability_of(log_odds: float) -> float:
 
 
 def _log_ratio(probability: float, alternative: float, repeated: float) -> float:
-    """Return the log of the ratio of two probabilities of an answer, a share of which may be repeated."""
+    """Return the log likelihood ratio of an answer that is a copy with the probability `repeated`."""
     return math.log(repeat_probability(probability, repeated) / repeat_probability(alternative, repeated))

@@ -1,4 +1,4 @@
-"""Items in bins: number of objects, and dropped items that a bin may contain."""
+"""Contents of the bins: number of objects, and dropped items that a bin may contain."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from executive.ledger.association import MAX_STANDARD_DEVIATIONS
 from executive.ledger.item import Record, State
 
 WALL_MARGIN = 0.035
-"""Smallest distance from the walls at which a landing centre of an object is in the bin for certain [m]."""
+"""Minimum distance from the walls at which an object that lands in a bin is certain to stay there [m]."""
 LOG_ODDS_FELL_IN_BIN = math.log(0.95 / 0.05)
 """Prior log odds that a dropped item lies in the bin over which it was predicted to land."""
 BIN_AREA_SHARE = 0.04
@@ -34,8 +34,8 @@ class Bins:
 
     Attributes:
         config: Limits of the cell file.
-        bins: By name.
-        routes: Class label to the bins that are right for it.
+        bins: Bins by name.
+        routes: Names of the right bins by class.
     """
 
     config: LedgerConfig
@@ -46,18 +46,18 @@ class Bins:
         """Return the number of items that were released in a bin or are believed to have fallen into it."""
         return sum(bin in (record.bin, find_believed_bin(record)) for record in records)
 
-    def find_bin(self, one: Observation, bias: float, records: Collection[Record]) -> str | None:
+    def find_bin(self, observation: Observation, bias: float, records: Collection[Record]) -> str | None:
         """Return the bin in which an observed object lies, or None.
 
-        The measurement error counts if the bin has content. `bias` is the systematic error [m].
+        Bins with content are enlarged by the measurement error. `bias` is the systematic error [m].
         """
-        error = MAX_STANDARD_DEVIATIONS * math.hypot(one.std, bias)
+        error = MAX_STANDARD_DEVIATIONS * math.hypot(observation.std, bias)
         for name, bin in self.bins.items():
-            if bin.contains(one.position, error if self.count_in(name, records) else 0.0):
+            if bin.contains(observation.position, error if self.count_in(name, records) else 0.0):
                 return name
         return None
 
-    def predict(self, record: Record, landing: Array | None) -> None:
+    def set_prior(self, record: Record, landing: Array | None) -> None:
         """Set the prior log odds that a dropped item lies in a bin.
 
         `landing` `(3,)` [m] is the predicted position, or None if it is unknown.
@@ -72,7 +72,7 @@ class Bins:
     ) -> list[Record]:
         """Set dropped items that a look shows in a bin of their class to PLACED, and return these items.
 
-        If a bin shows more objects of a class than were released in it, the others must have fallen into it.
+        If a look shows more objects of a class in a bin than were released there, the others have fallen in.
 
         Args:
             look: A look at the whole image.
@@ -81,9 +81,9 @@ class Bins:
         """
         # The centre of an object that leans on a wall from the inside may lie over the wall.
         shown = Counter(
-            (one.detection.label, bin)
-            for one, bin in content.items()
-            if one.confident and bin and self.bins[bin].contains(one.position, BIN_THICKNESS)
+            (seen.detection.label, bin)
+            for seen, bin in content.items()
+            if seen.confident and bin and self.bins[bin].contains(seen.position, BIN_THICKNESS)
         )
         found = []
         for record in (record for record in records if record.state is State.DROPPED):

@@ -7,26 +7,25 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from executive.cell.config import LedgerConfig
-from executive.ledger.association import MIN_PROBABILITY
+from executive.ledger.association import MIN_EXISTENCE_PROBABILITY
 from executive.ledger.item import REASON_UNCERTAIN, Record, State
 
 MIN_P_VALUE, REJECTION_P_VALUE = 0.01, 0.001
-"""Limits of the p-value of a binomial test of the number of looks with another class: the smallest to sort an
-item, and the limit below which to reject it."""
+"""Minimum p-value of an item's class to sort the item, and the p-value below which the item is rejected."""
 RETRY_STANDARD_ERROR_FACTOR = 2 / 3
 """Factor on the allowed standard error of an item's position after a failed grasp."""
 MIN_MISS_PROBABILITY = 0.1
-"""An item counts as present if the probability that later looks missed it is at least this."""
+"""Minimum probability that looks missed an item since its last detection, for an item that is picked."""
 MIN_LOOKS_TO_REJECT = 40
 """Number of looks from which an item is rejected if they disagree about its class."""
 MIN_CONTRADICTIONS_TO_REJECT = 3
 """Number of contradicting looks from which an item may be rejected."""
 MAX_REPEATS = 2
-"""Number of repeated answers from one pose after which further looks from there add hardly any evidence."""
+"""Number of repeated answers from a viewpoint from which further looks from there add hardly any evidence."""
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
-"""Probability of a wrong class up to which an item is touched, if a touch decides its class."""
+"""Maximum probability of a wrong class for a touch, if the height of the touch determines the class."""
 MAX_UNCERTAIN_LOOKS = 10
-"""Number of looks with low-confidence detections of an item only after which it is rejected."""
+"""Number of looks without a confident detection of an item, from which the item is rejected."""
 
 
 @dataclass(frozen=True)
@@ -44,15 +43,15 @@ class Certainty:
     def is_sure(self, record: Record) -> bool:
         """Return True if an item's existence, class and position are certain enough.
 
-        After a failed grasp, the position must be known more precisely. If looks from one pose cannot prove
-        the class, but a touch can, the item is certain enough to be touched.
+        After a failed grasp, the position must be known more precisely. If looks from one viewpoint cannot
+        prove the class, but a touch can, the item is certain enough to be touched.
         """
         belief, limit = record.belief, self.config.misjudged
         if belief.repeats >= MAX_REPEATS and record.label in self.distinct_by_touch:
             limit = MAX_CLASS_ERROR_FOR_TOUCH
         max_error = self.config.aim * (RETRY_STANDARD_ERROR_FACTOR if record.attempts else 1.0)
         return (
-            belief.probability >= MIN_PROBABILITY
+            belief.probability >= MIN_EXISTENCE_PROBABILITY
             and record.contradictions <= belief.looks
             and belief.miss_probability >= MIN_MISS_PROBABILITY
             and belief.class_error <= limit
@@ -61,7 +60,7 @@ class Certainty:
         )
 
     def is_possible(self, record: Record) -> bool:
-        """Return True if an item may be an object that lies on the table and is to be sorted."""
+        """Return True if an open item may lie on the table."""
         may_exist = record.belief.probability > self.config.overlooked
         return record.state is State.SEEN and may_exist and not self.is_gone(record)
 
@@ -83,7 +82,7 @@ class Certainty:
         if record.state is not State.SEEN:
             return
         if belief.looks >= MIN_LOOKS_TO_REJECT and belief.p_value < REJECTION_P_VALUE:
-            counts = ", ".join(f"{count} {label}" for label, count in belief.counts.most_common())
+            counts = ", ".join(f"{count} {label}" for label, count in belief.label_counts.most_common())
             record.set_state(State.REJECTED, f"its class is in doubt: {counts}")
         elif self._cannot_prove_class(record):
             chance = f"leave a chance of {belief.class_error:.1%} that it is no {record.label}"
@@ -95,15 +94,15 @@ class Certainty:
             belief.log_odds = max(belief.log_odds, 0.0)
 
     def count_low_touch(self, record: Record) -> bool:
-        """Count a touch that is too low for the class; return True if it may have missed the top.
+        """Count a touch that is too low for the class; return True if the touch may have missed the top.
 
-        That may happen once, and only to an item whose class the looks prove without a touch.
+        Only the first low touch may have missed the top, and only if looks alone prove the class.
         """
         record.low_touches += 1
         return record.low_touches == 1 and record.belief.class_error <= self.config.misjudged
 
     def _cannot_prove_class(self, record: Record) -> bool:
-        """Return True if all looks came from one viewpoint, and neither they nor a touch prove its class."""
+        """Return True if all looks came from one viewpoint, and neither looks nor a touch prove the class."""
         belief = record.belief
         return (
             belief.class_error > self.config.misjudged

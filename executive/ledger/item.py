@@ -18,11 +18,11 @@ from executive.geometry import Array
 from executive.ledger.belief import Belief
 
 SAME_POSITION_TOLERANCE = 0.01
-"""Distance up to which two measured positions count as the same one [m]."""
+"""Maximum distance between two measurements of the same position [m]."""
 REASON_NOT_FOUND = "more looks missed it than saw it"
-"""Reason of a phantom that looks did not find again."""
+"""Reason of a phantom that looks have missed."""
 REASON_UNTRACKED = "its place is unknown: the journal lacks actions of the tool, and no look showed it since"
-"""Reason why an item is rejected that the tool may have moved while nothing was recorded."""
+"""Reason of the rejection of an item that the tool may have moved while nothing was recorded."""
 REASON_UNCERTAIN = "no look is sure of it"
 """Reason of the rejection of an item with low-confidence detections only."""
 
@@ -31,25 +31,25 @@ class State(Enum):
     """State of an item; the last four are final."""
 
     SEEN = "seen"
-    """It lies on the table and is not sorted yet."""
+    """The item lies on the table and is not sorted yet."""
     HELD = "held"
-    """The tool holds it."""
+    """The tool holds the item."""
     DROPPED = "dropped"
-    """The tool lost it, and no look has found it again yet; it is rejected if the record has a reason."""
+    """The tool lost the item, and no look has found it again. With a reason, the item is rejected later."""
     PLACED = "placed"
-    """It was released in a bin."""
+    """The item was released in a bin."""
     REJECTED = "rejected"
-    """It stays on the table because the mission had to sort it and could not."""
+    """The item stays on the table because the mission had to sort it and could not."""
     SKIPPED = "skipped"
-    """It stays on the table because the mission did not have to sort it."""
+    """The item stays on the table because the mission did not have to sort it."""
     LOST = "lost"
-    """It exists, and no look finds it."""
+    """The item exists, and no look finds it."""
     PHANTOM = "phantom"
-    """It does not exist, or it is another item."""
+    """The item does not exist, or is another item of the ledger."""
 
 
 LYING = (State.SEEN, State.REJECTED)
-"""States of an item that lies where it was detected last."""
+"""States of an item that lies at the position of its last detection."""
 
 
 @dataclass(eq=False)
@@ -59,31 +59,30 @@ class Record:
     Attributes:
         item: Name, unique in the run.
         belief: Existence and class.
-        first_position: Position before the item may have been moved for the first time `(3,)` [m].
+        first_position: Position before the first possible move of the item `(3,)` [m].
         first_epoch: Number of changes of the table at the first detection.
         first_stamp: Time of the first detection [s].
         has_appeared: True if looks had found its position empty before the first detection.
-        position: Mean of the measured positions since the item may have been moved `(3,)` [m].
+        position: Mean of the measured positions since the last possible move `(3,)` [m].
         std: Standard error of `position` along each axis [m].
         bias: Standard deviation of the systematic error of `position` along each axis [m].
-        was_moved: True if it was detected again after it may have been moved.
+        was_moved: True if the item was detected after a possible move.
         epoch: Number of changes of the table at the last detection.
         frame: Id of the frame of the last detection.
         stamp: Time of the last detection [s].
         confidence: Confidence of the last detection, 0 to 1.
         state: State.
-        bin: Bin in which it was placed, or "".
-        why: Reason of the state, or "".
-        attempts: Number of failed attempts to pick it.
-        empty_probes: Number of probes that found only the table at its position, since it moved or was
-            touched.
-        had_contact: True if the tool has touched it, at any height.
-        touched_label: Class at whose height the tool has touched it last, or "".
-        low_touches: Number of touches too low for its class since the last one at the height of its class.
-        contradictions: Number of looks with evidence against its class, since it may have been moved.
-        contradiction: The last evidence against its class besides the detector's score, or "".
-        bin_log_odds: For a dropped item, log odds that it lies in each bin.
-        is_untracked: True if the tool may have moved it while nothing was recorded.
+        bin: Bin that contains the item, or "".
+        reason: Reason of the state, or "".
+        attempts: Number of failed attempts to pick the item.
+        empty_probes: Number of probes that found only the table there, since its last move or touch.
+        had_contact: True if the tool has touched the item, at any height.
+        touched_label: Class at whose height the tool has last touched the item, or "".
+        low_touches: Number of touches below the height of its class since the last touch at this height.
+        contradictions: Number of looks with evidence against its class, since the last possible move.
+        contradiction: Last evidence against its class besides the detector's score, or "".
+        bin_log_odds: Log odds, by bin, that the dropped item lies in the bin.
+        is_untracked: True if the tool may have moved the item while nothing was recorded.
     """
 
     item: str
@@ -102,7 +101,7 @@ class Record:
     confidence: float = 0.0
     state: State = State.SEEN
     bin: str = ""
-    why: str = ""
+    reason: str = ""
     attempts: int = 0
     empty_probes: int = 0
     had_contact: bool = False
@@ -133,19 +132,19 @@ class Record:
         """The item as an event, its position rounded to 0.1 mm."""
         return ItemChanged(
             self.item, self.label, self.state.value, rounded(self.position, 4),
-            self.belief.looks, self.attempts, self.bin, self.why,
+            self.belief.looks, self.attempts, self.bin, self.reason,
         )  # fmt: skip
 
     def distance_to(self, position: Array) -> float:
         """Return the distance [m] between the item and a position `(3,)` [m]."""
         return float(np.linalg.norm(self.position - position))
 
-    def set_state(self, state: State, why: str) -> None:
+    def set_state(self, state: State, reason: str) -> None:
         """Set the state and its reason."""
-        self.state, self.why = state, why
+        self.state, self.reason = state, reason
 
     def forget_answers(self) -> None:
-        """Take further looks as independent of earlier ones, because the item may have been moved."""
+        """Forget the answers of earlier looks: after a possible move, later looks do not repeat errors."""
         self.belief.answers.clear()
         self.belief.repeats = self.contradictions = 0
 
@@ -172,24 +171,24 @@ class Record:
             self.first_position = self.position
         self.belief.miss_probability = 1.0
 
-    def observe(self, one: Observation, frame: Frame, bias: float, *, is_settled: bool) -> None:
-        """Update the position with an observation, the last one from now on.
+    def observe(self, observation: Observation, frame: Frame, bias: float, *, is_settled: bool) -> None:
+        """Update the position with an observation, and record the frame of the last detection.
 
         `bias` is the systematic error of the detector's positions [m]; `is_settled` is as in `locate`.
         """
-        self.locate(one.position, one.std, is_settled=is_settled)
-        self.bias, self.confidence = bias, one.detection.confidence
+        self.locate(observation.position, observation.std, is_settled=is_settled)
+        self.bias, self.confidence = bias, observation.detection.confidence
         self.epoch, self.frame, self.stamp = frame.epoch, frame.id, frame.stamp
 
     def merge(self, found: Record) -> None:
-        """Take over the evidence of `found`, a new item that proved to be this one."""
+        """Add the evidence of `found`, a new item that is this item after a move."""
         self.belief.merge(found.belief)
         self.empty_probes = 0
         self.position, self.std, self.epoch = found.position, found.std, found.epoch
         self.frame, self.stamp, self.confidence = found.frame, found.stamp, found.confidence
-        # Its first position is that before the fall or the push.
+        # `first_position` remains the position before the fall or the push.
         self.was_moved = True
         if self.state is State.PHANTOM:
-            self.belief.log_odds, self.why = found.belief.log_odds, ""
+            self.belief.log_odds, self.reason = found.belief.log_odds, ""
         if self.state in (State.DROPPED, State.PHANTOM):
-            self.state = State.REJECTED if self.why else State.SEEN
+            self.state = State.REJECTED if self.reason else State.SEEN

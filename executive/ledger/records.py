@@ -1,4 +1,4 @@
-"""Records of all items, which emit each change of an item as an event."""
+"""Collection of the records of all items, which emits each change of an item as an event."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Records:
         self._name_counts: Counter[str] = Counter()
 
     def __iter__(self) -> Iterator[Record]:
-        """Yield all items; the items may be changed meanwhile."""
+        """Yield all items; items may be added and removed during the iteration."""
         return iter(list(self._records.values()))
 
     def find(self, item: Item) -> Record:
@@ -67,7 +67,7 @@ class Records:
         record.bin = bin
         self.change(record, State.PLACED)
 
-    def reject(self, record: Record, why: str) -> None:
-        """Record that an item is given up; a held or dropped item stays held or dropped."""
-        record.why = f"{why}: {record.contradiction}" if record.contradiction else why
+    def reject(self, record: Record, reason: str) -> None:
+        """Reject an item; a held or dropped item keeps its state, with the reason of the later rejection."""
+        record.reason = f"{reason}: {record.contradiction}" if record.contradiction else reason
         self.change(record, record.state if record.state in (State.HELD, State.DROPPED) else State.REJECTED)

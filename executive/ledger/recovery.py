@@ -1,4 +1,4 @@
-"""Recovery of the items of a run that is resumed with an incomplete journal."""
+"""Recovery of the items that the tool may have moved after the last event of an incomplete journal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from executive.ledger.records import Records
 
 
 class Recovery:
-    """Search for items that the tool may have moved unrecorded, on the table and in the bins.
+    """Search for items that the tool may have moved while nothing was recorded, on the table and in the bins.
 
     Args:
         records: All items.
@@ -26,7 +26,7 @@ class Recovery:
         self._looks: dict[str, list[Counter[str]]] = defaultdict(list)
 
     def search(self, records: Collection[Record], epoch: int) -> None:
-        """Set the position of items to unknown: from now on, they are searched everywhere.
+        """Set items to DROPPED, so that looks search for them on the table and in the bins.
 
         `epoch` is the number of changes of the table so far.
         """
@@ -44,8 +44,8 @@ class Recovery:
         """
         for name in self._bins.bins:
             if self._bins.is_searched(name, look):
-                inside = (one for one, bin in content.items() if bin == name and one.confident)
-                self._looks[name].append(Counter(one.detection.label for one in inside))
+                inside = (seen for seen, bin in content.items() if bin == name and seen.confident)
+                self._looks[name].append(Counter(seen.detection.label for seen in inside))
 
     def record_bin_contents(self, epoch: int) -> None:
         """Record a placed or rejected item for each object in a bin beyond the known items there.
@@ -53,30 +53,29 @@ class Recovery:
         `epoch` is the number of changes of the table so far.
         """
         for label, bin in self._find_surplus():
-            searched = (one for one in self._records if one.state is State.DROPPED and one.is_untracked)
-            record = next((one for one in searched if one.label == label), None)
+            searched = (item for item in self._records if item.state is State.DROPPED and item.is_untracked)
+            record = next((item for item in searched if item.label == label), None)
             if record is None:
                 belief = Belief(label, LOG_ODDS_OF_PROOF, is_proved=True)
                 record = self._records.add(belief, self._bins.bins[bin].position, epoch, 0.0, True)
             if bin in self._bins.routes.get(label, ()):
-                record.why = "found there when the run was resumed"
+                record.reason = "found there when the run was resumed"
                 self._records.place(record, bin)
             else:
                 self._records.reject(record, f"found in {bin} when the run was resumed")
 
     def _find_surplus(self) -> Iterator[tuple[str, str]]:
-        """Yield the class and the bin of each object in a bin that is none of the items there.
+        """Yield the class and the bin of each object in a bin beyond the known items there.
 
-        The median of the looks counts. Objects of a class for which the bin is right come first: a look may
-        take an item for one of another class.
+        The median of the looks counts. Classes for which the bin is right come first, because a look may show
+        a known item with a wrong class.
         """
         for bin, looks in self._looks.items():
             shown = {label: median_low(look[label] for look in looks) for label in set().union(*looks)}
-            surplus = sum(shown.values()) - self._bins.count_in(bin, [*self._records])
-            wrong = {label for label in shown if bin not in self._bins.routes.get(label, ())}
-            for is_wrong, label in sorted((label in wrong, label) for label in shown):
-                del is_wrong
-                known = sum(one.bin == bin and one.label == label for one in self._records)
+            surplus = sum(shown.values()) - self._bins.count_in(bin, self._records)
+            right = {label for label in shown if bin in self._bins.routes.get(label, ())}
+            for label in [*sorted(right), *sorted(shown.keys() - right)]:
+                known = sum(item.bin == bin and item.label == label for item in self._records)
                 count = max(min(shown[label] - known, surplus), 0)
                 surplus -= count
                 yield from [(label, bin)] * count

@@ -1,4 +1,4 @@
-"""Staleness of positions: changes of the table by the robot, after which objects may lie elsewhere."""
+"""Staleness of positions: changes of the table by the robot, which may have moved objects."""
 
 from __future__ import annotations
 

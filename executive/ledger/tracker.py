@@ -1,4 +1,4 @@
-"""Tracker of all items: records of looks and robot actions, and the questions of skills about items."""
+"""Tracker of all items: records looks and actions of the robot, and answers the queries of skills."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ from executive.ledger.bins import Bins, find_believed_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import LYING, Record, State
-from executive.ledger.look import Update
-from executive.ledger.look_event import describe_look
+from executive.ledger.look import Update, describe_look
 from executive.ledger.records import Records
 from executive.ledger.recovery import Recovery
 from executive.ledger.staleness import Staleness
@@ -42,15 +41,15 @@ class Tracker:
 
     Args:
         config: Limits of the cell file.
-        table: Declares the workspace.
+        table: The workspace.
         bins: Bins by name.
-        routes: Class label to the bins that are right for it.
-        emit: Takes the events.
+        routes: Names of the right bins by class.
+        emit: Emits an event.
         distinct_by_touch: Classes whose height distinguishes them from all others.
 
     Attributes:
-        unknown: For each label that is not in the cell file, the largest number of its boxes in a look.
-        doubts: Reasons why error rates of detectors were assumed and not measured, in the order of the looks.
+        unknown: Largest number of boxes in one look for each label that is not in the cell file.
+        doubts: Reasons for assuming the error rates of detectors, in the order of the looks.
     """
 
     def __init__(
@@ -87,8 +86,7 @@ class Tracker:
         """Update all items with one search of a frame, and return the targets."""
         frame = detections.frame
         self.unknown |= Counter(detection.label for detection in detections.unknown)
-        # The text of a doubt ends with a colon and numbers that differ from frame to frame; one text per kind
-        # is kept.
+        # The numbers after the colon in the text of a doubt differ between frames: one text per kind is kept.
         kind = detections.error_rates.doubt.partition(":")[0]
         if kind and not any(doubt.startswith(kind) for doubt in self.doubts):
             self.doubts.append(detections.error_rates.doubt)
@@ -132,7 +130,7 @@ class Tracker:
         return next((record.item for record in self.records if record.state is State.HELD), None)
 
     def is_current(self, frame: Frame) -> bool:
-        """Return True if no change after the capture of a frame may have moved all objects."""
+        """Return True if no change of the whole table happened after the capture of a frame."""
         return self._staleness.is_table_unchanged(frame.epoch)
 
     def is_fresh(self, target: Target) -> bool:
@@ -142,7 +140,7 @@ class Tracker:
     def is_open(self, item: Item) -> bool:
         """Return True if an item is still to be sorted."""
         record = self._records.find(item)
-        return record.state in (State.SEEN, State.DROPPED) and not record.why
+        return record.state in (State.SEEN, State.DROPPED) and not record.reason
 
     def is_sure(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough."""
@@ -151,7 +149,7 @@ class Tracker:
     def is_table_empty(self, label: str | None = None) -> bool:
         """Return True if no object with a route is left on the visible table."""
         return self._coverage.max_object_probability <= self._config.overlooked and not any(
-            # The class of an item without a confident detection is a guess.
+            # An item without a confident detection counts with any class, because its class is uncertain.
             ((record.label in self._routes and label in (None, record.label)) or not record.belief.looks)
             and self._certainty.is_possible(record)
             and self._coverage.is_in_sight(record.position)
@@ -170,18 +168,18 @@ class Tracker:
         """Return the number of objects in a bin."""
         return self._bins.count_in(bin, self.records)
 
-    def record_touch(self, item: Item, contradiction: str = "", *, beside_top: bool = False) -> bool:
-        """Record a touch, which proves that an item exists, and return True if it may be of its class.
+    def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
+        """Record a touch, which proves that an item exists, and return True if the item may be of its class.
 
-        An item that was touched at the height of its class before may have fallen over since: then no height
-        contradicts its class.
+        If an earlier touch was at the height of the class, no later height contradicts the class, because the
+        item may have fallen over.
         """
         record = self._records.find(item)
         record.belief.is_proved, record.had_contact, record.empty_probes = True, True, 0
         if not contradiction:
             record.touched_label, record.low_touches = record.label, 0
         elif record.touched_label != record.label:
-            if beside_top and self._certainty.count_low_touch(record):
+            if may_miss_top and self._certainty.count_low_touch(record):
                 return True
             record.contradiction = contradiction
             self._invalidate(record.position, self._config.neighbourhood)
@@ -190,7 +188,7 @@ class Tracker:
         return True
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
-        """Record a failed attempt to pick an item; all positions are in doubt now."""
+        """Record a failed attempt to pick an item; all positions are uncertain now."""
         record = self._records.find(item)
         record.attempts += 1
         record.empty_probes += found_table
@@ -214,11 +212,11 @@ class Tracker:
         self._invalidate(record.position, self._config.neighbourhood)
 
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
-        """Record that the tool lost an item on the way; all positions are in doubt now."""
+        """Record that the tool lost an item during a motion; all positions are uncertain now."""
         record = self._records.find(item)
         record.is_untracked = False
         self._records.change(record, State.DROPPED)
-        self._bins.predict(record, landing)
+        self._bins.set_prior(record, landing)
         record.attempts += 1
         record.epoch = self.epoch
         self.invalidate_positions()
@@ -227,7 +225,7 @@ class Tracker:
         """Record that an item was released in a bin."""
         record = self._records.find(item)
         if record.state is State.HELD:
-            record.why = ""
+            record.reason = ""
         self._records.place(record, bin)
 
     def record_put_down(self, item: Item, position: Array) -> None:
@@ -235,15 +233,15 @@ class Tracker:
         record = self._records.find(item)
         record.locate(position, self._config.gate, is_settled=False)
         record.epoch = self.epoch
-        self._records.change(record, State.REJECTED if record.why else State.SEEN)
+        self._records.change(record, State.REJECTED if record.reason else State.SEEN)
         self.invalidate_positions()
 
-    def reject(self, item: Item, why: str) -> None:
+    def reject(self, item: Item, reason: str) -> None:
         """Reject an item: it is reported and not tried again.
 
-        A held item stays HELD until it is released; looks continue to search for a dropped item.
+        A held item stays HELD until its release; looks continue to search for a dropped item.
         """
-        self._records.reject(self._records.find(item), why)
+        self._records.reject(self._records.find(item), reason)
 
     def invalidate_positions(self) -> None:
         """Record that any object on the table may have been moved."""
@@ -252,8 +250,7 @@ class Tracker:
     def lose_track(self) -> None:
         """Record that the tool may have moved any item that is not in a bin."""
         self._recovery = Recovery(self._records, self._bins)
-        held_or_dropped = (State.HELD, State.DROPPED)
-        self._search_everywhere([one for one in self.records if one.state in held_or_dropped])
+        self._search_everywhere([item for item in self._records if item.state in (State.HELD, State.DROPPED)])
 
     def mark_unseen_as_dropped(self) -> None:
         """Have looks search for every item that none has shown since `lose_track`."""
@@ -285,8 +282,8 @@ class Tracker:
             if bin := find_believed_bin(record):
                 record.bin, final = bin, (State.PLACED, "it fell there")
             if final is not None:
-                record.why = final[1]
-                self._records.change(record, final[0])
+                record.set_state(*final)
+                self._records.report(record)
         for record in find_lost_elsewhere(self.records, dropped):
             self._records.report(record)
 
@@ -295,7 +292,7 @@ class Tracker:
         for record in forget_rejected(self.records):
             self._records.report(record)
 
-    def balance(self) -> dict[str, int]:
+    def count_states(self) -> dict[str, int]:
         """Return the counts `seen, placed, rejected, skipped, lost, phantom`."""
         return count_states(self.records)
 
@@ -304,17 +301,17 @@ class Tracker:
         return [record.summary for record in self.records]
 
     def _update(self, detections: Detections, observations: Sequence[Observation]) -> None:
-        """Associate, update, reject; an object in a bin is no target, but it may be a dropped item."""
+        """Update the items on the table with observations there, and dropped items with those in bins."""
         bias = detections.error_rates.bias
-        in_bins = {one: self._bins.find_bin(one, bias, self.records) for one in observations}
+        bins = {seen: self._bins.find_bin(seen, bias, self.records) for seen in observations}
         update = Update(self._config, self._records, self._coverage, self._staleness, detections)
-        for record in update.apply([one for one, bin in in_bins.items() if bin is None]):
+        for record in update.apply([seen for seen, bin in bins.items() if bin is None]):
             self._certainty.reject_if_uncertain(record, is_settled=self._staleness.is_settled(record))
             self._records.report(record)
         if detections.view == "full" and self._recovery is not None:
-            self._recovery.add(detections, in_bins)
+            self._recovery.add(detections, bins)
         elif detections.view == "full":
-            for record in self._bins.find_dropped(detections, in_bins, self.records):
+            for record in self._bins.find_dropped(detections, bins, self.records):
                 self._records.report(record)
 
     def _search_everywhere(self, records: Collection[Record]) -> None:

@@ -174,7 +174,7 @@ class Recording:
     ) -> Result:
         workcell, path, timeline = self.run.workcell, self.directory.path, self._timeline
         accounts = workcell.accounts
-        balance = accounts.balance()
+        balance = accounts.count_states()
         return Result(
             mission=self.loaded.mission.name,
             status=outcome.status,

@@ -67,7 +67,7 @@ def close_accounts(accounts: Accounts, *, completed: bool) -> None:
         Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost ones.
     """
     accounts.close(completed=completed)
-    counts = accounts.balance()
+    counts = accounts.count_states()
     if not is_balanced(counts):
         listed = ", ".join(f"{number} {state}" for state, number in counts.items())
         raise Fault(

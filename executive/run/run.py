@@ -96,8 +96,8 @@ class Run:
         return outcome
 
     def items(self) -> dict[str, int]:
-        """Return the counts of the items by final state; see `Accounts.balance`."""
-        return self.workcell.accounts.balance()
+        """Return the counts of the items by final state; see `Accounts.count_states`."""
+        return self.workcell.accounts.count_states()
 
     def audit(self) -> Mapping[str, int] | None:
         """Return the true final counts of the objects, or None if they are unknown; only after `execute`."""

@@ -33,7 +33,7 @@ class MissionResult(RunEnded):
 
     Attributes:
         events: Everything the run told its observers, in order.
-        items: Counts of the items by final state; see `Accounts.balance`.
+        items: Counts of the items by final state; see `Accounts.count_states`.
         accounts: The ledger, with the final state of each item.
         audit: What really became of the objects, or None where nobody can know.
         cell: The cell it ran in, closed; without what was wrapped around it.

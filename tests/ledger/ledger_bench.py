@@ -113,7 +113,8 @@ class Bench:
 
     def states(self) -> dict[str, tuple[str, str]]:
         """State of each item, and where it was placed or why it is in that state."""
-        return {record.item: (record.state.value, record.bin or record.why) for record in self.ledger.records}
+        records = self.ledger.records
+        return {record.item: (record.state.value, record.bin or record.reason) for record in records}
 
     def end(self, *, completed: bool = True) -> dict[str, tuple[str, str]]:
         """End the run and return the final states; `completed` is True if the tree succeeded."""

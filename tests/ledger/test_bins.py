@@ -74,7 +74,7 @@ def test_what_leans_on_the_wall_of_its_bin_is_in_it_and_what_lies_beside_it_is_n
     bench.place("cube-1")
     bench.drop("cube-2")
     assert bench.look(("cube", 0.2, y), IN_RED, view="full") == []
-    assert bench.ledger.balance()["placed"] == placed
+    assert bench.ledger.count_states()["placed"] == placed
 
 
 def test_what_was_given_up_is_found_in_its_bin_all_the_same(bench: Bench) -> None:
@@ -135,7 +135,7 @@ def test_one_object_more_in_a_bin_of_its_class_than_was_let_go_there_is_the_drop
     bench.look(("cube", 0.60, 0.0))
     bench.drop("cube-2")
     bench.look(IN_RED, view="full")
-    assert bench.ledger.balance()["placed"] == 1, "the cube in the red bin is the one that was let go there"
+    assert bench.ledger.count_states()["placed"] == 1, "the cube in the red bin is the released one"
     bench.look(IN_RED, ("cube", 0.2, 0.44), view="full")
     assert bench.states()["cube-2"] == ("placed", "pink_bin")
 

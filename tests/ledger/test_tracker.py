@@ -129,14 +129,14 @@ def test_a_rejection_after_a_contradiction_contains_it(bench: Bench) -> None:
 def test_a_touch_may_miss_the_top_of_an_object_once(bench: Bench) -> None:
     bench.look(CUBE)
     doubt = "it was touched 40 mm above the table, and a cube is 50 mm high"
-    assert [bench.ledger.record_touch("cube-1", doubt, beside_top=True) for _ in range(2)] == [True, False]
+    assert [bench.ledger.record_touch("cube-1", doubt, may_miss_top=True) for _ in range(2)] == [True, False]
 
 
 def test_after_a_touch_at_its_height_an_object_may_lie_on_its_side(bench: Bench) -> None:
     bench.look(CUBE)
     doubt = "it was touched 40 mm above the table, and a cube is 50 mm high"
     answers = [
-        bench.ledger.record_touch("cube-1", text, beside_top=True) for text in (doubt, "", doubt, doubt)
+        bench.ledger.record_touch("cube-1", text, may_miss_top=True) for text in (doubt, "", doubt, doubt)
     ]
     assert answers == [True] * 4
 
@@ -152,7 +152,7 @@ def test_a_frame_from_before_a_pick_brings_nothing_back(bench: Bench) -> None:
     bench.look(CUBE, FAR)
     bench.ledger.record_grasp("cube-1")
     assert names(bench.look(CUBE, FAR, epoch=0)) == ["cube-2"]
-    assert bench.ledger.balance()["seen"] == 2
+    assert bench.ledger.count_states()["seen"] == 2
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_what_looks_agree_on_decides_what_becomes_of_an_item(
         bench.look(view="full")
     assert bench.end() == {"cube-1": final}
     counts = {"placed": 0, "rejected": 0, "skipped": 0, "lost": 0, "phantom": 0, final[0]: 1}
-    assert bench.ledger.balance() == {"seen": int(final != PHANTOM), **counts}
+    assert bench.ledger.count_states() == {"seen": int(final != PHANTOM), **counts}
 
 
 def test_an_item_that_is_given_up_in_the_tool_stays_there_until_it_is_released(bench: Bench) -> None:
@@ -208,7 +208,7 @@ def test_every_change_is_reported_and_the_accounts_balance(bench: Bench) -> None
         "cube-2": ("rejected", "the run ended before its turn"),
         "duck-1": ("rejected", "slippery"),
     }
-    assert bench.ledger.balance() == {
+    assert bench.ledger.count_states() == {
         "seen": 3, "placed": 1, "rejected": 2, "skipped": 0, "lost": 0, "phantom": 0,
     }  # fmt: skip
     changes = [event for event in bench.events if isinstance(event, ItemChanged) and event.item == "cube-1"]
@@ -397,7 +397,7 @@ def test_an_item_that_was_touched_exists_although_the_tool_finds_only_the_table_
         bench.look(CUBE, FAR)
     bench.ledger.record_touch("cube-2")
     bench.look(CUBE, FAR)
-    assert bench.ledger.record_touch("cube-1", contradiction, beside_top=True)
+    assert bench.ledger.record_touch("cube-1", contradiction, may_miss_top=True)
     for _ in range(3):
         bench.ledger.record_miss("cube-1", found_table=True)
         bench.look(CUBE)

@@ -89,7 +89,7 @@ def items_of(workcell: Workcell) -> dict[str, object]:
     """Return the counts and the final states of the items, and the labels and doubts of the ledger."""
     accounts = workcell.accounts
     details = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.summaries()}
-    return {**accounts.balance(), **details}
+    return {**accounts.count_states(), **details}
 
 
 def story_of(name: str, seed: int) -> Story:

@@ -152,7 +152,7 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
 
 def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:
     run, events = make(missions)
-    fake_of(run).ledger.balance = lambda: {  # type: ignore[method-assign]
+    fake_of(run).ledger.count_states = lambda: {  # type: ignore[method-assign]
         "seen": 3, "placed": 1, "rejected": 0, "skipped": 0, "lost": 1, "phantom": 0,
     }  # fmt: skip
     outcome = run.execute()

@@ -31,7 +31,7 @@ def test_items_are_recognized_in_their_bins_and_on_the_table(fake: FakeCell, tar
     recover(fake)
     assert states(fake) == {"cube-1": "placed", "duck-1": "seen"}
     fake.ledger.close(completed=False)
-    assert fake.audit()["right"] == fake.ledger.balance()["placed"] == 1
+    assert fake.audit()["right"] == fake.ledger.count_states()["placed"] == 1
 
 
 def test_an_item_whose_place_stays_unknown_is_rejected(fake: FakeCell, targets: list[Target]) -> None:
@@ -75,4 +75,4 @@ def test_a_known_object_in_a_bin_is_counted_once(fake: FakeCell, targets: list[T
     move_into_bin(fake, "cube", "red_bin")
     look(fake, "full")
     recover(fake)
-    assert fake.ledger.balance()["placed"] == 1
+    assert fake.ledger.count_states()["placed"] == 1

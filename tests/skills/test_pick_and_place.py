@@ -143,7 +143,7 @@ def test_items_hang_over_one_slot_after_the_other_and_are_placed(
     assert run_skill(Transit(held=held, bin="red_bin"), fake).status == "SUCCESS"
     assert fake.arm.tool_pose.position == pytest.approx([*slots[0], 0.065])
     assert run_skill(Release(held=held, bin="red_bin"), fake).outputs == {"placed": "cube-1"}
-    assert (fake.ledger.balance()["placed"], fake.ledger.count_in("red_bin")) == (1, 1)
+    assert (fake.ledger.count_states()["placed"], fake.ledger.count_in("red_bin")) == (1, 1)
     fake.world.put("cube", 0.5, 0.1)
     carry(fake, at_hand.pick(fake, look()[0]))
     assert np.allclose(fake.arm.tool_pose.position[:2], slots[1])
@@ -171,7 +171,7 @@ def test_what_does_not_come_off_is_stuck_and_not_placed(
     result = run_skill(Release(held=held, bin="red_bin", settle=0.2), fake)
     assert (result.reason, result.message) == ("stuck", "cube-1 hangs on the tool 0.20 s after release")
     assert result.ticks == pytest.approx(0.2 * 240, abs=1)
-    assert (fake.ledger.find_held_item(), fake.ledger.balance()["placed"]) == (held, 0)
+    assert (fake.ledger.find_held_item(), fake.ledger.count_states()["placed"]) == (held, 0)
 
 
 def test_an_item_is_given_up_with_its_reason_after_the_failures_the_mission_grants(
