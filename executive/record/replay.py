@@ -40,6 +40,7 @@ class Replay:
         edited: True if the mission is not the recorded one.
         unanswered: Message of the question without a recorded answer that ended the replay, or "".
         is_complete: True if the replay repeated the last control step of the record, too.
+        last_command: Control step of the last command to arm or tool.
     """
 
     decisions: int
@@ -49,6 +50,7 @@ class Replay:
     edited: bool
     unanswered: str = ""
     is_complete: bool = True
+    last_command: int = 0
 
     @property
     def same(self) -> bool:
@@ -116,7 +118,14 @@ def compare(
     comparison.end()
     recorded, replayed = comparison.difference
     return Replay(
-        comparison.same, run.tick, recorded, replayed, edited, comparison.unanswered, comparison.is_complete
+        comparison.same,
+        run.tick,
+        recorded,
+        replayed,
+        edited,
+        comparison.unanswered,
+        comparison.is_complete,
+        run.replayed.last_command,
     )
 
 
@@ -127,7 +136,7 @@ class _Comparison:
         same: Number of equal decisions.
         difference: The first recorded decision that differs, and the new one; None if there is none.
         unanswered: Message of a question without a recorded answer before the first difference, or "".
-        is_complete: True if the replay repeated all recorded decisions and had no others.
+        is_complete: True if the replay repeated all recorded decisions and had no others in these steps.
         run: The replay; it is stopped at the first difference.
     """
 
@@ -155,7 +164,9 @@ class _Comparison:
         if recorded == decision:
             self.same += 1
             return
-        self._is_over, self.is_complete, self.unanswered = True, False, self.run.replayed.unanswered
+        self._is_over, self.unanswered = True, self.run.replayed.unanswered
+        # After the last recorded control step, the replay only halts.
+        self.is_complete = decision.tick > self._log.last_tick
         if self._has_ended or self._counts(decision) or (recorded is not None and self._counts(recorded)):
             self.difference = (recorded, decision)
         self.run.control.stop()

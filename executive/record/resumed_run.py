@@ -80,7 +80,14 @@ def resume_run(
             )
         options = replace(options, seed=seed, requests=start.requests, scene=directory.scene)
         run = assemble_resumed(
-            loaded, skills, options, log, directory.world, is_complete=replay.is_complete, has_ended=has_ended
+            loaded,
+            skills,
+            options,
+            log,
+            directory.world,
+            replay.last_command,
+            is_complete=replay.is_complete,
+            has_ended=has_ended,
         )
     except BaseException:
         recorder.close(wait=False)

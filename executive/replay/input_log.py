@@ -124,7 +124,7 @@ class InputLog:
         return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
     def interruption_after(
-        self, steps: int, last_command: int = 0, *, is_complete: bool = True
+        self, steps: int, last_command: int = 0, known_command: int = 0, *, is_complete: bool = True
     ) -> Interruption:
         """Return the interruption at the end of the log.
 
@@ -133,15 +133,16 @@ class InputLog:
 
         Args:
             steps: Number of control steps that the world of the cell has made.
-            last_command: Control step in which, according to the world, the arm or the tool was last
-                commanded.
+            last_command: Control step of the last command to arm or tool by the log of the world.
+            known_command: Control step of the last command to arm or tool by a replay of this log.
             is_complete: True if the log holds all events of its last control step.
         """
         if self.last_tick in _incomplete_ends(self.events):
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
         end = self.last_tick + is_complete if self.halt is None else self.halt.tick
         complete = min(steps, end)
-        lacks_actions = last_command > self.last_tick or (not is_complete and steps > self.last_tick)
+        # The journal of a halted run reaches beyond the halt, which the replay does not.
+        lacks_actions = last_command > (known_command if self.halt is None else self.last_tick)
         for earlier in reversed(list(self.interruptions.values())):
             if earlier.resumed >= complete:
                 complete = min(complete, earlier.complete)

@@ -85,6 +85,9 @@ COMMANDS = frozenset(
 )
 """Accesses that command the cell; a replay skips them."""
 
+MOVING_COMMANDS = frozenset({"arm.start", "tool.close", "tool.open"})
+"""Commands that the log of a simulated world contains, too."""
+
 RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
 """Roles whose answers are recorded. A replay builds its own ledger, and reads the cell file for the rest."""
 

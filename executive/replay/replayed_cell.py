@@ -15,7 +15,7 @@ from executive.cell.workcell import Workcell
 from executive.errors import Stopped
 from executive.replay.input_log import InputLog, Interruption
 from executive.replay.input_replayer import InputReplayer
-from executive.replay.recorded_cell import RECORDED_ROLES, InputFormat
+from executive.replay.recorded_cell import MOVING_COMMANDS, RECORDED_ROLES, InputFormat
 
 
 class ReplayedCell(CellWrapper):
@@ -42,6 +42,7 @@ class ReplayedCell(CellWrapper):
         self.last = last
         self._replayer = InputReplayer(self.log)
         self._is_halted = False
+        self._last_command = 0
         self.is_live = False
         clock = StepClock(self._now, self.log.step)
         self._cell = replace(intercept(inner.cell, self._answer, RECORDED_ROLES), clock=clock)
@@ -57,6 +58,11 @@ class ReplayedCell(CellWrapper):
     def steps(self) -> int:
         """Number of control steps since the run began."""
         return self.inner.steps if self.is_live else self._steps
+
+    @property
+    def last_command(self) -> int:
+        """Control step of the last command to arm or tool; of a recorded run, as far as the log reaches."""
+        return self.inner.last_command if self.is_live else self._last_command
 
     @property
     def unanswered(self) -> str:
@@ -130,5 +136,7 @@ class ReplayedCell(CellWrapper):
     def _answer(self, access: Access) -> Any:
         if self.is_live:
             return access.proceed()
+        if access.name in MOVING_COMMANDS and self._steps <= self.log.last_tick:
+            self._last_command = self._steps
         name, codec = InputFormat.of(access)
         return self._replayer.read(name, codec)

@@ -29,6 +29,7 @@ from executive.cells.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.events import RunEnded
 from executive.geometry import Array
+from executive.ledger.accounts import is_balanced
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import cell_kind
@@ -85,19 +86,18 @@ def check_limits(halt: Figures) -> Iterator[str]:
             yield f"{name} is {halt[name]:.4g}; {allowed:g} is allowed"
 
 
-def check_ledger(items: Mapping[str, Any], audit: Mapping[str, int] | None) -> Iterator[str]:
+def check_ledger(items: Mapping[str, int], audit: Mapping[str, int] | None) -> Iterator[str]:
     """Yield a sentence if the ledger does not balance, or disagrees with the audit.
 
     An object that was not detected before the halt is not in the ledger; the audit counts it as unseen.
     """
-    balanced = items["seen"] == items["placed"] + items["rejected"] + items["lost"]
-    agrees = audit is None or (
+    matches = audit is None or (
         items["placed"] == audit["right"]
-        and items["rejected"] + audit["unseen"] <= audit["left"]
+        and items["rejected"] + items["skipped"] + audit["unseen"] <= audit["left"]
         and items["lost"] == audit["elsewhere"]
         and audit["wrong_bin"] == 0
     )
-    if not (balanced and agrees):
+    if not (is_balanced(items) and matches):
         yield f"the ledger says {dict(items)}; the audit {audit}"
 
 

@@ -118,9 +118,11 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     loaded = load(missions, name)
     whole = run_of(loaded, tmp_path)
     path = cut_off(loaded, tmp_path, after, nth)
-    result = resumed(path)
+    watcher = Watcher()
+    result = resumed(path, views=[watcher])
     assert (result.status, result.items) == (whole.status, whole.items)
     assert result.audit.agrees
+    assert watcher.notes == [], "a kill loses no action of the tool"
     assert set(placed(path).values()) <= {1}
     assert redecided(path) == ""
     assert json.loads((path / "result.json").read_text()) == plain(result)

@@ -68,13 +68,13 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
 
 @pytest.mark.parametrize(
     ("last_command", "is_complete", "complete", "action"),
-    [(8, True, 9, "open"), (9, True, 9, "unknown"), (8, False, 8, "unknown"), (20, False, 8, "unknown")],
+    [(8, True, 9, "open"), (9, True, 9, "unknown"), (8, False, 8, "open"), (20, False, 8, "unknown")],
 )
 def test_a_world_that_did_more_than_the_journal_knows(
     last_command: int, is_complete: bool, complete: int, action: str
 ) -> None:
     log = InputLog.of([START, at(8, ToolCommanded("open"))])
-    interruption = log.interruption_after(20, last_command, is_complete=is_complete)
+    interruption = log.interruption_after(20, last_command, 8, is_complete=is_complete)
     assert (interruption.complete, interruption.last_action) == (complete, action)
 
 
@@ -86,7 +86,7 @@ def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> Non
 
 def test_a_kill_within_a_control_step_loses_no_action() -> None:
     interruption = InputLog.of([START, at(8, ToolCommanded("open"))]).interruption_after(
-        8, 8, is_complete=False
+        8, 8, 8, is_complete=False
     )
     assert (interruption.complete, interruption.last_action) == (8, "open")
 
