@@ -10,11 +10,15 @@ from executive.cell.workcell import CellOptions, ResumePoint, Workcell
 from executive.cells.fake.cell import SilentOperator
 from executive.events import ignore
 from executive.mission.load import LoadedMission
-from executive.testing.faults.hand import Hand, hand_of
+from executive.testing.faults.world_access import WorldAccess, open_world
 
 
 def meanwhile(
-    log: Path, loaded: LoadedMission, seed: int, act: Callable[[Hand], None], kind: Callable[..., Workcell]
+    log: Path,
+    loaded: LoadedMission,
+    seed: int,
+    act: Callable[[WorldAccess], None],
+    kind: Callable[..., Workcell],
 ) -> None:
     """Rebuild the world of a cut-off run, let `act` change it, and leave it so for whoever takes the run up.
 
@@ -28,7 +32,7 @@ def meanwhile(
     options = CellOptions(SilentOperator(), base=loaded.cell_path.parent, resume=ResumePoint(log))
     cell = kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=ignore, options=options)
     with closing(cell):
-        hand = hand_of(cell)
-        hand.settle()
-        act(hand)
-        hand.settle()
+        world = open_world(cell)
+        world.settle()
+        act(world)
+        world.settle()

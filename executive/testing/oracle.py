@@ -1,7 +1,7 @@
-"""A simulated cell that knows instead of seeing: real physics and motion, detections from the truth.
+"""Simulated cell with true detections: physics and motion are simulated, detections are the true boxes.
 
-A whole simulated sort costs about a second of computing this way, and never fails for what a network
-took for a duck. The truth goes with the frame, as an image does, so nothing knows more than its look.
+A whole simulated sort takes about a second of computing time, without errors of a network. Each frame carries
+its true detections, so that a detector knows no more than its frame shows.
 """
 
 from __future__ import annotations
@@ -31,15 +31,16 @@ from executive.perception.camera_model import NEAR, project
 from executive.perception.detectors.requests import Pending
 
 CONFIDENCE = 0.9
-"""What an oracle says of everything it sees."""
+"""Confidence of all detections of an oracle."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrueFrame(Frame):
-    """A frame that says what it shows.
+    """A frame with its true detections.
 
     Attributes:
-        truth: The box around the outline of every loose object before the lens whose middle no other hides.
+        truth: Boxes around the outlines of the loose objects before the lens; an object whose centre is
+            hidden by another one is missing.
     """
 
     truth: tuple[Detection, ...]
@@ -47,38 +48,44 @@ class TrueFrame(Frame):
 
 @dataclass(frozen=True, eq=False)
 class _Outline:
-    """An object in an image: its vertices `(N, 2)` [pixel] and how far it is from the camera [m]."""
+    """Outline of an object in an image.
+
+    Attributes:
+        label: Class of the object.
+        pixels: Projected vertices `(N, 2)` [pixel].
+        distance: Mean distance of the vertices from the camera along the optical axis [m].
+    """
 
     label: str
     pixels: Array
     distance: float
 
-    def hides(self, other: _Outline) -> bool:
-        """Tell whether this one is before the middle of the other."""
+    def is_hiding(self, other: _Outline) -> bool:
+        """Return True if this object is nearer than another one and covers the centre of the other box."""
         left, top, right, bottom = outline_box(other.pixels)
         hull = cv2.convexHull(self.pixels.astype(np.float32))
-        middle = ((left + right) / 2, (top + bottom) / 2)
-        return self.distance < other.distance and cv2.pointPolygonTest(hull, middle, False) > 0
+        centre = ((left + right) / 2, (top + bottom) / 2)
+        return self.distance < other.distance and cv2.pointPolygonTest(hull, centre, False) > 0
 
 
 class TruthCamera(SimCamera):
-    """A simulated camera whose frames carry the truth; without depth they are black unless `rendered`."""
+    """A simulated camera whose frames carry true detections; images are black without `rendered` or depth."""
 
     def __init__(self, world: World, *args: Any, rendered: bool = False, **options: Any) -> None:
         super().__init__(world, *args, **options)
         self._rendered = rendered
 
     def capture(self) -> TrueFrame:
-        """Return a fresh frame of what the camera sees now, and the truth about it."""
+        """Return a new frame with its true detections."""
         frame = super().capture()
-        return TrueFrame(**vars(frame), truth=self._truth())
+        return TrueFrame(**vars(frame), truth=self._find_true_detections())
 
     def _sense(self) -> tuple[Image, Array | None]:
         if self._rendered or self.config.depth:
             return super()._sense()
         return np.zeros((self.config.height, self.config.width, 3), np.uint8), None
 
-    def _truth(self) -> tuple[Detection, ...]:
+    def _find_true_detections(self) -> tuple[Detection, ...]:
         outlines = []
         matrix, X_WC = self._true_view()
         for body, label in self._world.bodies.items():
@@ -91,7 +98,7 @@ class TruthCamera(SimCamera):
         return tuple(
             Detection(outline.label, CONFIDENCE, outline_box(outline.pixels))
             for outline in outlines
-            if outline.label != UNKNOWN and not any(other.hides(outline) for other in outlines)
+            if outline.label != UNKNOWN and not any(other.is_hiding(outline) for other in outlines)
         )
 
 
@@ -99,15 +106,15 @@ class TruthCamera(SimCamera):
 class Oracle:
     """A detector that answers with the truth of a `TrueFrame`; implements `cell.protocols.Detector`.
 
-    It reports what has the centre of its box in the searched part of the image and not behind the arm.
+    It reports the boxes whose centre is in the searched part of the image and not hidden by the arm.
 
     Attributes:
-        name: Its name in the cell file.
-        config: Its threshold and latency count; its kind does not.
-        camera: The camera whose frames it searches.
-        clock: The run's clock.
+        name: Name of the detector in the cell file.
+        config: Threshold and latency of the detector; the kind is ignored.
+        camera: Camera of the frames.
+        clock: Clock of the run.
         jitter: Standard deviation of each side of a box [pixel].
-        seed: Decides the jitter, together with the number of the frame.
+        seed: Random seed of the jitter, together with the number of the frame.
     """
 
     name: str
@@ -118,7 +125,7 @@ class Oracle:
     seed: int
 
     def request(self, frame: Frame, view: str) -> Pending:
-        """Return the truth about `frame`, visible as late as a real detector's answer."""
+        """Request the true detections of `frame`, which are available after the latency of the detector."""
         assert isinstance(frame, TrueFrame), "an oracle needs the frames of a TruthCamera"
         random = np.random.default_rng([self.seed, frame.id])
         found = []
@@ -135,21 +142,21 @@ class Oracle:
         return Pending(answer, due, self.clock, self.name, self.config.error_rates)
 
     def close(self) -> None:
-        """Have nothing to give back."""
+        """Do nothing: an oracle holds no resources."""
 
 
 def oracle_cell(*, jitter: float = 0.7, rendered: bool = False) -> Callable[..., SimCell]:
-    """Return a kind of cell, for `RunOptions.kind`: the simulated one with oracles for detectors.
+    """Return a kind of cell for `RunOptions.kind`: a simulated cell with oracles as detectors.
 
     Args:
         jitter: Standard deviation of each side of a box [pixel].
-        rendered: Draw the camera's images, for whoever looks at them.
+        rendered: True to render the images of the camera; otherwise they are black.
     """
     camera = partial(TruthCamera, rendered=rendered)
-    return partial(SimCell, camera=camera, detectors=partial(_oracles, jitter=jitter))
+    return partial(SimCell, camera=camera, detectors=partial(_build_oracles, jitter=jitter))
 
 
-def _oracles(
+def _build_oracles(
     config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path], jitter: float
 ) -> dict[str, Oracle]:
     del base, folders

@@ -1,6 +1,6 @@
-"""The test kit as pytest fixtures: installed with the executive, in reach of every test.
+"""Pytest fixtures of the test kit, available in every test where the executive is installed.
 
-Whoever starts pytest for something else must not wait for it: nothing is imported before a test asks.
+The fixtures import lazily, so that other tests start without delay.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def fake_cell() -> FakeCell:
 
 @pytest.fixture
 def run_skill() -> Callable[..., SkillResult]:
-    """Runs one skill: `executive.testing.run_skill.run_skill`."""
+    """The function `executive.testing.run_skill.run_skill`, which runs one skill."""
     from executive.testing.run_skill import run_skill
 
     return run_skill
@@ -34,7 +34,7 @@ def run_skill() -> Callable[..., SkillResult]:
 
 @pytest.fixture
 def run_mission() -> Callable[..., MissionResult]:
-    """Runs a whole mission: `executive.testing.run_mission.run_mission`."""
+    """The function `executive.testing.run_mission.run_mission`, which runs a whole mission."""
     from executive.testing.run_mission import run_mission
 
     return run_mission

@@ -1,4 +1,4 @@
-"""Run a whole mission in a test, whatever goes wrong in it."""
+"""Execution of a whole mission in a test."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from executive.testing.faults.faulty_cell import FaultyCell, with_faults
 from executive.testing.faults.script import ScheduledFault
 from executive.tree.skill_leaf import SkillLeaf
 
-LONGEST = 600.0
-"""Time on its clock after which a mission that is not done counts as one that never ends [s]."""
+TIMEOUT = 600.0
+"""Time on the run's clock after which a mission counts as endless [s]."""
 
 
 @dataclass(frozen=True)
 class MissionResult(RunEnded):
-    """How a mission ended, and what is to be known of it.
+    """End and record of a mission.
 
     Attributes:
-        events: Everything the run told its observers, in order.
+        events: All events of the run, in order.
         items: Counts of the items by final state; see `Accounts.count_states`.
         accounts: The ledger, with the final state of each item.
-        audit: What really became of the objects, or None where nobody can know.
-        cell: The cell it ran in, closed; without what was wrapped around it.
+        audit: True final counts of the objects, or None if they are unknown.
+        cell: The innermost cell of the run, closed.
     """
 
     events: Sequence[TimedEvent]
@@ -47,23 +47,23 @@ class MissionResult(RunEnded):
 
     @property
     def agrees(self) -> bool:
-        """True if what the ledger believes is what the audit found."""
+        """True if the ledger and the audit agree, or there is no audit."""
         return self.audit is None or agrees(self.items, self.audit, self.empty)
 
-    def entered(self, pattern: str) -> list[str]:
-        """Return the path of every node that was activated and whose path fits a pattern, in order."""
-        started = (one.event.node for one in self.events if isinstance(one.event, NodeStarted))
+    def find_activations(self, pattern: str) -> list[str]:
+        """Return the path of each activated node whose path matches a pattern, in order."""
+        started = (timed.event.node for timed in self.events if isinstance(timed.event, NodeStarted))
         return [node for node in started if fnmatchcase(node, pattern)]
 
-    def reasons(self, pattern: str = "*") -> list[str]:
-        """Return the reason of every failure of a skill whose node fits a pattern, in order."""
-        ended = (one.event for one in self.events if isinstance(one.event, NodeEnded))
+    def find_reasons(self, pattern: str = "*") -> list[str]:
+        """Return the reason of each failure of a skill whose node's path matches a pattern, in order."""
+        ended = (timed.event for timed in self.events if isinstance(timed.event, NodeEnded))
         failures = (event for event in ended if event.skill and event.status == "FAILURE")
         return [event.reason for event in failures if fnmatchcase(event.node, pattern)]
 
-    def faults(self) -> list[FaultInjected]:
+    def find_faults(self) -> list[FaultInjected]:
         """Return the injected faults, in order."""
-        return [one.event for one in self.events if isinstance(one.event, FaultInjected)]
+        return [timed.event for timed in self.events if isinstance(timed.event, FaultInjected)]
 
 
 def run_mission(
@@ -77,32 +77,32 @@ def run_mission(
     faults: Sequence[ScheduledFault] = (),
     arrange: Callable[[Any], object] | None = None,
     observers: Sequence[Observer] = (),
-    longest: float = LONGEST,
+    timeout: float = TIMEOUT,
 ) -> MissionResult:
-    """Run a mission to its end and return how it went; the cell is closed.
+    """Run a mission to its end, close the cell and return the result.
 
     Args:
         mission: A mission file, or the name of a shipped mission.
-        kind: Makes the work cell, whatever kind the mission's cell file names.
-        seed: Decides everything random.
-        set: Other values for params by name, and for the cell as `cell.<key>.<key>`.
-        requests: What the operator asks for, in turn.
-        substitutes: What runs instead of a node's skill, by a pattern of the node's path.
-        faults: What happens to the cell, and when.
-        arrange: Gets the cell before the run, to put things on its table.
-        observers: Told of every event.
-        longest: Time on the run's clock after which the run ends as a fault [s].
+        kind: Makes the work cell, instead of the kind in the mission's cell file.
+        seed: Random seed.
+        set: Values of params by name, and of keys of the cell file as `cell.<key>.<key>`.
+        requests: Requests of the operator, in order.
+        substitutes: Skills that replace those of nodes, by a pattern of the node's path.
+        faults: Faults of the cell, and their times.
+        arrange: Called with the cell before the run, to put objects on its table.
+        observers: Called with each event.
+        timeout: Time on the run's clock after which the run ends as a fault [s].
 
     Raises:
-        MissionError: Something is wrong with the mission.
-        InputError: There is no such mission, or a pattern fits no node, or one with another skill than its
-            substitute's.
+        MissionError: The mission is wrong.
+        InputError: The mission does not exist, or a pattern matches no node, or a node with another skill
+            than that of the substitute.
     """
     skills = discover()
     loaded = load_mission(mission, skills, set)
     events: list[TimedEvent] = []
 
-    def arranged(*args: Any, **options: Any) -> Workcell:
+    def make_arranged_cell(*args: Any, **options: Any) -> Workcell:
         workcell = kind(*args, **options)
         try:
             if arrange is not None:
@@ -112,14 +112,14 @@ def run_mission(
             raise
         return workcell
 
-    make_cell = with_faults(arranged, faults, longest=longest)
+    make_cell = with_faults(make_arranged_cell, faults, timeout=timeout)
     options = RunOptions(seed, requests, kind=make_cell, substitutes=substitutes or {})
     run = assemble(loaded, skills, options, [events.append, *observers])
     workcell = run.workcell
     assert isinstance(workcell, FaultyCell)
     try:
         workcell.require_nodes([getattr(node, "path", node.name) for node in run.root.iterate()])
-        _require_fitting_substitutes(run, skills)
+        _require_matching_substitutes(run, skills)
         run.observe(workcell.hear)
         outcome = run.execute()
         return MissionResult(
@@ -134,11 +134,11 @@ def run_mission(
         run.close()
 
 
-def _require_fitting_substitutes(run: Run, skills: Mapping[str, type[Skill]]) -> None:
-    """Return if every node runs its own skill, or a subclass of that."""
+def _require_matching_substitutes(run: Run, skills: Mapping[str, type[Skill]]) -> None:
+    """Return if each node runs its own skill or a subclass of it."""
     for node in run.root.iterate():
         if isinstance(node, SkillLeaf) and not issubclass(node.skill_type, skills[node.skill_name]):
             raise InputError(
-                f"{node.path} runs {node.skill_name}, and {node.skill_type.__name__} is none; "
-                "give its substitute a pattern that fits nodes of its own skill only"
+                f"{node.path} runs {node.skill_name}, and {node.skill_type.__name__} is not a subclass; "
+                "give the substitute a pattern that matches only nodes of its own skill"
             )

@@ -1,4 +1,4 @@
-"""Run one skill by itself, without a tree."""
+"""Execution of one skill in a test, without a tree."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from executive.skill import Skill, SkillFailed
 from executive.tree.skill_run import SkillRun
 
 _ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
-_NOTED = COMMANDS | {
+_COMMANDS = COMMANDS | {
     "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.record_touch",
     "ledger.record_miss", "ledger.record_grasp", "ledger.record_drop", "ledger.record_placement",
     "ledger.record_put_down", "ledger.reject", "ledger.invalidate_positions",
@@ -29,17 +29,17 @@ _NOTED = COMMANDS | {
 
 @dataclass(frozen=True)
 class SkillResult:
-    """How a skill ended.
+    """End of a skill, and its commands.
 
     Attributes:
         status: `SUCCESS`, `FAILURE`, `HALTED`, or `RUNNING` if it was still running after `ticks`.
         reason: The declared reason of a failure, or "".
-        message: Its sentence, or "".
+        message: Message of the failure, or "".
         outputs: Values of the output ports, on success.
-        ticks: Control steps it took.
-        commanded: What it commanded of the cell, in order and in words (`written_down`).
-        braking: Control steps from a halt until the arm was at rest; None if it still moved after
-            `MAX_BRAKING_TIME`.
+        ticks: Number of control steps.
+        commanded: Commands to the cell, in order, as texts (`note_commands`).
+        braking: Number of control steps from a halt until the arm was at rest; None if the arm still moved
+            after `MAX_BRAKING_TIME`.
     """
 
     status: str
@@ -61,27 +61,29 @@ def run_skill(
 ) -> SkillResult:
     """Tick a skill on `workcell` until it ends, is halted at tick `halt_at`, or `ticks` have passed.
 
-    After a halt the arm is given time to come to rest. Exceptions that are no declared failure come out as
-    they are: in a mission they would be faults.
+    After a halt the function waits until the arm is at rest. An exception that is no declared failure is
+    raised unchanged; in a mission it would be a fault.
 
     Args:
         skill: The skill, or its class.
-        workcell: Where it runs.
-        inputs: Params and inputs of the class by name, for those without a default.
-        ticks: Control steps after which nobody waits any longer.
-        halt_at: Control step before which the skill is taken away; None: it is left to its end.
+        workcell: Cell in which the skill runs.
+        inputs: Params and inputs of the class by name, at least those without a default.
+        ticks: Maximum number of control steps.
+        halt_at: Control step before which the skill is halted; None: no halt.
 
     Raises:
         InputError: An input is missing or unknown.
-        Fault: The skill broke its own declarations: it succeeded without setting an output, failed with a
-            reason that it does not declare, yielded something, or raised while it was halted.
+        Fault: The skill violated its declarations: it succeeded without setting an output, failed with an
+            undeclared reason, yielded a value, or raised an exception while it was halted.
     """
     commanded: list[str] = []
-    run = SkillRun(_instance(skill, inputs), written_down(workcell.cell, commanded))
+    run = SkillRun(_instantiate(skill, inputs), note_commands(workcell.cell, commanded))
     for tick in range(ticks):
         if tick == halt_at:
             run.halt()
-            return SkillResult("HALTED", ticks=tick, commanded=commanded, braking=_braking(workcell))
+            return SkillResult(
+                "HALTED", ticks=tick, commanded=commanded, braking=_count_braking_steps(workcell)
+            )
         try:
             has_succeeded = run.step()
         except SkillFailed as failure:
@@ -92,7 +94,7 @@ def run_skill(
     return SkillResult("RUNNING", ticks=ticks, commanded=commanded)
 
 
-def _instance(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -> Skill:
+def _instantiate(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -> Skill:
     if isinstance(skill, type):
         return skill(**(inputs or {}))
     if inputs is not None:
@@ -101,8 +103,8 @@ def _instance(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -> S
     return skill
 
 
-def _braking(workcell: Workcell) -> int | None:
-    """Let the arm come to rest and return after how many control steps it was."""
+def _count_braking_steps(workcell: Workcell) -> int | None:
+    """Wait until the arm is at rest; return the number of control steps, or None at `MAX_BRAKING_TIME`."""
     arm, clock = workcell.cell.arm, workcell.cell.clock
     steps, deadline = 0, clock.now + MAX_BRAKING_TIME
     while not arm.at_rest:
@@ -113,35 +115,34 @@ def _braking(workcell: Workcell) -> int | None:
     return steps
 
 
-def written_down(cell: Cell, commands: list[str]) -> Cell:
-    """Return the cell with every command to one of its parts noted in `commands`, in order.
+def note_commands(cell: Cell, commands: list[str]) -> Cell:
+    """Return a cell that appends the text of each command to its parts to `commands`.
 
-    A command is its part, its name and those of its arguments that have a short text: `arm.plan home`,
+    A text is the part, the method and the arguments with a short text: `arm.plan home`,
     `arm.plan (0.5, 0.0, 0.035)`, `tool.close`, `embedded.request table`, `ledger.reject cube-1`.
-    Questions are no commands.
     """
 
     def note(command: str, *arguments: Any) -> None:
         commands.append(" ".join([command, *filter(None, map(short_text, arguments))]))
 
-    def ask(access: Access) -> Any:
-        if access.name in _NOTED:
+    def note_access(access: Access) -> Any:
+        if access.name in _COMMANDS:
             note(f"{access.detector or access.role}.{access.member}", *access.all_arguments)
         return access.proceed()
 
-    def decided(target: Target, bin: str) -> None:
+    def note_decision(target: Target, bin: str) -> None:
         note("decided", target, bin)
         cell.decided(target, bin)
 
-    return replace(intercept(cell, ask, _ROLES), decided=decided)
+    return replace(intercept(cell, note_access, _ROLES), decided=note_decision)
 
 
 def short_text(argument: object) -> str:
-    """Return the short text of an argument of a command, or "" for one that has none."""
+    """Return the short text of an argument of a command, or ""."""
     if isinstance(argument, str):
         return argument
     if isinstance(argument, Goal):
-        # Adding 0.0 makes a negative zero a plain one.
+        # Adding 0.0 turns -0.0 into 0.0.
         return str(tuple(round(float(value), 4) + 0.0 for value in argument.position))
     if isinstance(argument, Target):
         return argument.item

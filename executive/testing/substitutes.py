@@ -1,8 +1,8 @@
-"""Skills that run instead of a node's own and go wrong on purpose.
+"""Substitutes of skills, which fail, succeed, raise an error or never end as a test requires.
 
-Each function returns a subclass of the skill it is given, with its ports, params and reasons, for
-`run_mission(substitutes={"*/Grasp": failing(Grasp, "missed", times=2)})`. What it counts it counts over
-all nodes and runs that it stands in for: make a new one for every run.
+Each function returns a subclass of the given skill, with its ports, params and reasons, for
+`run_mission(substitutes={"*/Grasp": make_failing(Grasp, "missed", times=2)})`. A substitute counts its starts
+over all nodes and runs: make a new one for each run.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from executive.cell.protocols import Cell, Steps
 from executive.errors import InputError
 from executive.skill import Direction, Skill
 
-Body = Callable[[Skill, Cell], Steps | None]
-"""The `run` of a skill."""
+RunMethod = Callable[[Skill, Cell], Steps | None]
+"""The method `run` of a skill."""
 
 
-def failing(
+def make_failing(
     skill: type[Skill], reason: str, *, times: int | None = None, message: str = "as the test wants it"
 ) -> type[Skill]:
-    """Return the skill that fails the first so many `times` it is started, and then does its work.
+    """Return a skill that fails in its first `times` starts, and then does its work.
 
-    With None for `times` it always fails.
+    With None for `times` the skill always fails.
 
     Raises:
         InputError: The skill does not declare this reason.
@@ -35,102 +35,108 @@ def failing(
             f'{skill.__name__} cannot fail with "{reason}"; it declares: {", ".join(skill.reasons) or "none"}'
         )
 
-    def body(self: Skill, cell: Cell) -> Steps:
+    def run(self: Skill, cell: Cell) -> Steps:
         del cell
         yield from ()
         raise self.failed(reason, message)
 
-    return in_place_of(skill, "Failing", body, _first(times))
+    return make_substitute(skill, "Failing", run, _first_starts(times))
 
 
-def succeeding(
+def make_succeeding(
     skill: type[Skill], outputs: Mapping[str, Any] | None = None, *, after: int = 0
 ) -> type[Skill]:
-    """Return the skill that does nothing, and succeeds with these outputs `after` so many control steps.
+    """Return a skill that does nothing for `after` control steps, and succeeds with these outputs.
 
     Raises:
-        InputError: The skill lacks one of these outputs, or has one more.
+        InputError: The names of the outputs are not those of the skill.
     """
-    given = dict(outputs or {})
+    values = dict(outputs or {})
     declared = [name for name, port in skill.ports.items() if port.direction is Direction.OUT]
-    if set(given) != set(declared):
+    if set(values) != set(declared):
         raise InputError(
             f"{skill.__name__} has the outputs {', '.join(declared) or 'none'}, "
-            f"and was given {', '.join(given) or 'none'}"
+            f"and was given {', '.join(values) or 'none'}"
         )
 
-    def body(self: Skill, cell: Cell) -> Steps:
+    def run(self: Skill, cell: Cell) -> Steps:
         del cell
         for _ in range(after):
             yield
-        for name, value in given.items():
+        for name, value in values.items():
             setattr(self, name, value)
 
-    return in_place_of(skill, "Succeeding", body)
+    return make_substitute(skill, "Succeeding", run)
 
 
-def raising(skill: type[Skill], error: Exception, *, after: int = 0, times: int | None = None) -> type[Skill]:
-    """Return the skill with a bug: `error` comes up in it `after` so many control steps, if it runs so long.
+def make_raising(
+    skill: type[Skill], error: Exception, *, after: int = 0, times: int | None = None
+) -> type[Skill]:
+    """Return a skill that raises `error` after `after` control steps, if it still runs then.
 
-    What the skill does before that, and in its `finally`, it does.
+    Before the error the skill does its work, and its `finally` blocks are executed.
     """
 
-    def body(self: Skill, cell: Cell) -> Steps:
-        ran = 0
-        with closing(_steps(skill, self, cell)) as steps:
+    def run(self: Skill, cell: Cell) -> Steps:
+        steps_done = 0
+        with closing(_run_original(skill, self, cell)) as steps:
             for _ in islice(steps, after):
                 yield
-                ran += 1
-            if ran == after:
+                steps_done += 1
+            if steps_done == after:
                 raise error
 
-    return in_place_of(skill, "Raising", body, _first(times))
+    return make_substitute(skill, "Raising", run, _first_starts(times))
 
 
-def raising_when_halted(skill: type[Skill], error: Exception) -> type[Skill]:
-    """Return the skill with a bug in its `finally`: `error` comes up when it is taken away."""
+def make_raising_when_halted(skill: type[Skill], error: Exception) -> type[Skill]:
+    """Return a skill that raises `error` when it is halted, like a bug in its `finally`."""
 
-    def body(self: Skill, cell: Cell) -> Steps:
+    def run(self: Skill, cell: Cell) -> Steps:
         try:
-            yield from _steps(skill, self, cell)
+            yield from _run_original(skill, self, cell)
         except GeneratorExit:
             raise error from None
 
-    return in_place_of(skill, "RaisingWhenHalted", body)
+    return make_substitute(skill, "RaisingWhenHalted", run)
 
 
-def endless(skill: type[Skill]) -> type[Skill]:
-    """Return the skill that does nothing and never ends."""
+def make_endless(skill: type[Skill]) -> type[Skill]:
+    """Return a skill that does nothing and never ends."""
 
-    def body(self: Skill, cell: Cell) -> Steps:
+    def run(self: Skill, cell: Cell) -> Steps:
         del self, cell
         while True:
             yield
 
-    return in_place_of(skill, "Endless", body)
+    return make_substitute(skill, "Endless", run)
 
 
-def in_place_of(
-    skill: type[Skill], what: str, body: Body, starts: Container[int] | None = None
+def make_substitute(
+    skill: type[Skill], prefix: str, run: RunMethod, starts: Container[int] | None = None
 ) -> type[Skill]:
-    """Return a subclass that runs `body` in these of its starts, counted from 1, else what `skill` runs.
+    """Return a subclass of a skill with another `run`.
 
-    With None for `starts` it always runs `body`.
+    Args:
+        skill: The skill.
+        prefix: Prefix of the name of the subclass.
+        run: The other `run`.
+        starts: Numbers of the starts, from 1, in which the other `run` is used; None: all starts.
     """
-    number = count(1)
+    numbers = count(1)
 
-    def run(self: Skill, cell: Cell) -> Steps | None:
-        goes_wrong = starts is None or next(number) in starts
-        return body(self, cell) if goes_wrong else _steps(skill, self, cell)
+    def choose_run(self: Skill, cell: Cell) -> Steps | None:
+        is_replaced = starts is None or next(numbers) in starts
+        return run(self, cell) if is_replaced else _run_original(skill, self, cell)
 
-    members = {"run": run, "__doc__": skill.__doc__, "__module__": skill.__module__}
-    return cast(type[Skill], type(f"{what}{skill.__name__}", (skill,), members))
+    members = {"run": choose_run, "__doc__": skill.__doc__, "__module__": skill.__module__}
+    return cast(type[Skill], type(f"{prefix}{skill.__name__}", (skill,), members))
 
 
-def _first(times: int | None) -> Container[int] | None:
+def _first_starts(times: int | None) -> Container[int] | None:
     return None if times is None else range(1, times + 1)
 
 
-def _steps(skill: type[Skill], instance: Skill, cell: Cell) -> Generator[None, None, None]:
-    """Yield at every step of what `skill` runs."""
+def _run_original(skill: type[Skill], instance: Skill, cell: Cell) -> Generator[None, None, None]:
+    """Run `instance` as `skill` does; also a `run` that is no generator becomes one."""
     yield from skill.run(instance, cell) or ()

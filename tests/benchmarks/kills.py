@@ -33,7 +33,7 @@ from executive.record.resumed_run import resume_run
 from executive.record.run_directory import LATEST, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
-from executive.testing.faults.hand import Hand, Thing
+from executive.testing.faults.world_access import TrueObject, WorldAccess
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command, show_progress
 from tests.meanwhile import meanwhile
@@ -141,21 +141,21 @@ def change_world(subject: Subject, seed: int, path: Path, past: InputLog, change
     distance = 2 * max(kind.radius for kind in config.objects.values())
     done: list[str] = []
 
-    def act(hand: Hand) -> None:
-        held = hand.held
-        unheld_objects = [thing for thing in hand.things if held is None or thing.body != held.body]
+    def act(world: WorldAccess) -> None:
+        held = world.held
+        unheld_objects = [thing for thing in world.objects if held is None or thing.body != held.body]
         on_table = [thing for thing in unheld_objects if is_on_table(thing.position[:2], config.table)]
         if change == "dropped" and held is not None:
-            hand.part()
+            world.break_seal()
             done.append(f"dropped {held.label}")
         elif on_table:
             thing = on_table[int(random.integers(len(on_table)))]
             shifts = find_free_shifts(thing, unheld_objects, distance, config.table)
             if change == "removed" or not shifts:
-                hand.remove(thing)
+                world.remove(thing)
                 done.append(f"removed {thing.label}")
             else:
-                hand.move(thing, tuple(random.choice(shifts)))
+                world.move(thing, tuple(random.choice(shifts)))
                 done.append(f"moved {thing.label}")
 
     assert past.start is not None
@@ -165,7 +165,7 @@ def change_world(subject: Subject, seed: int, path: Path, past: InputLog, change
 
 
 def find_free_shifts(
-    moved_object: Thing, unheld_objects: Sequence[Thing], distance: float, table: TableConfig
+    moved_object: TrueObject, unheld_objects: Sequence[TrueObject], distance: float, table: TableConfig
 ) -> Sequence[Array]:
     """Return the shifts `(2,)` [m] of an object to positions with no object within `distance` [m]."""
     others = [other.position[:2] for other in unheld_objects if other.body != moved_object.body]

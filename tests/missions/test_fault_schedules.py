@@ -12,7 +12,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.plugins import cell_kind
 from executive.testing.faults import ScheduledFault, after, during, object_bumped, with_probability
 from executive.testing.faults.detector import faulty_detector
-from executive.testing.faults.effect import Effect, Occasion
+from executive.testing.faults.effect import Effect, Occurrence
 from executive.testing.run_mission import MissionResult, run_mission
 
 X_RANGE, Y_RANGE = (0.42, 0.64), (-0.22, 0.22)
@@ -21,33 +21,33 @@ SWAPPED = {"cube": "sphere", "sphere": "cube", "duck": "duck"}
 SEEDS = range(171000, 171006)
 
 
-def exchange_objects(now: Occasion) -> bool:
+def exchange_objects(occurrence: Occurrence) -> bool:
     """Swap the target object with one of another class, once."""
-    hand = now.scene.hand
-    if (first := now.scene.find("node", now.item)) is None:
+    world = occurrence.scene.world
+    if (first := occurrence.scene.find("node", occurrence.item)) is None:
         return False
     others = [
         thing
-        for thing in hand.things
+        for thing in world.objects
         if thing.label != first.label
-        and not any(b.contains(thing.position) for b in now.scene.cell.bins.values())
+        and not any(b.contains(thing.position) for b in occurrence.scene.cell.bins.values())
     ]
     if not others:
         return False
     x, y = (others[0].position - first.position)[:2]
-    hand.move(first, (float(x), float(y)))
-    hand.move(others[0], (-float(x), -float(y)))
-    now.record(first)
+    world.move(first, (float(x), float(y)))
+    world.move(others[0], (-float(x), -float(y)))
+    occurrence.record(first)
     return True
 
 
-def empty_bin(now: Occasion) -> bool:
+def empty_bin(occurrence: Occurrence) -> bool:
     """Take all objects out of the first bin that holds some, once."""
-    for bin in now.scene.cell.bins.values():
-        inside = [thing for thing in now.scene.hand.things if bin.contains(thing.position)]
+    for bin in occurrence.scene.cell.bins.values():
+        inside = [thing for thing in occurrence.scene.world.objects if bin.contains(thing.position)]
         for thing in inside:
-            now.record(thing)
-            now.scene.hand.remove(thing)
+            occurrence.record(thing)
+            occurrence.scene.world.remove(thing)
         if inside:
             return True
     return False

@@ -26,9 +26,9 @@ from executive.record.result import Result
 from executive.record.resumed_run import resume_run
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
-from executive.testing.faults.hand import Hand
+from executive.testing.faults.world_access import WorldAccess
 from executive.testing.oracle import oracle_cell
-from executive.testing.substitutes import raising
+from executive.testing.substitutes import make_raising
 from tests.meanwhile import meanwhile
 
 SEED = 3
@@ -176,9 +176,9 @@ def moment(path: Path, skill: str) -> int:
 def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path, skill: str) -> None:
     fell: list[str] = []
 
-    def act(hand: Hand) -> None:
-        fell.append(hand.held.label)
-        hand.part()
+    def act(world: WorldAccess) -> None:
+        fell.append(world.held.label)
+        world.break_seal()
 
     loaded = load(missions, "sort_overhead")
     path = cut_off(loaded, tmp_path, moment(Path(run_of(loaded, tmp_path).run), skill))
@@ -213,7 +213,7 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["Detect", "Grasp"])
 def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(missions: Path, tmp_path: Path, name) -> None:
     skills = discover()
-    buggy = {**skills, name: raising(skills[name], ZeroDivisionError("a bug"), after=3)}
+    buggy = {**skills, name: make_raising(skills[name], ZeroDivisionError("a bug"), after=3)}
     first = run_of(load(missions, "sort_overhead"), tmp_path, skills=buggy)
     assert (first.status, "a bug" in first.message) == ("FAULT", True)
     run = Path(first.run)

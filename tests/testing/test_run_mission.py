@@ -16,7 +16,7 @@ from executive.plugins import discover
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults import FaultyCell, after, detector_dead, during, seal_fails
 from executive.testing.run_mission import run_mission
-from executive.testing.substitutes import endless
+from executive.testing.substitutes import make_endless
 from skills.detect import Detect
 from skills.wait import Wait
 
@@ -45,7 +45,7 @@ def test_a_shipped_mission_runs_by_its_name_on_the_fake_cell() -> None:
     assert result.items["placed"] == len(result.cell.world.objects) >= 3
     assert (type(result.events[0].event), type(result.events[-1].event)) == (RunStarted, RunEnded)
     assert result.robot_time == result.events[-1].clock > 5.0
-    assert (result.agrees, result.faults()) == (True, [])
+    assert (result.agrees, result.find_faults()) == (True, [])
 
 
 def test_a_mission_file_runs_with_other_values(look: Path) -> None:
@@ -66,15 +66,15 @@ def test_the_cell_is_arranged_before_the_run(look: Path) -> None:
 
 def test_what_was_entered_and_what_failed_is_told_in_order() -> None:
     result = run_mission("sort_overhead", faults=[during("*/Grasp", seal_fails(), nth=1)])
-    assert len(result.entered("*/Grasp")) == result.items["placed"] + 1
-    assert (result.entered("tree/look*")[0], result.reasons()[0]) == ("tree/look/try", "missed")
-    assert (result.reasons("*/Grasp"), result.reasons("*/Approach")) == (["missed"], [])
+    assert len(result.find_activations("*/Grasp")) == result.items["placed"] + 1
+    assert (result.find_activations("tree/look*")[0], result.find_reasons()[0]) == ("tree/look/try", "missed")
+    assert (result.find_reasons("*/Grasp"), result.find_reasons("*/Approach")) == (["missed"], [])
 
 
 def test_a_failure_that_only_passes_through_a_control_node_is_none_of_its_own(look: Path) -> None:
     result = run_mission(look, faults=[after(0.0, detector_dead())])
     assert (result.status, result.reason) == ("FAILURE", "Detect.unavailable")
-    assert result.reasons() == ["unavailable"]
+    assert result.find_reasons() == ["unavailable"]
 
 
 def test_without_disturbances_a_mission_goes_as_it_always_goes() -> None:
@@ -89,14 +89,14 @@ def test_without_disturbances_a_mission_goes_as_it_always_goes() -> None:
 
 
 def test_a_mission_that_never_ends_ends_as_a_fault(look: Path) -> None:
-    result = run_mission(look, substitutes={"*Detect": endless(Detect)}, longest=3.0)
+    result = run_mission(look, substitutes={"*Detect": make_endless(Detect)}, timeout=3.0)
     assert (result.status, result.message) == ("FAULT", "the mission is not done after 3 s on its clock")
     assert result.robot_time == pytest.approx(3.0, abs=0.01)
     assert result.cell.arm.at_rest
 
 
 def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() -> None:
-    cell = FaultyCell(FakeCell(), [], longest=0.01)
+    cell = FaultyCell(FakeCell(), [], timeout=0.01)
     cell.advance()
     cell.advance()
     with pytest.raises(Fault, match=r"the mission is not done after 0\.01 s on its clock"):
@@ -106,13 +106,13 @@ def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() 
 
 
 def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:
-    sentence = 'seal_fails waits for a node that is called "*/Grasp"; there are: tree/Wait, tree/Detect, '
+    sentence = 'no path of a node matches "*/Grasp", the pattern of seal_fails; the paths are: tree/Wait, '
     with pytest.raises(InputError, match=sentence.replace("*", r"\*")):
         run_mission(look, faults=[during("*/Grasp", seal_fails())])
     with pytest.raises(InputError, match='no node is called "Wait"; there are: tree/Wait, tree/Detect'):
-        run_mission(look, substitutes={"Wait": endless(Wait)})
-    with pytest.raises(InputError, match="tree/Detect runs Detect, and EndlessWait is none; give its subst"):
-        run_mission(look, substitutes={"tree/*": endless(Wait)})
+        run_mission(look, substitutes={"Wait": make_endless(Wait)})
+    with pytest.raises(InputError, match="tree/Detect runs Detect, and EndlessWait is not a subclass; give"):
+        run_mission(look, substitutes={"tree/*": make_endless(Wait)})
 
 
 def test_the_cell_is_closed_whatever_happens(look: Path) -> None:

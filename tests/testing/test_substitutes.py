@@ -10,18 +10,24 @@ from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.testing.run_skill import run_skill
-from executive.testing.substitutes import endless, failing, raising, raising_when_halted, succeeding
+from executive.testing.substitutes import (
+    make_endless,
+    make_failing,
+    make_raising,
+    make_raising_when_halted,
+    make_succeeding,
+)
 from skills.approach import Approach
 from skills.grasp import Grasp
 from skills.release import Release
 from skills.wait import Wait
 
 SUBSTITUTES = {
-    "FailingGrasp": failing(Grasp, "missed"),
-    "SucceedingGrasp": succeeding(Grasp, {"held": "cube-1"}),
-    "RaisingGrasp": raising(Grasp, ValueError("a bug")),
-    "RaisingWhenHaltedGrasp": raising_when_halted(Grasp, ValueError("a bug")),
-    "EndlessGrasp": endless(Grasp),
+    "FailingGrasp": make_failing(Grasp, "missed"),
+    "SucceedingGrasp": make_succeeding(Grasp, {"held": "cube-1"}),
+    "RaisingGrasp": make_raising(Grasp, ValueError("a bug")),
+    "RaisingWhenHaltedGrasp": make_raising_when_halted(Grasp, ValueError("a bug")),
+    "EndlessGrasp": make_endless(Grasp),
 }
 
 
@@ -36,7 +42,7 @@ def test_a_substitute_is_declared_as_the_skill_is_and_named_after_it(name: str) 
 
 def test_it_fails_the_first_times_and_then_does_its_work(fake: FakeCell, target: Target) -> None:
     run_skill(Approach, fake, inputs={"target": target})
-    slippery = failing(Grasp, "missed", times=2, message="it slips")
+    slippery = make_failing(Grasp, "missed", times=2, message="it slips")
     results = [run_skill(slippery, fake, inputs={"target": target}) for _ in range(3)]
     assert [result.reason for result in results] == ["missed", "missed", ""]
     assert (results[0].message, results[0].commanded) == ("it slips", [])
@@ -44,7 +50,7 @@ def test_it_fails_the_first_times_and_then_does_its_work(fake: FakeCell, target:
 
 
 def test_it_succeeds_with_what_it_was_given_when_it_was_told_to(fake: FakeCell) -> None:
-    quick = succeeding(Release, {"placed": "cube-7"}, after=12)
+    quick = make_succeeding(Release, {"placed": "cube-7"}, after=12)
     result = run_skill(quick, fake, inputs={"held": "cube-7", "bin": "red_bin"})
     assert (result.status, result.outputs, result.ticks) == ("SUCCESS", {"placed": "cube-7"}, 12)
     assert result.commanded == []
@@ -53,9 +59,9 @@ def test_it_succeeds_with_what_it_was_given_when_it_was_told_to(fake: FakeCell) 
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: failing(Grasp, "dropped"), 'Grasp cannot fail with "dropped"; it declares: missed'),
-        (lambda: succeeding(Grasp), "Grasp has the outputs held, and was given none"),
-        (lambda: succeeding(Grasp, {"held": "", "bin": ""}), "outputs held, and was given held, bin"),
+        (lambda: make_failing(Grasp, "dropped"), 'Grasp cannot fail with "dropped"; it declares: missed'),
+        (lambda: make_succeeding(Grasp), "Grasp has the outputs held, and was given none"),
+        (lambda: make_succeeding(Grasp, {"held": "", "bin": ""}), "outputs held, and was given held, bin"),
     ],
 )
 def test_what_the_skill_does_not_declare_is_refused(make: Callable[[], object], sentence: str) -> None:
@@ -64,7 +70,7 @@ def test_what_the_skill_does_not_declare_is_refused(make: Callable[[], object], 
 
 
 def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, target: Target) -> None:
-    broken = raising(Approach, ZeroDivisionError("in the model"), after=40)
+    broken = make_raising(Approach, ZeroDivisionError("in the model"), after=40)
     with pytest.raises(ZeroDivisionError, match="in the model"):
         run_skill(broken, fake, inputs={"target": target})
     assert fake.steps >= 40
@@ -72,14 +78,14 @@ def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, targ
 
 
 def test_a_bug_comes_up_in_time_and_as_often_as_it_was_told_to(fake: FakeCell) -> None:
-    late, once = (raising(Wait, ValueError("a bug"), **when) for when in ({"after": 1000}, {"times": 1}))
+    late, once = (make_raising(Wait, ValueError("a bug"), **when) for when in ({"after": 1000}, {"times": 1}))
     with pytest.raises(ValueError, match="a bug"):
         run_skill(once, fake, inputs={"seconds": 0.1})
     assert [run_skill(skill, fake, inputs={"seconds": 0.1}).ticks for skill in (late, once)] == [24, 24]
 
 
 def test_a_bug_in_finally_comes_up_in_a_halt_and_not_without_one(fake: FakeCell, target: Target) -> None:
-    broken = raising_when_halted(Approach, ValueError("in finally"))
+    broken = make_raising_when_halted(Approach, ValueError("in finally"))
     with pytest.raises(Fault, match="ValueError while it was halted: in finally"):
         run_skill(broken, fake, inputs={"target": target}, halt_at=40)
     assert fake.arm.commands == ["start", "stop"], "the skill's own finally ran before"
@@ -87,6 +93,6 @@ def test_a_bug_in_finally_comes_up_in_a_halt_and_not_without_one(fake: FakeCell,
 
 
 def test_it_never_ends_but_can_be_taken_away(fake: FakeCell) -> None:
-    waiting = endless(Wait)
+    waiting = make_endless(Wait)
     assert run_skill(waiting, fake, inputs={"seconds": 0.1}, ticks=500).status == "RUNNING"
     assert run_skill(waiting, fake, inputs={"seconds": 0.1}, halt_at=500).status == "HALTED"

@@ -10,7 +10,7 @@ from executive.cell.protocols import Cell, Steps
 from executive.manipulation.drops import record_drop
 from executive.skill import EMPTY, Skill
 from executive.testing.faults.script import ScheduledFault
-from executive.testing.substitutes import in_place_of, raising, raising_when_halted
+from executive.testing.substitutes import make_raising, make_raising_when_halted, make_substitute
 
 When = Literal["first", "middle", "late", "lasting"]
 """Time of a fault in a run: the first activation, the middle, near the end, or repeatedly."""
@@ -95,10 +95,10 @@ def broken_skills(
         if skill_fault.how == "fails":
             broken = _failing(skill, skill_fault.reason)
         elif skill_fault.how == "raises":
-            broken = raising(skill, error, after=skill_fault.after)
+            broken = make_raising(skill, error, after=skill_fault.after)
         else:
-            broken = raising_when_halted(skill, error)
-        found[skill_fault.node] = in_place_of(skill, "Broken", broken.run, skill_fault.starts or None)
+            broken = make_raising_when_halted(skill, error)
+        found[skill_fault.node] = make_substitute(skill, "Broken", broken.run, skill_fault.starts or None)
     return found
 
 
@@ -119,4 +119,4 @@ def _failing(skill: type[Skill], reason: str) -> type[Skill]:
                 record_drop(cell, item)
         raise self.failed(reason, INJECTED_FAILURE)
 
-    return in_place_of(skill, "Failing", body)
+    return make_substitute(skill, "Failing", body)

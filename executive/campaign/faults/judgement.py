@@ -15,7 +15,7 @@ from executive.events import FaultInjected, FrameSearched, ItemChanged, RunEnded
 from executive.ledger.accounts import is_balanced
 from executive.ledger.item import State
 from executive.mission.flow.endings import Ending
-from executive.testing.faults.hand import Thing
+from executive.testing.faults.world_access import TrueObject
 
 REACHES = frozenset({"object_removed", "object_moved", "seal_breaks"})
 """What a fault does to an object that may put it out of reach."""
@@ -58,7 +58,7 @@ def check_tree(root: Behaviour) -> Iterator[str]:
             yield f"{getattr(node, 'path', node.name)} is still running"
 
 
-def out_of_sight(things: Sequence[Thing], bins: Collection[Bin], events: Sequence[TimedEvent]) -> Hidden:
+def out_of_sight(things: Sequence[TrueObject], bins: Collection[Bin], events: Sequence[TimedEvent]) -> Hidden:
     """Return how many things lie where no look has shown a place since the tool last dropped anything."""
     changes = [(one.tick, one.event) for one in events if isinstance(one.event, ItemChanged)]
     dropped = [tick for tick, change in changes if change.state == State.DROPPED.value]
@@ -125,7 +125,7 @@ def check_losses(audit: Mapping[str, int] | None, events: Sequence[TimedEvent]) 
         yield f"{audit['elsewhere']} objects are out of reach, and the fault reached for {reached}"
 
 
-def _is_shown(thing: Thing, frame: Frame) -> bool:
+def _is_shown(thing: TrueObject, frame: Frame) -> bool:
     height, width = frame.visible.shape
     place = thing.position[None]
     return bool((frame.is_in_area(place, (0, 0, width, height), EDGE) & frame.is_unobstructed(place))[0])

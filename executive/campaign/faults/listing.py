@@ -204,7 +204,7 @@ def skill_nodes(subject: Subject) -> list[nodes.SkillNode]:
 
 
 def _other(about: str, what: str, when: When, cell_fault: ScheduledFault) -> PlannedFault:
-    start = getattr(cell_fault.when, "start", 0.0)
+    start = getattr(cell_fault.time, "start", 0.0)
     return PlannedFault(about, about, "", what, when, f"from {start:.2f} s on", cell_faults=(cell_fault,))
 
 

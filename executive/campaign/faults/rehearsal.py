@@ -30,8 +30,8 @@ class Rehearsal:
     activations: Mapping[str, tuple[int, ...]]
 
     @property
-    def longest(self) -> float:
-        """Time on its clock after which a run counts as one that never ends [s]."""
+    def timeout(self) -> float:
+        """Time on the run's clock after which a run counts as endless [s]."""
         return 60.0 + 10 * self.robot_time
 
 

@@ -80,7 +80,7 @@ class _Trying:
         self.options = RunOptions(
             subject.seed,
             subject.requests,
-            kind=with_faults(self._kind, cell_faults, longest=rehearsal.longest),
+            kind=with_faults(self._kind, cell_faults, timeout=rehearsal.timeout),
             substitutes=broken_skills(self._skill_faults, own),
         )
         self.run = assemble(subject.loaded, subject.skills, self.options, [self._see, self._activations])
@@ -149,11 +149,11 @@ class _Trying:
     def _hidden(self) -> judgement.Hidden:
         workcell = self.run.workcell
         assert isinstance(workcell, FaultyCell)
-        return judgement.out_of_sight(workcell.hand.things, workcell.cell.bins.values(), self._events)
+        return judgement.out_of_sight(workcell.world.objects, workcell.cell.bins.values(), self._events)
 
     def _happened(self, fault: PlannedFault) -> bool:
         """Return True if a fault was injected."""
-        names = {cell_fault.what.name for cell_fault in fault.cell_faults}
+        names = {cell_fault.effect.name for cell_fault in fault.cell_faults}
         if any(isinstance(one.event, FaultInjected) and one.event.name in names for one in self._events):
             return True
         return bool(fault.skill_faults) and self._raised(fault)

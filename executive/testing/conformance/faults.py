@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from executive.cells.fake.arm import FakeMotion
 from executive.skill import Skill
 from executive.testing import faults
-from executive.testing.faults.effect import Effect, Occasion
+from executive.testing.faults.effect import Effect, Occurrence
 
 SEAL_BREAKS = 20
 """Number of moments, spread over a run, at which the seal breaks."""
@@ -49,9 +49,9 @@ def faults_of(skill: type[Skill], ticks: int, *, holding: bool) -> Iterator[Name
             yield NamedFault(f"while the seal breaks at tick {tick}", faults.seal_breaks(None), tick=tick)
 
 
-def _move_arm(now: Occasion) -> bool:
+def _move_arm(occurrence: Occurrence) -> bool:
     """Start a motion, as if another skill had used the arm before."""
-    arm = now.scene.cell.arm
+    arm = occurrence.scene.cell.arm
     arm.start(FakeMotion([arm.tool_pose] * BRAKING_STEPS))
     return True
 

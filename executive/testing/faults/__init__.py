@@ -1,11 +1,12 @@
-"""Fault scripts: faults of a cell in which a mission or a skill runs, and when they happen.
+"""Fault scripts: faults of the cell of a mission or a skill, and their times.
 
 A script is a list of faults, for `run_mission(faults=[...])`:
 
-* the second grasp slips: `during("*/Grasp", seal_fails(), nth=2)`
-* no answer from 4 s to 9 s: `between(4.0, 9.0, detector_hangs())`
-* at 12 s somebody takes an object away: `after(12.0, object_removed("nearest"))`
-* now and then something falls: `with_probability(0.1, "*/Transit", seal_breaks(), seed=1)`
+* The second grasp fails: `during("*/Grasp", seal_fails(), nth=2)`
+* The detector hangs from 4 s to 9 s: `between(4.0, 9.0, detector_hangs())`
+* An object is removed at 12 s: `after(12.0, object_removed("nearest"))`
+* Each transit drops its object with probability 0.1:
+  `with_probability(0.1, "*/Transit", seal_breaks(), seed=1)`
 """
 
 from executive.testing.faults.detector import (

@@ -1,6 +1,6 @@
 """Faults of detectors: dead, hanging, slow, blind, or unsure of everything.
 
-A fault affects every request that is made while it lasts; earlier requests are answered as usual.
+A fault affects each request that is made while the fault lasts; earlier requests are answered as usual.
 """
 
 from __future__ import annotations
@@ -12,81 +12,80 @@ from dataclasses import dataclass, replace
 from executive.cell.detection import Answer
 from executive.cell.protocols import Request
 from executive.errors import InputError, Unavailable
-from executive.testing.faults.effect import Effect, Occasion
+from executive.testing.faults.effect import TIME_TOLERANCE, Effect, Occurrence
 
-DOUBT = 0.9
-"""Highest confidence of a detector that is unsure, as a share of its threshold."""
-TIME_TOLERANCE = 1e-9
-"""Rounding allowed when two times on the clock are compared [s]."""
+MAX_UNSURE_SHARE = 0.9
+"""Highest confidence of an unsure detector, as a share of its threshold."""
 
-
-Change = Callable[[Answer], Answer]
-"""Returns an answer instead of the true one; raises Unavailable for none."""
+AnswerChange = Callable[[Answer], Answer]
+"""Returns a changed answer, or raises Unavailable."""
 
 
-def refuse(answer: Answer) -> Answer:
+def _refuse(answer: Answer) -> Answer:
     """Raise Unavailable."""
     raise Unavailable(f"detector {answer.detector}: the detector is dead, as the test wants it")
 
 
-def doubt(answer: Answer) -> Answer:
+def _reduce_confidence(answer: Answer) -> Answer:
     """Return an answer whose confidences are below the threshold."""
-    most = DOUBT * answer.error_rates.threshold
-    seen = sorted((*answer.found, *answer.doubtful), key=lambda one: -one.confidence)
-    doubtful = tuple(replace(one, confidence=min(one.confidence, most)) for one in seen)
+    limit = MAX_UNSURE_SHARE * answer.error_rates.threshold
+    detections = sorted((*answer.found, *answer.doubtful), key=lambda detection: -detection.confidence)
+    doubtful = tuple(
+        replace(detection, confidence=min(detection.confidence, limit)) for detection in detections
+    )
     return replace(answer, found=(), doubtful=doubtful, unknown=())
 
 
-def overlook(answer: Answer) -> Answer:
-    """Return an answer in which nothing was found."""
+def _remove_detections(answer: Answer) -> Answer:
+    """Return an answer without detections."""
     return replace(answer, found=(), doubtful=(), unknown=())
 
 
 def faulty_detector(
-    name: str, change: Change | None = None, delay: float = 0.0, until: float = 0.0
+    name: str, change: AnswerChange | None = None, delay: float = 0.0, until: float = 0.0
 ) -> Effect:
     """The detector answers late, wrongly, or not at all.
 
     Args:
         name: Name of the effect in the record.
-        change: Returns the answer instead of the true one; None: the true one.
-        delay: Time by which the answer is late [s].
-        until: Time on the clock before which nothing is answered while the effect lasts [s].
+        change: Changes the true answer; None: no change.
+        delay: Delay of the answer [s].
+        until: Time on the run's clock before which no request is answered while the effect lasts [s].
     """
     return Effect(name, answers={"request": _request}, arguments=(change, delay, until))
 
 
 def detector_dead() -> Effect:
     """Requests are not answered: `Detect` is `unavailable`."""
-    return faulty_detector("detector_dead", refuse)
+    return faulty_detector("detector_dead", _refuse)
 
 
 def detector_hangs(until: float = math.inf) -> Effect:
-    """Requests are answered only when this is over; while a node runs that waits for one, that is never.
+    """Requests are answered only after the fault, which is never if the node of the fault waits for them.
 
     Args:
-        until: Time on the run's clock at which they are answered in any case [s].
+        until: Time on the run's clock at which requests are answered in any case [s].
     """
     return faulty_detector("detector_hangs", until=until)
 
 
 def detector_given_up(deadline: float) -> Effect:
-    """Requests are not answered, and given up at their deadline: `Detect` is `unavailable`.
+    """Requests expire at their deadline without an answer: `Detect` is `unavailable`.
 
     Args:
-        deadline: Time by which that is later than an answer would be [s].
+        deadline: Time between the usual answer and the deadline [s].
     """
-    return faulty_detector("detector_hangs", refuse, delay=deadline)
+    return faulty_detector("detector_hangs", _refuse, delay=deadline)
 
 
 def detector_slow(by: float) -> Effect:
-    """Requests are answered later than they would be.
+    """Requests are answered with a delay.
 
     Args:
         by: The delay [s].
 
     Raises:
-        InputError: The answer would come sooner.
+        InputError: The delay is negative.
     """
     if by < 0:
         raise InputError(f"a slow detector answers later, not by {by:g} s")
@@ -94,43 +93,47 @@ def detector_slow(by: float) -> Effect:
 
 
 def detector_unsure() -> Effect:
-    """Everything is seen with less confidence than counts: `Detect` is `unsure`."""
-    return faulty_detector("detector_unsure", doubt)
+    """All detections have a confidence below the threshold: `Detect` is `unsure`."""
+    return faulty_detector("detector_unsure", _reduce_confidence)
 
 
 def detector_blind() -> Effect:
-    """Nothing is seen: `Detect` succeeds with an empty list."""
-    return faulty_detector("detector_blind", overlook)
+    """Nothing is detected: `Detect` succeeds with an empty list."""
+    return faulty_detector("detector_blind", _remove_detections)
 
 
 @dataclass
 class FaultyRequest:
     """A request to a faulty detector; implements `Request`."""
 
-    asked: Request
-    now: Occasion
-    change: Change | None
+    request: Request
+    occurrence: Occurrence
+    change: AnswerChange | None
     delay: float
     until: float
     _due: float = math.inf
 
     @property
     def ready(self) -> bool:
-        """True once the answer is due, its delay is over, and the detector does not hang any longer."""
-        time = self.now.scene.now
-        if math.isinf(self._due) and self.asked.ready:
+        """True if the delay of the answer is over and the detector does not hang."""
+        time = self.occurrence.scene.now
+        if math.isinf(self._due) and self.request.ready:
             self._due = time + self.delay
-        does_hang = not self.now.over and time < self.until - TIME_TOLERANCE
-        return time >= self._due - TIME_TOLERANCE and not does_hang
+        is_hanging = not self.occurrence.is_over and time < self.until - TIME_TOLERANCE
+        return time >= self._due - TIME_TOLERANCE and not is_hanging
 
     def result(self) -> Answer:
         """Return the changed answer, or raise Unavailable."""
-        answer = self.asked.result()
+        answer = self.request.result()
         return answer if self.change is None else self.change(answer)
 
 
 def _request(
-    proceed: Callable[[], Request], now: Occasion, change: Change | None, delay: float, until: float
+    proceed: Callable[[], Request],
+    occurrence: Occurrence,
+    change: AnswerChange | None,
+    delay: float,
+    until: float,
 ) -> Request:
-    now.record()
-    return FaultyRequest(proceed(), now, change, delay, until)
+    occurrence.record()
+    return FaultyRequest(proceed(), occurrence, change, delay, until)

@@ -14,13 +14,10 @@ from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.errors import Fault, InputError
 from executive.events import Emit, NodeEnded, NodeStarted, TimedEvent, ignore
-from executive.testing.faults.effect import Effect, Occasion
-from executive.testing.faults.hand import Hand, hand_of
-from executive.testing.faults.scene import FaultScene
+from executive.testing.faults.effect import TIME_TOLERANCE, FaultScene, Occurrence
 from executive.testing.faults.script import DuringNode, DuringTime, ScheduledFault
+from executive.testing.faults.world_access import WorldAccess, open_world
 
-TIME_TOLERANCE = 1e-9
-"""Rounding allowed when two times on the clock are compared [s]."""
 _ROLES = ("arm", "tool", "camera", "detector", "localizer", "operator")
 _ANSWERS = frozenset(
     {
@@ -34,15 +31,14 @@ _ANSWERS = frozenset(
 class FaultyCell(CellWrapper):
     """A work cell with injected faults; implements `Workcell`.
 
-    The cell must `hear` the events of its run, which tell it the running nodes. For each fault it emits a
-    `FaultInjected`.
+    The cell must `hear` the events of its run to know the running nodes. Each fault emits a `FaultInjected`.
 
     Args:
         inner: The cell without faults.
         faults: The faults and their times.
         emit: Emits events of the run.
-        hand: Returns the access to the world of a cell.
-        longest: Time on the run's clock after which the run ends as a fault [s].
+        open_world: Returns the access to the world of a cell.
+        timeout: Time on the run's clock after which the run ends as a fault [s].
     """
 
     def __init__(
@@ -50,16 +46,18 @@ class FaultyCell(CellWrapper):
         inner: Workcell,
         faults: Sequence[ScheduledFault],
         emit: Emit = ignore,
-        hand: Callable[[Workcell], Hand] = hand_of,
-        longest: float = math.inf,
+        open_world: Callable[[Workcell], WorldAccess] = open_world,
+        timeout: float = math.inf,
     ) -> None:
         super().__init__(inner)
-        self._scene = FaultScene(inner, hand, emit)
-        self._longest = longest
-        self._by_node = [(one.what, one.when) for one in faults if isinstance(one.when, DuringNode)]
-        self._to_come = [(one.what, one.when) for one in faults if isinstance(one.when, DuringTime)]
+        self._scene = FaultScene(inner, open_world, emit)
+        self._timeout = timeout
+        self._node_faults = [
+            (fault.effect, fault.time) for fault in faults if isinstance(fault.time, DuringNode)
+        ]
+        self._pending = [(fault.effect, fault.time) for fault in faults if isinstance(fault.time, DuringTime)]
         self._activations: Counter[int] = Counter()
-        self._occasions: list[Occasion] = []
+        self._occurrences: list[Occurrence] = []
         self._cell = intercept(inner.cell, self._answer, _ROLES)
 
     @property
@@ -68,75 +66,75 @@ class FaultyCell(CellWrapper):
         return self._cell
 
     @property
-    def hand(self) -> Hand:
+    def world(self) -> WorldAccess:
         """Access to the world of the cell."""
-        return self._scene.hand
+        return self._scene.world
 
     def hear(self, timed: TimedEvent) -> None:
-        """Begin and end the faults of a node: an observer of the run that drives this cell."""
+        """Begin and end the faults of a node; an observer of the run on this cell."""
         match timed.event:
             case NodeStarted(node, _, item):
-                for number, (effect, when) in enumerate(self._by_node):
-                    if when.fits(node):
-                        self._activations[number] += 1
-                        if when.chosen(self._activations[number]):
-                            self._begin(effect, node, item)
+                for index, (effect, time) in enumerate(self._node_faults):
+                    if time.matches(node):
+                        self._activations[index] += 1
+                        if time.includes(self._activations[index]):
+                            self._begin(Occurrence(effect, self._scene, node, item))
             case NodeEnded(node):
-                self._end(lambda occasion: occasion.node == node)
+                self._end(lambda occurrence: occurrence.node == node)
 
     def require_nodes(self, paths: Sequence[str]) -> None:
-        """Check that every fault of a node fits one of these `paths`.
+        """Check that the pattern of each fault matches one of these `paths`.
 
         Raises:
-            InputError: A fault fits no path.
+            InputError: A pattern matches no path.
         """
-        for effect, when in self._by_node:
-            if not any(map(when.fits, paths)):
+        for effect, time in self._node_faults:
+            if not any(map(time.matches, paths)):
                 raise InputError(
-                    f'{effect.name} waits for a node that is called "{when.pattern}"; '
-                    f"there are: {', '.join(paths)}"
+                    f'no path of a node matches "{time.pattern}", the pattern of {effect.name}; '
+                    f"the paths are: {', '.join(paths)}"
                 )
 
     def advance(self) -> None:
         """Let one control step pass, and inject the faults that are due.
 
         Raises:
-            Fault: The run has lasted too long; raised once, so that the arm can brake afterwards.
+            Fault: The timeout has expired; raised once, so that the arm can brake afterwards.
         """
         self.inner.advance()
         self._step()
-        if self._scene.now > self._longest:
-            longest, self._longest = self._longest, math.inf
-            raise Fault(f"the mission is not done after {longest:g} s on its clock")
+        if self._scene.now > self._timeout:
+            timeout, self._timeout = self._timeout, math.inf
+            raise Fault(f"the mission is not done after {timeout:g} s on its clock")
 
     def _step(self) -> None:
-        """Begin and end the faults of a time, and let the lasting ones act."""
+        """Begin and end the faults with a time, and let the active ones act."""
         now = self._scene.now + TIME_TOLERANCE
-        due = [(effect, when) for effect, when in self._to_come if when.start <= now]
-        self._to_come = [(effect, when) for effect, when in self._to_come if when.start > now]
-        for effect, when in due:
-            self._begin(effect, until=when.end)
-        self._end(lambda occasion: occasion.until <= now)
-        for occasion in self._occasions:
-            occasion.act()
+        due = [(effect, time) for effect, time in self._pending if time.start <= now]
+        self._pending = [(effect, time) for effect, time in self._pending if time.start > now]
+        for effect, time in due:
+            self._begin(Occurrence(effect, self._scene, end=time.end))
+        self._end(lambda occurrence: occurrence.end <= now)
+        for occurrence in self._occurrences:
+            occurrence.act()
 
-    def _begin(self, effect: Effect, node: str = "", item: str = "", until: float = math.inf) -> None:
-        self._occasions.append(Occasion(effect, self._scene, node, item, until))
-        self._occasions[-1].act()
+    def _begin(self, occurrence: Occurrence) -> None:
+        self._occurrences.append(occurrence)
+        occurrence.act()
 
-    def _end(self, ends: Callable[[Occasion], bool]) -> None:
-        for occasion in [one for one in self._occasions if ends(one)]:
-            occasion.over = True
-            self._occasions.remove(occasion)
+    def _end(self, is_ending: Callable[[Occurrence], bool]) -> None:
+        for occurrence in filter(is_ending, list(self._occurrences)):
+            occurrence.is_over = True
+            self._occurrences.remove(occurrence)
 
     def _answer(self, access: Access) -> Any:
-        """Return the answer of the cell, changed by all lasting effects."""
+        """Return the answer of the cell, changed by all active effects."""
         proceed = access.proceed
         if access.name in _ANSWERS:
             self._step()
-            for occasion in self._occasions:
-                if answer := occasion.effect.answers.get(access.member):
-                    proceed = partial(answer, proceed, occasion, *occasion.effect.arguments)
+            for occurrence in self._occurrences:
+                if answer := occurrence.effect.answers.get(access.member):
+                    proceed = partial(answer, proceed, occurrence, *occurrence.effect.arguments)
         result = proceed()
         if access.name == "arm.start":
             self._scene.motion = self._scene.now, access.all_arguments[0]
@@ -148,21 +146,21 @@ class FaultyCell(CellWrapper):
 def with_faults(
     kind: Callable[..., Workcell],
     faults: Sequence[ScheduledFault],
-    hand: Callable[[Workcell], Hand] = hand_of,
-    longest: float = math.inf,
+    open_world: Callable[[Workcell], WorldAccess] = open_world,
+    timeout: float = math.inf,
 ) -> Callable[..., FaultyCell]:
-    """Return a kind of cell, for `RunOptions.kind`: another kind, with a fault script.
+    """Return a kind of cell with a fault script, for `RunOptions.kind`.
 
-    The run must be observed by its cell: `run.observe(run.workcell.hear)`.
+    The cell must observe the run: `run.observe(run.workcell.hear)`.
 
     Args:
-        kind: The other kind.
+        kind: The kind of cell without faults.
         faults: The script.
-        hand: Returns the access to the world of a cell of that kind.
-        longest: Time on the run's clock after which the run ends as a fault [s].
+        open_world: Returns the access to the world of a cell of that kind.
+        timeout: Time on the run's clock after which the run ends as a fault [s].
     """
 
     def make(*args: Any, emit: Emit = ignore, **options: Any) -> FaultyCell:
-        return FaultyCell(kind(*args, emit=emit, **options), faults, emit, hand, longest)
+        return FaultyCell(kind(*args, emit=emit, **options), faults, emit, open_world, timeout)
 
     return make

@@ -8,61 +8,60 @@ from collections.abc import Callable
 import numpy as np
 
 from executive.errors import InputError
-from executive.testing.faults.effect import Effect, Occasion, checked_share
-from executive.testing.faults.hand import Thing
-from executive.testing.faults.scene import FaultScene, Which
+from executive.testing.faults.effect import Effect, FaultScene, ObjectChoice, Occurrence, require_share
+from executive.testing.faults.world_access import TrueObject
 
 BUMP_DISTANCE = 0.06
 """Distance by which an object is bumped aside [m]."""
 BUMP_DIRECTIONS = 8
 """Number of directions in which an object may be bumped; the first free one is taken."""
 MAX_TOOL_OFFSET = 0.03
-"""Horizontal distance between an object and the tool up to which the tool is on it [m]."""
+"""Horizontal distance between an object and the tool up to which the tool is on the object [m]."""
 
 Range = tuple[float, float]
 """Smallest and largest coordinate [m]."""
 
 
-def object_removed(which: Which = "node", share: float | None = None) -> Effect:
-    """Somebody takes an object away once, out of the tool too.
+def object_removed(which: ObjectChoice = "node", share: float | None = None) -> Effect:
+    """An object is removed once, from the tool if it is held.
 
     Args:
         which: The object; by default the object of the node.
-        share: Share of its motion that the arm has then behind it, 0 to 1; by default at once.
+        share: Share of the arm's motion after which this happens, 0 to 1; by default at once.
 
     Raises:
         InputError: The number or the share is out of range.
     """
-    return Effect("object_removed", _remove, arguments=(_checked(which), checked_share(share)))
+    return _object_effect("object_removed", _remove, which, share)
 
 
-def object_moved(by: tuple[float, float], which: Which = "node", share: float | None = None) -> Effect:
-    """Somebody puts an object elsewhere once.
+def object_moved(by: tuple[float, float], which: ObjectChoice = "node", share: float | None = None) -> Effect:
+    """An object is displaced once.
 
     Args:
-        by: Displacement along x and y [m]; an object that stands there is pushed aside, or flies.
+        by: Displacement along x and y [m]; an object at the new place is pushed aside.
         which: The object; by default the object of the node.
-        share: Share of its motion that the arm has then behind it, 0 to 1; by default at once.
+        share: Share of the arm's motion after which this happens, 0 to 1; by default at once.
 
     Raises:
         InputError: The number or the share is out of range.
     """
-    return Effect("object_moved", _move, arguments=(_checked(which), checked_share(share), by))
+    return _object_effect("object_moved", _move, which, share, by)
 
 
-def object_bumped(x: Range, y: Range, which: Which = "node", share: float | None = None) -> Effect:
-    """Something bumps an object aside once, to a free place.
+def object_bumped(x: Range, y: Range, which: ObjectChoice = "node", share: float | None = None) -> Effect:
+    """An object is bumped aside once, to a free place.
 
     Args:
-        x: Range in which the object stays [m].
-        y: The same along y [m].
+        x: Range of x of the place [m].
+        y: Range of y of the place [m].
         which: The object; by default the object of the node.
-        share: Share of its motion that the arm has then behind it, 0 to 1; by default at once.
+        share: Share of the arm's motion after which this happens, 0 to 1; by default at once.
 
     Raises:
         InputError: The number or the share is out of range.
     """
-    return Effect("object_moved", _bump, arguments=(_checked(which), checked_share(share), x, y))
+    return _object_effect("object_moved", _bump, which, share, x, y)
 
 
 def object_refuses(number: int) -> Effect:
@@ -71,65 +70,69 @@ def object_refuses(number: int) -> Effect:
     Args:
         number: Number of the object, from 1.
     """
-    return Effect("seal_fails", answers={"close": _refuse}, arguments=(number,))
+    return Effect("seal_fails", answers={"close": _prevent_seal}, arguments=(number,))
 
 
-def _checked(which: Which) -> Which:
+def _object_effect(
+    name: str, change: Callable[..., bool], which: ObjectChoice, share: float | None, *arguments: Range
+) -> Effect:
+    """Return the effect of `change(occurrence, object, *arguments)`."""
     if isinstance(which, int) and which < 1:
         raise InputError(f"objects are counted from 1, and which is {which}")
-    return which
+    return Effect(name, _change_object, arguments=(change, which, require_share(share), *arguments))
 
 
-def _find(now: Occasion, which: Which, share: float) -> Thing | None:
-    """Return the object once the arm has this share of its motion behind it, or None."""
-    return None if now.scene.progress < share else now.scene.find(which, now.item)
+def _change_object(
+    occurrence: Occurrence, change: Callable[..., bool], which: ObjectChoice, share: float, *arguments: Range
+) -> bool:
+    """Change the object as soon as the arm has completed this share of its motion."""
+    scene = occurrence.scene
+    affected = None if scene.progress < share else scene.find(which, occurrence.item)
+    return affected is not None and change(occurrence, affected, *arguments)
 
 
-def _remove(now: Occasion, which: Which, share: float) -> bool:
-    if (thing := _find(now, which, share)) is None:
-        return False
-    now.record(thing)
-    now.scene.hand.remove(thing)
+def _remove(occurrence: Occurrence, removed: TrueObject) -> bool:
+    occurrence.record(removed)
+    occurrence.scene.world.remove(removed)
     return True
 
 
-def _move(now: Occasion, which: Which, share: float, by: tuple[float, float]) -> bool:
-    if (thing := _find(now, which, share)) is None:
-        return False
-    now.record(thing)
-    now.scene.hand.move(thing, by)
+def _move(occurrence: Occurrence, moved: TrueObject, by: tuple[float, float]) -> bool:
+    occurrence.record(moved)
+    occurrence.scene.world.move(moved, by)
     return True
 
 
-def _bump(now: Occasion, which: Which, share: float, x: Range, y: Range) -> bool:
-    thing = _find(now, which, share)
-    by = None if thing is None else _find_free_place(now.scene, thing, x, y)
-    return by is not None and _move(now, which, share, by)
+def _bump(occurrence: Occurrence, bumped: TrueObject, x: Range, y: Range) -> bool:
+    by = _find_free_displacement(occurrence.scene, bumped, x, y)
+    return by is not None and _move(occurrence, bumped, by)
 
 
-def _find_free_place(scene: FaultScene, thing: Thing, x: Range, y: Range) -> tuple[float, float] | None:
+def _find_free_displacement(
+    scene: FaultScene, bumped: TrueObject, x: Range, y: Range
+) -> tuple[float, float] | None:
     """Return the displacement of an object to a free place beside it [m], or None."""
-    radius = scene.cell.classes[thing.label].radius
+    radius = scene.cell.classes[bumped.label].radius
     others = [
         (other.position[:2], scene.cell.classes[other.label].radius + radius)
-        for other in scene.hand.things
-        if other.body != thing.body
+        for other in scene.world.objects
+        if other.body != bumped.body
     ]
     for number in range(BUMP_DIRECTIONS):
         angle = 2 * math.pi * number / BUMP_DIRECTIONS
         by = np.array([math.cos(angle), math.sin(angle)]) * BUMP_DISTANCE
-        place = thing.position[:2] + by
+        place = bumped.position[:2] + by
         is_inside = x[0] <= place[0] <= x[1] and y[0] <= place[1] <= y[1]
-        if is_inside and all(math.dist(place, other) > apart for other, apart in others):
+        if is_inside and all(math.dist(place, other) > distance for other, distance in others):
             return float(by[0]), float(by[1])
     return None
 
 
-def _refuse(proceed: Callable[[], None], now: Occasion, number: int) -> None:
-    """Leave the tool as it is on this object."""
-    thing = now.scene.find(number, "")
-    here = now.scene.cell.arm.tool_pose.position
-    if thing is None or math.dist(thing.position[:2], here[:2]) > MAX_TOOL_OFFSET:
+def _prevent_seal(proceed: Callable[[], None], occurrence: Occurrence, number: int) -> None:
+    """Close the tool, unless the tool is on this object."""
+    refusing = occurrence.scene.find(number, "")
+    tool = occurrence.scene.cell.arm.tool_pose.position
+    if refusing is None or math.dist(refusing.position[:2], tool[:2]) > MAX_TOOL_OFFSET:
         proceed()
     else:
-        now.record(thing)
+        occurrence.record(refusing)

@@ -1,4 +1,4 @@
-"""A fault script: what happens to a cell, and when."""
+"""Fault script: the faults of a cell and their times."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from executive.testing.faults.effect import Effect
 
 @dataclass(frozen=True)
 class DuringNode:
-    """While a node runs.
+    """Activations of nodes.
 
     Attributes:
-        pattern: Of the node's path, as in `build`: `*` stands for anything, `/` included.
-        nth: Which activations of all nodes that fit, counted from 1; empty for every one.
-        probability: Chance of each of them.
-        seed: Decides by chance.
+        pattern: Pattern of the nodes' paths; `*` matches any text, `/` included.
+        nth: Numbers of activations, counted from 1 over all matching nodes; empty: all.
+        probability: Probability of a fault in each of them.
+        seed: Random seed.
     """
 
     pattern: str
@@ -29,12 +29,12 @@ class DuringNode:
     probability: float = 1.0
     seed: int = 0
 
-    def fits(self, path: str) -> bool:
-        """Tell whether this is about a node."""
+    def matches(self, path: str) -> bool:
+        """Return True if the path of a node matches the pattern."""
         return fnmatchcase(path, self.pattern)
 
-    def chosen(self, number: int) -> bool:
-        """Tell whether it happens during the activation of a number."""
+    def includes(self, number: int) -> bool:
+        """Return True if the fault occurs in the activation with this number."""
         if self.nth and number not in self.nth:
             return False
         return float(np.random.default_rng([self.seed, number]).random()) < self.probability
@@ -42,7 +42,7 @@ class DuringNode:
 
 @dataclass(frozen=True)
 class DuringTime:
-    """From one time on the run's clock until before another [s]."""
+    """Time on the run's clock from `start` until before `end` [s]."""
 
     start: float
     end: float
@@ -50,57 +50,57 @@ class DuringTime:
 
 @dataclass(frozen=True)
 class ScheduledFault:
-    """Something that happens to a cell, and when."""
+    """An effect on a cell, and its time."""
 
-    what: Effect
-    when: DuringNode | DuringTime
+    effect: Effect
+    time: DuringNode | DuringTime
 
 
-def during(pattern: str, what: Effect, *, nth: int | Collection[int] = ()) -> ScheduledFault:
-    """Return a fault that lasts as long as a node runs.
+def during(pattern: str, effect: Effect, *, nth: int | Collection[int] = ()) -> ScheduledFault:
+    """Return a fault that lasts while a node runs.
 
     Args:
-        pattern: Of the node's path: `*/Grasp`.
-        what: What happens.
-        nth: In which activations of all nodes that fit, counted from 1; by default in every one.
+        pattern: Pattern of the node's path: `*/Grasp`.
+        effect: Effect of the fault.
+        nth: Numbers of activations, counted from 1 over all matching nodes; by default all.
 
     Raises:
-        InputError: An activation has a number less than 1.
+        InputError: A number is less than 1.
     """
     numbers = (nth,) if isinstance(nth, int) else tuple(nth)
     if any(number < 1 for number in numbers):
         raise InputError(f"activations are counted from 1, and nth is {nth}")
-    return ScheduledFault(what, DuringNode(pattern, numbers))
+    return ScheduledFault(effect, DuringNode(pattern, numbers))
 
 
-def with_probability(probability: float, pattern: str, what: Effect, *, seed: int) -> ScheduledFault:
-    """Return a fault that lasts as long as a node runs, in some of its activations.
+def with_probability(probability: float, pattern: str, effect: Effect, *, seed: int) -> ScheduledFault:
+    """Return a fault that lasts while a node runs, in a random part of its activations.
 
     Args:
-        probability: Chance of every activation, 0 to 1.
-        pattern: Of the node's path: `*/Transit`.
-        what: What happens.
-        seed: Decides which activations; the same one always the same.
+        probability: Probability in each activation, 0 to 1.
+        pattern: Pattern of the node's path: `*/Transit`.
+        effect: Effect of the fault.
+        seed: Random seed, which determines the activations.
 
     Raises:
-        InputError: The probability is none.
+        InputError: The probability is not in 0 to 1.
     """
     if not 0.0 <= probability <= 1.0:
         raise InputError(f"a probability is 0 to 1, not {probability:g}")
-    return ScheduledFault(what, DuringNode(pattern, probability=probability, seed=seed))
+    return ScheduledFault(effect, DuringNode(pattern, probability=probability, seed=seed))
 
 
-def between(start: float, end: float, what: Effect) -> ScheduledFault:
+def between(start: float, end: float, effect: Effect) -> ScheduledFault:
     """Return a fault that lasts from one time on the run's clock until another [s].
 
     Raises:
-        InputError: It would end before it begins.
+        InputError: The end is not after the start.
     """
     if not 0.0 <= start < end:
         raise InputError(f"a fault lasts from some time until a later one, not from {start:g} s to {end:g} s")
-    return ScheduledFault(what, DuringTime(start, end))
+    return ScheduledFault(effect, DuringTime(start, end))
 
 
-def after(start: float, what: Effect) -> ScheduledFault:
+def after(start: float, effect: Effect) -> ScheduledFault:
     """Return a fault that lasts from a time on the run's clock [s] until the end."""
-    return between(start, math.inf, what)
+    return between(start, math.inf, effect)

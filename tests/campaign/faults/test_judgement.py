@@ -22,7 +22,7 @@ from executive.cell.frame import FrameTaken
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, RunEnded
 from executive.mission.flow.endings import Ending
-from executive.testing.faults.hand import Thing
+from executive.testing.faults.world_access import TrueObject
 
 BUG = PlannedFault(
     "tree/Grasp", "Grasp", "", "raises", "first", "", skill_faults=(SkillFault("tree/Grasp", "raises"),)
@@ -161,8 +161,8 @@ def test_what_fell_where_no_look_shows_it_is_out_of_reach_wherever_it_lies(
 
 def test_an_object_is_out_of_sight_if_no_look_since_the_last_fall_shows_its_place(fake: FakeCell) -> None:
     camera, bins = fake.cell.camera, fake.cell.bins.values()
-    seen, beside = (Thing(body, "cube", np.array(place)) for body, place in enumerate(PLACES[:2]))
-    inside = Thing(2, "cube", np.array(PLACES[2]))
+    seen, beside = (TrueObject(body, "cube", np.array(place)) for body, place in enumerate(PLACES[:2]))
+    inside = TrueObject(2, "cube", np.array(PLACES[2]))
     fall = at(10, item_changed("cube-1", "dropped"))
     look = at(20, FrameTaken(camera.capture()))
     before = at(5, look.event)

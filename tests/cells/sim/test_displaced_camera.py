@@ -58,7 +58,7 @@ def test_a_moved_camera_ends_a_run_before_anything_is_touched(
 ) -> None:
     result = run_mission(mission, displaced(**camera), seed=1, requests=["cube"])
     assert (result.status, result.reason) == ("FAILURE", "Detect.camera_moved")
-    assert not result.entered("*Approach")
+    assert not result.find_activations("*Approach")
     found = re.search(r"moved by \((\S+), (\S+), (\S+)\) mm", result.message)
     assert found is not None
     if shift is not None:

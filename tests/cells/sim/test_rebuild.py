@@ -22,7 +22,7 @@ from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import discover
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.faults.hand import hand_of
+from executive.testing.faults.world_access import open_world
 from executive.testing.oracle import oracle_cell
 from tests.meanwhile import meanwhile
 
@@ -151,16 +151,16 @@ def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(
     log.write_bytes(left[1].log.read_bytes())
     moved: list[tuple[int, Array]] = []
 
-    def act(hand) -> None:
-        held = hand.held.body if hand.held else None
-        one, other = [thing for thing in hand.things if thing.body != held][:2]
-        hand.remove(other)
-        hand.move(one, (0.0, 0.3))
+    def act(world) -> None:
+        held = world.held.body if world.held else None
+        one, other = [thing for thing in world.objects if thing.body != held][:2]
+        world.remove(other)
+        world.move(one, (0.0, 0.3))
         moved.extend([(one.body, one.position + np.array([0.0, 0.3, 0.0])), (other.body, np.zeros(3))])
 
     meanwhile(log, mission, SEED, act, oracle_cell())
     cell = rebuilt(mission, log)
-    things = {thing.body: thing.position for thing in hand_of(cell).things}
+    things = {thing.body: thing.position for thing in open_world(cell).objects}
     assert np.abs(things[moved[0][0]] - moved[0][1]).max() < 0.01
     assert moved[1][0] not in things
     assert (cell.steps, cell.cell.arm.at_rest) == (left[1].tick, True)

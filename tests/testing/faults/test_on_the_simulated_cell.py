@@ -12,7 +12,7 @@ from executive.events import FaultInjected, NodeEnded, TimedEvent
 from executive.geometry import Array
 from executive.testing import faults as effects
 from executive.testing.faults import ScheduledFault, after, during
-from executive.testing.faults.hand import hand_of
+from executive.testing.faults.world_access import open_world
 from executive.testing.oracle import oracle_cell
 from executive.testing.run_mission import MissionResult, run_mission
 
@@ -47,7 +47,7 @@ def watched() -> Watched:
 
 def places(cell: SimCell) -> dict[int, Array]:
     """Return where every object is, by body `(3,)` [m]."""
-    return {thing.body: thing.position for thing in hand_of(cell).things}
+    return {thing.body: thing.position for thing in open_world(cell).objects}
 
 
 def holding(cell: SimCell) -> bool:
@@ -57,14 +57,14 @@ def holding(cell: SimCell) -> bool:
 @pytest.mark.slow
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
     result = watched.run(during("*/Transit", effects.seal_breaks(), nth=3), places)
-    (fault,) = result.faults()
+    (fault,) = result.find_faults()
     hung = watched.seen["FaultInjected"]
     fallen = watched.seen["SelectTarget.unseen"]
     assert isinstance(hung, dict) and isinstance(fallen, dict)
     (body,) = (body for body, place in hung.items() if np.allclose(place, fault.position, atol=1e-3))
     assert hung[body][2] > 0.1
     assert fallen[body][2] < 0.05
-    assert (result.status, result.reasons("*/Transit")) == ("SUCCESS", ["dropped"])
+    assert (result.status, result.find_reasons("*/Transit")) == ("SUCCESS", ["dropped"])
 
 
 @pytest.mark.slow
@@ -83,7 +83,7 @@ def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched)
 @pytest.mark.slow
 def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
     result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), nth=2), places)
-    (fault,) = result.faults()
+    (fault,) = result.find_faults()
     before, felt = watched.seen["FaultInjected"], watched.seen["no_contact"]
     assert isinstance(before, dict) and isinstance(felt, dict)
     (body,) = (body for body, place in before.items() if np.allclose(place, fault.position, atol=1e-3))

@@ -26,8 +26,8 @@ from executive.testing.faults import (
     with_faults,
     with_probability,
 )
-from executive.testing.faults.hand import hand_of
 from executive.testing.faults.script import DuringNode
+from executive.testing.faults.world_access import open_world
 from executive.testing.run_mission import MissionResult, run_mission
 
 SLIPS = effects.seal_fails()
@@ -50,7 +50,7 @@ def test_it_happens_in_the_activations_it_is_meant_for(nth: int | Sequence[int],
     result = sorted_with(during("*/Grasp", SLIPS, nth=nth))
     assert slipped(result)[: len(missed)] == missed
     assert len(slipped(result)) == len(missed) or nth == ()
-    assert len(result.faults()) == len(slipped(result))
+    assert len(result.find_faults()) == len(slipped(result))
     assert result.agrees
 
 
@@ -74,9 +74,9 @@ def test_after_a_time_it_lasts_until_the_end() -> None:
 @pytest.mark.parametrize("probability", [0.0, 0.1, 0.5, 1.0])
 @pytest.mark.parametrize("seed", range(5))
 def test_a_chance_is_met_as_often_as_it_says(probability: float, seed: int) -> None:
-    when = with_probability(probability, "*", SLIPS, seed=seed).when
-    assert isinstance(when, DuringNode)
-    share = sum(when.chosen(number) for number in range(1, 401)) / 400
+    time = with_probability(probability, "*", SLIPS, seed=seed).time
+    assert isinstance(time, DuringNode)
+    share = sum(time.includes(number) for number in range(1, 401)) / 400
     # Four standard deviations.
     assert abs(share - probability) <= 4 * math.sqrt(probability * (1 - probability) / 400)
 
@@ -112,7 +112,7 @@ def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again(
 
 def test_what_happens_to_a_node_is_told_with_node_item_and_object() -> None:
     result = sorted_with(during("*/Transit", effects.seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
-    (fault,) = result.faults()
+    (fault,) = result.find_faults()
     assert (fault.name, fault.node.rpartition("/")[2]) == ("seal_breaks", "Transit")
     assert fault.item.startswith(f"{fault.object}-") and len(fault.position) == 3
 
@@ -124,7 +124,7 @@ def test_a_mission_waits_for_a_detector_and_a_test_for_a_mission_for_so_long_onl
     ]
     assert (result.status, result.agrees) == ("SUCCESS", True)
     script = [during("tree/look/*/Detect", effects.detector_hangs())]
-    result = run_mission("sort_overhead", faults=script, longest=5.0)
+    result = run_mission("sort_overhead", faults=script, timeout=5.0)
     assert result.message == "the mission is not done after 5 s on its clock"
 
 
@@ -149,13 +149,13 @@ def test_a_kind_of_cell_has_faults_in_one_run_after_the_other() -> None:
         assert cell.cell.ledger.epoch == 1
 
 
-def test_a_hand_reaches_through_wrapped_cells_and_into_no_unknown_one() -> None:
+def test_the_world_of_a_wrapped_cell_is_opened_and_that_of_an_unknown_cell_is_refused() -> None:
     fake = FakeCell()
     fake.world.put("cube", 0.5, 0.0)
-    assert [thing.label for thing in hand_of(CellWrapper(CellWrapper(fake))).things] == ["cube"]
+    assert [thing.label for thing in open_world(CellWrapper(CellWrapper(fake))).objects] == ["cube"]
     gone = [after(0.0, effects.object_removed(1))]
     strange: Any = SimpleNamespace(cell=FakeCell().cell, advance=lambda: None)
-    with pytest.raises(InputError, match="how to reach into a SimpleNamespace; give `with_faults"):
+    with pytest.raises(InputError, match="faults cannot change the world of a SimpleNamespace; give `with"):
         FaultyCell(strange, gone).advance()
-    with_faults(lambda **_: strange, gone, hand=lambda _: hand_of(fake))().advance()
+    with_faults(lambda **_: strange, gone, open_world=lambda _: open_world(fake))().advance()
     assert fake.world.objects == []

@@ -1,0 +1,68 @@
+"""Access to the world of a simulated cell; the only part of the fault scripts that needs the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from executive.cells.sim.arm import SimArm
+from executive.cells.sim.cell import SimCell
+from executive.cells.sim.tool import SuctionTool
+from executive.geometry import Pose
+from executive.testing.faults.world_access import TrueObject, WorldAccess
+
+SETTLING_STEPS = 240
+"""Number of control steps in which the arm and displaced objects come to rest."""
+
+
+class SimWorldAccess(WorldAccess):
+    """Access to the world of a simulated cell."""
+
+    def __init__(self, workcell: SimCell) -> None:
+        arm, tool = workcell.cell.arm, workcell.cell.tool
+        assert isinstance(arm, SimArm)
+        assert isinstance(tool, SuctionTool)
+        self._workcell, self._world = workcell, workcell._world
+        self._arm, self._tool = arm, tool
+
+    @property
+    def objects(self) -> Sequence[TrueObject]:
+        """All loose objects."""
+        return [self._describe(body) for body in self._world.bodies]
+
+    @property
+    def held(self) -> TrueObject | None:
+        """The object at the tool, or None."""
+        body = self._tool.held_body
+        return None if body is None else self._describe(body)
+
+    def remove(self, removed: TrueObject) -> None:
+        """Remove an object from the world."""
+        self.drop(removed)
+        self._world.remove_object(removed.body)
+
+    def move(self, moved: TrueObject, by: tuple[float, float]) -> None:
+        """Displace an object."""
+        self.drop(moved)
+        X_WO = self._world.object_pose(moved.body)
+        position = X_WO.position + np.array([*by, 0.0])
+        self._world.place_object(moved.body, Pose(X_WO.rotation, position))
+
+    def break_seal(self) -> None:
+        """Break the seal of the tool."""
+        self._tool.part()
+
+    def block_arm(self, message: str) -> None:
+        """Let the arm run into an obstacle."""
+        self._arm.run_into(message)
+
+    def settle(self) -> None:
+        """Simulate one second that does not belong to a run."""
+        self._world.idle = True
+        for _ in range(SETTLING_STEPS):
+            self._workcell.advance()
+        self._world.idle = False
+
+    def _describe(self, body: int) -> TrueObject:
+        return TrueObject(body, self._world.bodies[body], self._world.object_pose(body).position)
