@@ -1,14 +1,14 @@
-"""Braking along the path: the arm slows down on the way it was going and never leaves it.
+"""Braking along the path: the arm decelerates on its planned path and comes to rest there.
 
-Path time itself is braked: its rate goes from 1 to 0 by a jerk-limited profile (ruckig's velocity
-interface with one degree of freedom), so the joints pass the same positions, only later. What that
-asks of the joints follows from the chain rule, `q'' = path'' rate² + path' rate'`.
+The rate of path time falls from 1 to 0 with limited jerk (ruckig's velocity interface with one degree of
+freedom). By the chain rule, the acceleration of the joints is then `q'' rate² + q' rate'`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from ruckig import ControlInterface, InputParameter, Ruckig
@@ -19,68 +19,71 @@ from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 
 MIN_BRAKING_TIME, MAX_BRAKING_TIME = 0.02, 0.5
-"""Range of the time taken from full rate to rest [s]."""
-_DURATIONS = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
-_RAMPS = (1 / 2, 1 / 3)  # share of the duration in which the deceleration builds up, and again ebbs away
+"""Range of the time from full rate to rest [s]."""
+_BRAKING_TIMES = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)  # [s]
+_RAMP_SHARES = (1 / 2, 1 / 3)  # share of the braking time in which the deceleration rises, and again falls
+
+
+class _Braking(NamedTuple):
+    """Path times [s], rates of path time, and changes of the rate [1/s] in `N` control steps, each `(N,)`."""
+
+    times: Array
+    rates: Array
+    rate_changes: Array
 
 
 def brake(trajectory: Trajectory, s: float, limits: JointLimits, step: float) -> Array:
-    """Return the path times `(N,)` [s] of the control steps after path time `s`; the last is at rest.
+    """Return the path times `(N,)` [s] of the control steps after path time `s`; the last state is at rest.
 
-    The shortest stop is taken that keeps joint accelerations and jerks inside the stop limits, at
-    control steps of `step` [s]. Running on to the end of the motion is one of the choices. If none is
-    inside, the one that exceeds the limits least: braking comes first.
+    The result is the shortest braking within the stop limits of joint acceleration and jerk; one candidate
+    continues to the end of the motion. If no candidate is within the limits, the result is the candidate that
+    exceeds the limits least. `step` is the length of a control step [s].
     """
-    best, least = np.array([s]), math.inf
-    for times, rates, slopes in _candidates(trajectory, s, step):
-        load = _load(trajectory, s, (times, rates, slopes), limits, step)
+    best_times, least_load = np.array([s]), math.inf
+    for braking in _candidates(trajectory, s, step):
+        load = _max_load(trajectory, s, braking, limits, step)
         if load <= 1.0:
-            return times
-        if load < least:
-            best, least = times, load
-    return best
+            return braking.times
+        if load < least_load:
+            best_times, least_load = braking.times, load
+    return best_times
 
 
-def _candidates(trajectory: Trajectory, s: float, step: float) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield path times, rates and their slopes `(N,)` of possible stops, shortest first."""
+def _candidates(trajectory: Trajectory, s: float, step: float) -> Iterator[_Braking]:
+    """Yield candidates from path time `s` [s], the shortest first."""
     remaining = max(0.0, trajectory.duration - s)
-    coasted = remaining > MAX_BRAKING_TIME
-    for duration in _DURATIONS:
-        if not coasted and remaining <= duration:
-            coasted = True
+    continues_to_end = remaining <= MAX_BRAKING_TIME
+    for duration in _BRAKING_TIMES:
+        if continues_to_end and remaining <= duration:
+            continues_to_end = False
             count = max(1, math.ceil(remaining / step - 1e-9))
             times = np.minimum(s + step * np.arange(1, count + 1), s + remaining)
-            yield times, np.ones(count), np.zeros(count)
-        for ramp in _RAMPS:
-            yield _profile(s, float(duration), ramp, step)
+            yield _Braking(times, np.ones(count), np.zeros(count))
+        for ramp_share in _RAMP_SHARES:
+            yield _sample_braking(s, float(duration), ramp_share, step)
 
 
-def _profile(s: float, duration: float, ramp: float, step: float) -> tuple[Array, Array, Array]:
-    """Sample a stop of path time that takes `duration` [s]."""
+def _sample_braking(s: float, duration: float, ramp_share: float, step: float) -> _Braking:
+    """Return the control steps of a braking that takes `duration` [s]."""
     inputs = InputParameter(1)
     inputs.control_interface = ControlInterface.Velocity
     inputs.current_position, inputs.current_velocity, inputs.target_velocity = [s], [1.0], [0.0]
-    deceleration = 1.0 / (duration * (1 - ramp))
-    inputs.max_acceleration, inputs.max_jerk = [deceleration], [deceleration / (duration * ramp)]
+    deceleration = 1.0 / (duration * (1 - ramp_share))
+    inputs.max_acceleration, inputs.max_jerk = [deceleration], [deceleration / (duration * ramp_share)]
     profile = Profile(1)
     Ruckig(1).calculate(inputs, profile)
     count = max(1, math.ceil(profile.duration / step - 1e-9))
     samples = [profile.at_time(min(k * step, profile.duration)) for k in range(1, count + 1)]
-    times, rates, slopes = (np.array([sample[i][0] for sample in samples]) for i in range(3))
-    return times, rates, slopes
+    return _Braking(*np.array(samples)[:, :, 0].T)
 
 
-def _load(
-    trajectory: Trajectory, s: float, stop: tuple[Array, Array, Array], limits: JointLimits, step: float
-) -> float:
-    """Return the largest joint acceleration or jerk of a stop as a share of its stop limit."""
-    accelerations = [trajectory.at(s)[2]]
-    for time, rate, slope in zip(*stop, strict=True):
+def _max_load(trajectory: Trajectory, s: float, braking: _Braking, limits: JointLimits, step: float) -> float:
+    """Return the largest joint acceleration or jerk of a braking as a share of its stop limit."""
+    accelerations = [trajectory.at(s).qdd]
+    for time, rate, rate_change in zip(*braking, strict=True):
         _, velocity, acceleration = trajectory.at(float(time))
-        accelerations.append(acceleration * rate**2 + velocity * slope)
+        accelerations.append(acceleration * rate**2 + velocity * rate_change)
     accelerations.append(np.zeros_like(accelerations[0]))
-    array = np.array(accelerations)
-    jerks = np.diff(array, axis=0) / step
-    return float(
-        max(np.max(np.abs(array) / limits.stop_acceleration), np.max(np.abs(jerks) / limits.stop_jerk))
-    )
+    jerks = np.diff(accelerations, axis=0) / step
+    shares = np.abs(accelerations) / limits.stop_acceleration, np.abs(jerks) / limits.stop_jerk
+    return float(max(map(np.max, shares)))

@@ -1,4 +1,4 @@
-"""Candidate arrivals at a goal, the most promising first."""
+"""Candidates for the end of a motion, in the order of their minimum durations."""
 
 from __future__ import annotations
 
@@ -24,43 +24,45 @@ class Candidate:
     """A candidate for the end of a motion.
 
     Attributes:
-        estimate: Minimum time of a motion to it [s].
-        entry: State in which the free part ends.
-        arrival: What follows it, straight down, or None.
-        configuration: Configuration in which it ends, or None for a named pose.
+        min_duration: Minimum duration of the free part [s].
+        entry: State at the end of the free part.
+        arrival: Straight motion down from `entry`, or None.
+        configuration: Configuration at the end, or None for given joint positions.
     """
 
-    estimate: float
+    min_duration: float
     entry: JointState
     arrival: CartesianLine | None
     configuration: Configuration | None
 
     @property
-    def tail(self) -> float:
-        """Duration of the straight part [s]."""
+    def arrival_duration(self) -> float:
+        """Duration of `arrival` [s]."""
         return self.arrival.duration if self.arrival else 0.0
 
 
 def find_candidates(
     kinematics: Kinematics, limits: JointLimits, start: JointState, goal: Goal, length: float
 ) -> Iterator[Candidate]:
-    """Yield candidates for motions to a goal, the last `length` [m] straight, each unlike those before it.
+    """Yield candidates for motions to a goal whose last `length` [m] is straight.
+
+    Each candidate differs from all earlier ones by more than `MIN_JOINT_DIFFERENCE`.
 
     Raises:
-        Unreachable: There is no posture.
+        Unreachable: No posture of the arm reaches the goal.
     """
     postures = find_postures(kinematics, goal, length, start.q)
-    estimates = min_time(postures.high - start.q, limits)
-    taken: list[Array] = []
-    for number in np.argsort(estimates, kind="stable"):
+    durations = min_time(postures.high - start.q, limits)
+    earlier: list[Array] = []
+    for number in np.argsort(durations, kind="stable"):
         low = postures.low[number]
-        if any(np.max(np.abs(low - other)) <= MIN_JOINT_DIFFERENCE for other in taken):
+        if any(np.max(np.abs(low - other)) <= MIN_JOINT_DIFFERENCE for other in earlier):
             continue
-        taken.append(low)
+        earlier.append(low)
         configuration = postures.configurations[number]
         arrival, entry = None, JointState.rest(low)
         if length > 0:
             chain = solve_vertical_line(kinematics, low, length, CHAIN_LENGTH, configuration)[::-1]
-            arrival = CartesianLine(chain, length, limits, goal.speed, enters=True)
+            arrival = CartesianLine(chain, length, limits, goal.speed, starts_in_motion=True)
             entry = arrival.at(0.0)
-        yield Candidate(float(estimates[number]), entry, arrival, configuration)
+        yield Candidate(float(durations[number]), entry, arrival, configuration)

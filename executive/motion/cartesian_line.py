@@ -1,12 +1,11 @@
-"""The tool in a straight line: a posture of the arm kept while the tool goes up or down.
+"""Straight motion of the tool: up or down in one configuration of the arm.
 
-The joints follow a spline through inverse kinematics, by a path parameter that is the tool's way. How fast
-that may grow follows from the chain rule,
+The joint path is a spline through inverse-kinematics solutions; its parameter `s` is the path length of the
+tool. With speed `v`, acceleration `a` and jerk `j` of the tool, the chain rule gives the joint motion
 
-    q' = q_s v,  q'' = q_s a + q_ss v²,  q''' = q_s j + 3 q_ss v a + q_sss v³,
+    q' = q_s v,  q'' = q_s a + q_ss v²,  q''' = q_s j + 3 q_ss v a + q_sss v³.
 
-with bounds on speed, acceleration and jerk of the tool that keep every joint inside its limits wherever on
-the line it is.
+The limits of `v`, `a` and `j` keep every joint within its limits on the whole line.
 """
 
 from __future__ import annotations
@@ -23,29 +22,30 @@ from executive.motion.limits import JointLimits
 from executive.motion.state import JointState
 
 CHAIN_LENGTH = 4
-"""Places along a line that inverse kinematics is asked for."""
-MAX_BEND_SHARE = 0.5
-"""Share of a joint's acceleration and jerk left to the bend of its path, at most."""
-_FINE = np.linspace(0.0, 1.0, 33)
+"""Number of inverse-kinematics solutions along a line."""
+MAX_CURVATURE_SHARE = 0.5
+"""Maximum share of a joint's acceleration and jerk limits for the terms with the curvature of its path."""
+_LIMIT_SAMPLES = np.linspace(0.0, 1.0, 33)  # shares of the length at which joint limits are evaluated
+_EPSILON = 1e-9  # [rad/m], [rad/m²], [rad/m³]: a joint at rest sets no limit
 
 
 class CartesianLine:
-    """A straight way of the tool; implements `executive.motion.state.Piece`.
+    """A straight motion of the tool; implements `executive.motion.state.Piece`.
 
-    An end at which it does not rest is passed at the largest speed that leaves room to rest at the other.
+    If the tool moves at one end, it has the largest speed from which it can stop at the other end.
 
     Args:
-        chain: Joint positions `(N, n)` [rad] at N places evenly spread along it, `N` > 3.
-        length: Its length [m].
-        limits: What the joints may do.
-        speed: Largest speed of the tool [m/s].
-        acceleration: Largest acceleration of the tool [m/s²].
-        enters: Whether it begins in motion.
-        leaves: Whether it ends in motion; not both.
+        chain: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line, `N` > 3.
+        length: Length of the line [m].
+        limits: Joint limits.
+        speed: Maximum speed of the tool [m/s].
+        acceleration: Maximum acceleration of the tool [m/s²].
+        starts_in_motion: True if the tool moves at the start.
+        ends_in_motion: True if the tool moves at the end; only one of both.
 
     Attributes:
-        duration: Time it takes [s].
-        acceleration: What the tool is accelerated with at most [m/s²]: what was asked, or what the arm can.
+        duration: Duration [s].
+        acceleration: Maximum acceleration of the tool [m/s²], also limited by the joints.
     """
 
     def __init__(
@@ -56,67 +56,69 @@ class CartesianLine:
         speed: float = math.inf,
         acceleration: float = math.inf,
         *,
-        enters: bool = False,
-        leaves: bool = False,
+        starts_in_motion: bool = False,
+        ends_in_motion: bool = False,
     ) -> None:
         self._spline = CubicSpline(np.linspace(0.0, length, len(chain)), chain)
         self._derivatives = [self._spline.derivative(order) for order in (1, 2)]
-        velocity, possible, jerk = self._bounds(limits, speed, length)
-        self.acceleration = acceleration = min(acceleration, possible)
-        passing = _passing_speed(length, velocity, acceleration, jerk)
+        max_speed, joint_acceleration, jerk = self._tool_limits(limits, speed, length)
+        self.acceleration = acceleration = min(acceleration, joint_acceleration)
+        end_speed = _max_end_speed(length, max_speed, acceleration, jerk)
         inputs = InputParameter(1)
         inputs.current_position, inputs.target_position = [0.0], [length]
-        inputs.current_velocity = [passing if enters else 0.0]
-        inputs.target_velocity = [passing if leaves else 0.0]
-        inputs.max_velocity, inputs.max_acceleration, inputs.max_jerk = [velocity], [acceleration], [jerk]
+        inputs.current_velocity = [end_speed if starts_in_motion else 0.0]
+        inputs.target_velocity = [end_speed if ends_in_motion else 0.0]
+        inputs.max_velocity, inputs.max_acceleration, inputs.max_jerk = [max_speed], [acceleration], [jerk]
         self._profile = Profile(1)
         Ruckig(1).calculate(inputs, self._profile)
         self.duration: float = self._profile.duration
 
     def at(self, s: float) -> JointState:
         """Return the state at time `s`, 0 to `duration` [s]."""
-        (place,), (speed,), (change,) = self._profile.at_time(s)
-        first, second = (derivative(place) for derivative in self._derivatives)
-        return JointState(self._spline(place), first * speed, first * change + second * speed**2)
+        (distance,), (speed,), (acceleration,) = self._profile.at_time(s)
+        q_s, q_ss = (derivative(distance) for derivative in self._derivatives)
+        return JointState(self._spline(distance), q_s * speed, q_s * acceleration + q_ss * speed**2)
 
     def over(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
-        place, speed, change = np.array([self._profile.at_time(s) for s in times.tolist()])[:, :, 0].T
-        first, second = (derivative(place) for derivative in self._derivatives)
-        bent = second * speed[:, None] ** 2
-        return JointState(self._spline(place), first * speed[:, None], first * change[:, None] + bent)
+        profile = np.array([self._profile.at_time(s) for s in times.tolist()])[:, :, 0].T
+        distance, (speed, acceleration) = profile[0], profile[1:, :, None]
+        q_s, q_ss = (derivative(distance) for derivative in self._derivatives)
+        return JointState(self._spline(distance), q_s * speed, q_s * acceleration + q_ss * speed**2)
 
-    def _bounds(self, limits: JointLimits, speed: float, length: float) -> tuple[float, float, float]:
-        """Return the tool's largest speed [m/s], acceleration [m/s²] and jerk [m/s³]."""
-        slope, bend, twist = (np.abs(self._spline(_FINE * length, order)).max(axis=0) for order in (1, 2, 3))
-        tiny = 1e-9  # [rad/m] and so on: a joint that stands still sets no bound
-        straight = float(np.min(limits.acceleration / (slope + tiny)))
-        velocity = min(
-            speed,
-            math.sqrt(2 * length * straight),  # so short a way does not make it faster
-            float(np.min(limits.velocity / (slope + tiny))),
-            float(np.min(np.sqrt(MAX_BEND_SHARE * limits.acceleration / (bend + tiny)))),
-            float(np.min(np.cbrt(MAX_BEND_SHARE / 2 * limits.jerk / (twist + tiny)))),
+    def _tool_limits(self, limits: JointLimits, speed: float, length: float) -> tuple[float, float, float]:
+        """Return the maximum speed [m/s], acceleration [m/s²] and jerk [m/s³] of the tool."""
+        q_s, q_ss, q_sss = (
+            np.abs(self._spline(_LIMIT_SAMPLES * length, order)).max(axis=0) for order in (1, 2, 3)
         )
-        acceleration = min(
-            float(np.min((limits.acceleration - bend * velocity**2) / (slope + tiny))),
-            float(np.min(MAX_BEND_SHARE / 2 * limits.jerk / (3 * bend * velocity + tiny))),
+        speeds = (
+            limits.velocity / (q_s + _EPSILON),
+            # The tool cannot become faster on a line of this length.
+            math.sqrt(2 * length * np.min(limits.acceleration / (q_s + _EPSILON))),
+            np.sqrt(MAX_CURVATURE_SHARE * limits.acceleration / (q_ss + _EPSILON)),
+            np.cbrt(MAX_CURVATURE_SHARE / 2 * limits.jerk / (q_sss + _EPSILON)),
         )
-        rest = limits.jerk - 3 * bend * velocity * acceleration - twist * velocity**3
-        return velocity, acceleration, float(np.min(rest / (slope + tiny)))
+        max_speed = min(speed, *(float(np.min(values)) for values in speeds))
+        accelerations = (
+            (limits.acceleration - q_ss * max_speed**2) / (q_s + _EPSILON),
+            MAX_CURVATURE_SHARE / 2 * limits.jerk / (3 * q_ss * max_speed + _EPSILON),
+        )
+        acceleration = float(np.min(accelerations))
+        jerks = limits.jerk - 3 * q_ss * max_speed * acceleration - q_sss * max_speed**3
+        return max_speed, acceleration, float(np.min(jerks / (q_s + _EPSILON)))
 
 
-def _passing_speed(length: float, velocity: float, acceleration: float, jerk: float) -> float:
-    """Return the largest speed [m/s] from which the tool comes to rest within `length` [m]."""
+def _max_end_speed(length: float, max_speed: float, acceleration: float, jerk: float) -> float:
+    """Return the largest speed [m/s], up to `max_speed`, from which the tool can stop within `length` [m]."""
 
-    def way(speed: float) -> float:
+    def stopping_distance(speed: float) -> float:
         ramp = speed / acceleration + acceleration / jerk
         return speed / 2 * (ramp if speed >= acceleration**2 / jerk else 2 * math.sqrt(speed / jerk))
 
-    low, high = 0.0, velocity
-    if way(high) <= length:
+    low, high = 0.0, max_speed
+    if stopping_distance(high) <= length:
         return high
     for _ in range(40):
         middle = (low + high) / 2
-        low, high = (middle, high) if way(middle) <= length else (low, middle)
+        low, high = (middle, high) if stopping_distance(middle) <= length else (low, middle)
     return low

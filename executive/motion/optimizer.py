@@ -1,9 +1,8 @@
-"""The fastest way from one state to another over what stands between.
+"""Trajectory optimization: the fastest motion between two states that avoids all obstacles.
 
-Sequential quadratic programming: linearize how near the last course comes to everything, let the program
-choose the shortest course near it, and again. The first course follows, as well as it can, a way that
-stops at every corner high above everything: so it is settled what is passed above and what beside, and
-every step leads from a slow way that is clear to a faster one.
+Sequential quadratic programming: each step linearizes the distances of the current course from the obstacles,
+and solves for the shortest course nearby. The first course approximates a slow motion without collision that
+stops at corners above the obstacles. This motion determines on which side a course passes each obstacle.
 """
 
 from __future__ import annotations
@@ -30,14 +29,14 @@ from executive.motion.transcription import (
 )
 
 MAX_DISTANCE = 0.03
-"""Distance up to which a state is part of the program [m]."""
+"""Largest slack of the positions and demands in a quadratic program [m]."""
 FIRST_TRUST, TRUST_DECAY = 0.3, 0.9
-"""Share of the limits by which accelerations change in the first step; from step to step it gets less."""
+"""Largest change of accelerations in the first step, as a share of their limits, and its factor per step."""
 FIRST_DURATION_SHARE = 0.8
-"""Share of the time of the way that stops at every corner which the first course takes."""
+"""Duration of the first course as a share of the duration of the motion that stops at corners."""
 LIMIT_MARGIN = 0.01
-"""Distance from the joints' position limits [rad]."""
-_DIFFERENCE = 1e-4  # [rad]
+"""Distance from the position limits of the joints [rad]."""
+_JOINT_DIFFERENCE = 1e-4  # [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +45,10 @@ class Problem:
 
     Attributes:
         start, end: The states.
-        connector: Joins states.
-        kinematics: The arm.
-        clearance: Distances to all obstacles.
-        discs: What hangs under the flange.
+        connector: Connects states within the joint limits.
+        kinematics: Kinematics of the arm.
+        clearance: Distances from the obstacles.
+        discs: Tool and load.
         payload: Acceleration limit due to the load, or None.
     """
 
@@ -62,43 +61,47 @@ class Problem:
     payload: PayloadLimit | None = None
 
     def slack(self, qs: Array) -> Array:
-        """Return by how much joint positions `(N, n)` keep their distance [m] and limits [rad] `(N,)`."""
+        """Return the smallest distance [m] or joint angle [rad] beyond the required one `(N,)`.
+
+        `qs` are joint positions `(N, n)` [rad]. The smaller of both numbers counts.
+        """
         tips, axes = self.kinematics.tips(qs)
-        return np.minimum(self.clearance.slack(tips, axes, self.discs), self._inside(qs).min(axis=1))
+        return np.minimum(self.clearance.slack(tips, axes, self.discs), self._range_slack(qs).min(axis=1))
 
     def slopes(self, qs: Array, slack: Array) -> Array:
-        """Return how the slack `(N,)` at joint positions `(N, n)` depends on each joint `(N, n)` [m/rad]."""
+        """Return the derivative `(N, n)` [m/rad] of the slack `(N,)` at joint positions `(N, n)` [rad]."""
         tips, axes = self.kinematics.tips(qs)
         count = qs.shape[1]
-        moved = self.kinematics.tips((qs[:, None] + _DIFFERENCE * np.eye(count)).reshape(-1, count))
-        shaped = moved[0].reshape(-1, count, 3), moved[1].reshape(-1, count, 3)
-        slopes = self.clearance.slopes(tips, axes, self.discs, shaped) / _DIFFERENCE
-        inside = self._inside(qs)
-        joint = np.argmin(inside, axis=1)
-        number = np.arange(len(qs))
-        limited = inside[number, joint] <= slack
-        slopes[limited] = 0.0
+        moved_qs = (qs[:, None] + _JOINT_DIFFERENCE * np.eye(count)).reshape(-1, count)
+        moved_tips, moved_axes = (values.reshape(-1, count, 3) for values in self.kinematics.tips(moved_qs))
+        changes = self.clearance.slopes(tips, axes, self.discs, (moved_tips, moved_axes))
+        slopes = changes / _JOINT_DIFFERENCE
+        range_slack = self._range_slack(qs)
+        row, joint = np.arange(len(qs)), np.argmin(range_slack, axis=1)
+        limited = range_slack[row, joint] <= slack
+        row, joint = row[limited], joint[limited]
         middle = (self.kinematics.joint_range.lower + self.kinematics.joint_range.upper) / 2
-        slopes[number[limited], joint[limited]] = -np.sign((qs - middle)[number[limited], joint[limited]])
+        slopes[row] = 0.0
+        slopes[row, joint] = -np.sign((qs - middle)[row, joint])
         return slopes
 
-    def _inside(self, qs: Array) -> Array:
+    def _range_slack(self, qs: Array) -> Array:
         return -self.kinematics.joint_range.shrink(LIMIT_MARGIN).excess(qs)
 
 
 class Optimizer:
-    """Searches the fastest motion between two states, a few steps at a time.
+    """Searches for the fastest motion between two states, a few steps at a time.
 
     Args:
-        problem: The states, and what limits a motion between them.
-        first: A motion between them `(M, n)` [rad] at the places that a course is looked at, however slow.
-        duration: Of that way [s].
+        problem: The optimization problem.
+        first: Joint positions `(M, n)` [rad] of a motion between the states, at the places of a course.
+        duration: Duration of this motion [s].
 
     Attributes:
-        cost: Duration of the best course so far, and what it is too near to something [s].
+        cost: Duration of the best course, and the cost of its violated distances [s].
 
     Raises:
-        NoProfile: No course is anywhere near that way.
+        NoProfile: No course approximates the first motion.
     """
 
     def __init__(self, problem: Problem, first: Array, duration: float) -> None:
@@ -106,10 +109,10 @@ class Optimizer:
         self._transcription = Transcription(problem.start, problem.end, problem.connector.limits)
         course = self._transcription.fit(FIRST_DURATION_SHARE * duration / STEP_COUNT, first)
         if course is None:
-            raise NoProfile("no motion follows the way that stops at every corner")
+            raise NoProfile("no course approximates the motion that stops at corners")
         self._best, self.cost, self._trust = course, np.inf, FIRST_TRUST
-        self._gentle: list[Demand] = []
-        self._look(course)
+        self._payload_demands: list[Demand] = []
+        self._evaluate(course)
 
     def improve(self, steps: int) -> None:
         """Take up to `steps` steps."""
@@ -117,48 +120,49 @@ class Optimizer:
             rows = np.nonzero(self._slack < MAX_DISTANCE)[0]
             slack = self._slack[rows]
             slopes = self._problem.slopes(self._last.qs[rows], slack)
-            clear = Demand(slack, rows[:, None], slopes[:, None], np.zeros(len(rows)))
-            course = self._transcription.shorten(self._last, [clear, *self._gentle], self._trust)
+            distances = Demand(slack, rows[:, None], slopes[:, None], np.zeros(len(rows)))
+            demands = [distances, *self._payload_demands]
+            course = self._transcription.shorten(self._last, demands, self._trust)
             if course is None:
                 return
             self._trust *= TRUST_DECAY
-            self._look(course)
+            self._evaluate(course)
 
-    def _look(self, course: JointCourse) -> None:
-        """Take `course` as the last one, and as the best one if it is."""
+    def _evaluate(self, course: JointCourse) -> None:
+        """Make `course` the last course, and the best course if its cost is lowest."""
         self._last, self._slack = course, self._problem.slack(course.qs)
-        lacks = [-float(self._slack.min())]
-        self._gentle = []
+        violations = [-float(self._slack.min())]
         if self._problem.payload is not None:
-            self._gentle = [
-                self._problem.payload.demand(course.qs, course.step / SAMPLES_PER_STEP, MAX_DISTANCE)
-            ]
-            lacks.append(-float(self._gentle[0].slack.min(initial=MAX_DISTANCE)))
-        cost = course.duration + VIOLATION_COST * max(0.0, *lacks)
+            time = course.step / SAMPLES_PER_STEP
+            demand = self._problem.payload.demand(course.qs, time, MAX_DISTANCE)
+            violations.append(-float(demand.slack.min(initial=MAX_DISTANCE)))
+            self._payload_demands = [demand]
+        cost = course.duration + VIOLATION_COST * max(0.0, *violations)
         if cost < self.cost:
             self._best, self.cost = course, cost
 
-    def fly(self, exactly: bool) -> tuple[PointToPoint, ...]:
-        """Return the best course as motions between states on it.
+    def connect_states(self, exactly: bool) -> tuple[PointToPoint, ...]:
+        """Return the best course as motions between its states.
 
-        `exactly`: between half steps, each as long as it takes on the course; else between whole steps, each
-        as long as it must, which is a little less, on a path that is a little different.
+        Args:
+            exactly: True to connect the states of all half steps within the times of the course; False to
+                connect the states of all steps as fast as possible, on a slightly different path.
 
         Raises:
-            NoProfile: It cannot be flown.
+            NoProfile: No motion connects two of the states.
         """
-        least = self._best.step / 2 if exactly else None
+        min_duration = self._best.step / 2 if exactly else None
         states = [
             _limit_velocity(state, self._problem.connector.limits)
             for state in self._transcription.states(self._best)[:: 1 if exactly else 2]
         ]
-        return tuple(self._problem.connector.connect(a, b, least) for a, b in pairwise(states))
+        return tuple(self._problem.connector.connect(a, b, min_duration) for a, b in pairwise(states))
 
 
 def _limit_velocity(state: JointState, limits: JointLimits) -> JointState:
-    """Return the nearest state that can be entered and left without exceeding a velocity limit.
+    """Return the nearest state through which a motion can pass without exceeding a velocity limit.
 
-    Whoever has an acceleration gains `a² / 2 j` before it is gone.
+    An acceleration `a` changes the velocity by `a² / 2 j` until it has fallen to 0.
     """
-    most = limits.velocity - state.qdd**2 / (2 * limits.jerk)
-    return state._replace(qd=np.clip(state.qd, -most, most))
+    max_velocity = limits.velocity - state.qdd**2 / (2 * limits.jerk)
+    return state._replace(qd=np.clip(state.qd, -max_velocity, max_velocity))

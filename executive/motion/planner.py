@@ -1,10 +1,9 @@
-"""Planning one motion per intent: from rest to rest, as fast as the limits allow, clear of everything.
+"""Motion planner: one motion from rest to rest, as fast as the limits allow, without collision.
 
-The arm has choices: its configuration and, for a round cup, the yaw of the tool at the goal, and the shape of
-the path between. The planner ranks the ends by the least time there can be, flies the direct
-way where nothing is in between and looks for the fastest detour where something is. What it finds is checked
-in a planning world before it counts. Its budget is a number of steps, never a time: the same question always
-gets the same answer.
+The planner chooses the configuration and, if the yaw of the goal is free, the yaw at the end. The planner
+prefers the direct motion, and optimizes a detour if an obstacle is in between. Each motion is checked,
+optionally in a more exact model. A number of steps, not a time, limits the search: equal queries have equal
+results.
 """
 
 from __future__ import annotations
@@ -31,23 +30,23 @@ from executive.motion.search import Search
 from executive.motion.trajectory import Trajectory, thin_out
 
 Check = Callable[[Array, Task], None]
-"""Takes joint positions along a path `(N, n)` [rad] and what it has to heed; raises Blocked."""
+"""Checks joint positions along a path `(N, n)` [rad] with load and obstacles of a task; raises Blocked."""
 
 MAX_CHECK_SPACING = math.radians(1.0)
-"""Largest joint move between the states whose clearance is checked [rad]."""
+"""Maximum joint motion between two states of a path that are checked for collisions [rad]."""
 
 
 class Planner:
     """Plans motions of the arm of a cell file.
 
     Args:
-        config: The cell file.
-        kinematics: Kinematics of its arm.
-        check: The last word on clearance; by default none beyond the search's own.
+        config: Content of the cell file.
+        kinematics: Kinematics of the arm.
+        check: Additional collision check of each motion, or None.
 
     Attributes:
         kinematics: Kinematics of the arm.
-        limits: Its joints'.
+        limits: Joint limits of the arm.
     """
 
     def __init__(self, config: CellConfig, kinematics: Kinematics, check: Check | None = None) -> None:
@@ -55,59 +54,60 @@ class Planner:
         self.kinematics = kinematics
         self._config = config
         self._check = check
-        self._height = travel_height(config)
 
     def plan(self, q_start: ArrayLike, goal: Goal | ArrayLike, task: Task = Task()) -> Trajectory:
         """Return the fastest motion found from rest at `q_start` `(n,)` [rad] to a goal or joint positions.
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.
-            Blocked: Every way tried comes too close to something; the text is the fastest one's.
+            Blocked: Each candidate comes too close to an obstacle; the text describes the first candidate.
         """
         start = np.asarray(q_start, dtype=float)
         end = goal if isinstance(goal, Goal) else np.asarray(goal, dtype=float)
         trajectory = self._plan(start, end, task)
-        return PayloadLimit(task.load, self.kinematics).gentle(trajectory) if task.load else trajectory
+        return PayloadLimit(task.load, self.kinematics).slow_down(trajectory) if task.load else trajectory
 
     def require_reachable(self, goal: Goal) -> None:
-        """Make sure that a goal and travel height above it can be reached from somewhere in one posture.
+        """Raise an error if no posture reaches both a goal and the travel height above the goal.
 
         Raises:
-            Unreachable: They cannot; the text says how far off it is.
+            Unreachable: No posture does; the text states the excess of the best posture.
         """
-        rise = max(0.0, self._height - goal.position[2])
+        rise = max(0.0, travel_height(self._config) - goal.position[2])
         find_postures(self.kinematics, goal, rise, np.zeros(self.limits.joint_count))
 
     def _plan(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
         search = Search(self._config, self.kinematics, self.limits, start, end, _task_of_free_part(task))
-        blocked: list[str] = []
-        for motion in search.candidates():
+        problems: list[str] = []
+        for motion in search.list_motions():
             try:
                 self._require_clear(motion, search, task)
             except (Blocked, Unreachable, NoProfile) as error:
-                blocked.append(str(error))
+                problems.append(str(error))
             else:
                 return motion
-        others = f"; of {len(blocked)} ways tried none is free" if len(blocked) > 1 else ""
-        raise Blocked(f"{blocked[0]}{others}" if blocked else "no way there can be flown")
+        if not problems:
+            raise Blocked("no motion inside the joint limits leads there")
+        others = f"; all {len(problems)} motions that were tried are blocked" if len(problems) > 1 else ""
+        raise Blocked(f"{problems[0]}{others}")
 
     def _require_clear(self, motion: Trajectory, search: Search, task: Task) -> None:
-        """Make sure that a motion keeps the joints' limits and its distances.
+        """Raise an error if a motion exceeds a joint limit or comes too near to an obstacle.
 
         Raises:
-            Blocked: It comes too near to something.
-            Unreachable, NoProfile: It leaves a joint's range, or exceeds another limit.
+            Blocked: The motion comes too near to an obstacle.
+            Unreachable, NoProfile: The motion exceeds the range or another limit of a joint.
         """
         qs = motion.check(self.limits).q
-        guarded = motion.guarded < math.inf
-        free = qs[: math.ceil(motion.guarded / STEP)] if guarded else qs
-        search.require_clear(free)
+        is_guarded = motion.guarded < math.inf
+        free_qs = qs[: math.ceil(motion.guarded / STEP)] if is_guarded else qs
+        search.require_clear(free_qs)
         if self._check is not None:
-            self._check(thin_out(free, MAX_CHECK_SPACING), _task_of_free_part(task))
-            if guarded:
-                self._check(thin_out(qs[len(free) - 1 :], MAX_CHECK_SPACING), task)
+            self._check(thin_out(free_qs, MAX_CHECK_SPACING), _task_of_free_part(task))
+            if is_guarded:
+                self._check(thin_out(qs[len(free_qs) - 1 :], MAX_CHECK_SPACING), task)
 
 
 def _task_of_free_part(task: Task) -> Task:
-    """Return the task of the free part of a motion: what is to be touched in the end stands around, too."""
+    """Return the task of the free part of a motion, in which the tool must not touch the target."""
     return task if task.target is None else replace(task, around=(*task.around, task.target), target=None)

@@ -1,4 +1,4 @@
-"""Plans that take their time on the run's clock, although they are made at once."""
+"""Plans that are computed at once, and known after the planning time on the clock of the run."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from executive.events import Emit, MotionPlanned
 from executive.geometry import Array
 
 M = TypeVar("M", bound=Motion)
-"""The kind of motion that an arm follows."""
+"""Type of the motions of an arm."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan(Generic[M]):
-    """A motion being planned; implements `executive.cell.arm.Planning`.
+    """A motion in planning; implements `executive.cell.arm.Planning`.
 
     Attributes:
-        due: When it is known [s].
+        clock: Clock of the run.
+        due: Time at which the outcome is known [s].
+        outcome: The motion, or the error of the planner.
     """
 
     clock: Clock
@@ -30,7 +32,7 @@ class Plan(Generic[M]):
 
     @property
     def ready(self) -> bool:
-        """True from the tick at which it is known, on the run's clock."""
+        """True from the control step at the time `due`."""
         return self.clock.now >= self.due - self.clock.step / 2
 
     def result(self) -> M:
@@ -38,7 +40,7 @@ class Plan(Generic[M]):
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.
-            Blocked: Every way comes too close to something.
+            Blocked: Every path comes too close to an obstacle.
         """
         if isinstance(self.outcome, Exception):
             raise self.outcome
@@ -46,13 +48,13 @@ class Plan(Generic[M]):
 
 
 class Plans(Generic[M]):
-    """Makes plans, one ahead at a time, and tells the run how long each was waited for.
+    """Makes the plans of an arm, at most one of them ahead, and emits an event for each requested plan.
 
     Args:
-        solve: Plans a motion from where an arm rests `(N,)`; raises Unreachable and Blocked.
-        clock: The run's.
-        latency: Time that a plan takes on it [s].
-        emit: Tells the run what happens.
+        solve: Plans a motion from joint positions at rest `(n,)` [rad]; raises Unreachable and Blocked.
+        clock: Clock of the run.
+        latency: Time for planning a motion on the clock of the run [s].
+        emit: Emits an event.
     """
 
     def __init__(
@@ -62,26 +64,26 @@ class Plans(Generic[M]):
         self._clock = clock
         self._latency = latency
         self._emit = emit
-        self._ahead: tuple[bytes, Goal | str, Task] | None = None
-        self._plan: Plan[M] | None = None
+        self._query_ahead: tuple[bytes, Goal | str, Task] | None = None
+        self._plan_ahead: Plan[M] | None = None
 
-    def ahead(self, start: Array, goal: Goal | str, task: Task) -> None:
-        """Plan a motion from `start` `(N,)` for whoever asks the same question next."""
-        question = start.tobytes(), goal, task
-        if question != self._ahead:
-            self._ahead, self._plan = question, self._made(start, goal, task)
+    def plan_ahead(self, start: Array, goal: Goal | str, task: Task) -> None:
+        """Plan a motion from `start` `(n,)` [rad] before the motion is requested."""
+        query = start.tobytes(), goal, task
+        if query != self._query_ahead:
+            self._query_ahead, self._plan_ahead = query, self._plan(start, goal, task)
 
-    def now(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
-        """Return the plan of a motion from `start` `(N,)`, begun now unless it was planned ahead."""
-        found = self._plan if (start.tobytes(), goal, task) == self._ahead else None
-        plan = found or self._made(start, goal, task)
-        self._ahead = self._plan = None
+    def plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
+        """Return the plan of a motion from `start` `(n,)` [rad], which may have been planned ahead."""
+        ahead = self._plan_ahead if (start.tobytes(), goal, task) == self._query_ahead else None
+        plan = ahead or self._plan(start, goal, task)
+        self._query_ahead = self._plan_ahead = None
         duration = 0.0 if isinstance(plan.outcome, Exception) else plan.outcome.duration
-        waits = max(0.0, plan.due - self._clock.now)
-        self._emit(MotionPlanned(found is not None, round(waits, 4), round(duration, 4)))
+        wait_time = max(0.0, plan.due - self._clock.now)
+        self._emit(MotionPlanned(ahead is not None, round(wait_time, 4), round(duration, 4)))
         return plan
 
-    def _made(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
+    def _plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
         outcome: M | Unreachable | Blocked
         try:
             outcome = self._solve(start, goal, task)

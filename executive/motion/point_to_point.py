@@ -1,12 +1,10 @@
-"""Time-optimal, jerk-limited motion of all joints from one state to another, by ruckig.
+"""Time-optimal, jerk-limited motion of all joints between two states, by ruckig.
 
-Every joint has a profile of its own; the slowest one decides how long it takes, and the others take as
-long. The path between the two states is what results from that, and has to be checked by whoever uses it.
+Each joint has its own profile. The slowest joint determines the duration, and the other joints take as long.
+The path between the states is a result: the caller must check its positions.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError
@@ -17,11 +15,11 @@ from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.state import JointState
 
-_ROUNDING = 1e-9  # share of a limit
+_ROUNDING_ERROR = 1e-9  # share of a limit
 
 
 class NoProfile(ValueError):
-    """There is no motion inside the limits that begins and ends in the given states."""
+    """No motion inside the limits connects the given states."""
 
 
 class PointToPoint:
@@ -37,12 +35,11 @@ class PointToPoint:
 
     def over(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
-        states = np.array([self._profile.at_time(s) for s in times.tolist()])
-        return JointState(states[:, 0], states[:, 1], states[:, 2])
+        return JointState(*np.array([self._profile.at_time(s) for s in times.tolist()]).swapaxes(0, 1))
 
 
 class Connector:
-    """Finds the fastest motions between states inside the joints' limits of velocity, acceleration, jerk."""
+    """Finds the fastest motions between states within the limits of joint velocity, acceleration and jerk."""
 
     def __init__(self, limits: JointLimits) -> None:
         self.limits = limits
@@ -52,54 +49,54 @@ class Connector:
         self._input.max_acceleration = limits.acceleration.tolist()
         self._input.max_jerk = limits.jerk.tolist()
 
-    def connect(self, start: JointState, end: JointState, least: float | None = None) -> PointToPoint:
-        """Return the fastest motion from `start` to `end` that takes `least` [s] or longer.
+    def connect(self, start: JointState, end: JointState, min_duration: float | None = None) -> PointToPoint:
+        """Return the fastest motion from `start` to `end` that takes at least `min_duration` [s].
 
-        Positions are not limited: ruckig does not look at that.
+        The joint positions on the way are not limited.
 
         Raises:
-            NoProfile: There is none, for instance because a velocity is outside the limits.
-            Fault: A state has not one finite number for each joint: ruckig would read out of bounds or crash.
+            NoProfile: There is no such motion, for instance because a velocity is outside the limits.
+            Fault: A state lacks a finite number for each joint; ruckig would read out of bounds or crash.
         """
         count = self.limits.joint_count
         for values in (*start, *end):
-            if values.shape != (count,) or not math.isfinite(float(values.sum())):
+            if values.shape != (count,) or not np.isfinite(values.sum()):
                 raise Fault(f"a motion needs states of {count} finite numbers, not {values}")
-        inputs = self._input
+        inputs, profile = self._input, Profile(count)
         inputs.current_position, inputs.current_velocity, inputs.current_acceleration = (
             values.tolist() for values in start
         )
         inputs.target_position, inputs.target_velocity, inputs.target_acceleration = (
             values.tolist() for values in end
         )
-        inputs.minimum_duration = least
-        profile = Profile(count)
+        inputs.minimum_duration = min_duration
+        problem: object = None
         try:
             result = self._ruckig.calculate(inputs, profile)
         except (RuckigError, ValueError) as error:
-            raise NoProfile(_text(start, end, error)) from error
-        if result not in (Result.Working, Result.Finished):
-            raise NoProfile(_text(start, end, result))
-        if np.any(_fastest(profile) > (1 + _ROUNDING) * self.limits.velocity):
-            raise NoProfile(_text(start, end, "the one it found exceeds a velocity limit"))
+            problem = error
+        else:
+            if result not in (Result.Working, Result.Finished):
+                problem = result
+            elif np.any(_max_speeds(profile) > (1 + _ROUNDING_ERROR) * self.limits.velocity):
+                problem = "its profile exceeds a velocity limit"
+        if problem is not None:
+            states = f"from {start.q.round(4)} to {end.q.round(4)} rad"
+            raise NoProfile(f"ruckig finds no profile {states}: {problem}")
         return PointToPoint(profile)
 
 
-def _fastest(profile: Profile) -> Array:
-    """Return the largest speed of every joint `(n,)` [rad/s].
+def _max_speeds(profile: Profile) -> Array:
+    """Return the largest speed of each joint `(n,)` [rad/s].
 
-    Where an acceleration changes sign within a phase, ruckig does not always look.
+    ruckig does not always check the speed at which an acceleration changes its sign within a phase.
     """
-    fastest = []
+    speeds = []
     for joint in profile.profiles[0]:
-        turns = [
+        extrema = [
             v - a * a / (2 * j)
-            for v, a, after, j in zip(joint.v, joint.a, joint.a[1:], joint.j, strict=False)
-            if a * after < 0
+            for v, a, next_a, j in zip(joint.v, joint.a, joint.a[1:], joint.j, strict=False)
+            if a * next_a < 0
         ]
-        fastest.append(max(map(abs, [*joint.v, *turns])))
-    return np.array(fastest)
-
-
-def _text(start: JointState, end: JointState, why: object) -> str:
-    return f"ruckig finds no profile from {start.q.round(4)} to {end.q.round(4)} rad: {why}"
+        speeds.append(max(map(abs, [*joint.v, *extrema])))
+    return np.array(speeds)

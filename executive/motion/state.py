@@ -1,4 +1,4 @@
-"""Where the joints are and how they move, at one moment of a motion."""
+"""Motion state of the joints, and the protocol of a piece of a motion."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ class JointState(NamedTuple):
 
     @staticmethod
     def rest(q: Array) -> JointState:
-        """Return the state of standing still at `q` `(n,)` [rad]."""
+        """Return the state of rest at `q` `(n,)` [rad]."""
         return JointState(q, np.zeros(len(q)), np.zeros(len(q)))
 
 
 class Piece(Protocol):
-    """A part of a motion, from its time 0 to its duration."""
+    """A piece of a motion, from time 0 to its duration."""
 
     @property
     def duration(self) -> float:
-        """Time it takes [s]."""
+        """Duration [s]."""
 
     def at(self, s: float) -> JointState:
         """Return the state at time `s`, 0 to `duration` [s]."""

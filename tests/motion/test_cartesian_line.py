@@ -41,7 +41,7 @@ def descents(draw: st.DrawFn) -> Descent:
 @given(descents(), st.booleans())
 @settings(max_examples=20)
 def test_the_tool_goes_straight_down_inside_all_limits(descent: Descent, enters: bool) -> None:
-    line = CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, enters=enters)
+    line = CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, starts_in_motion=enters)
     states = passed(line)
     tips, axes = ARM.tips(states.q)
     assert np.max(np.linalg.norm(tips[:, :2] - tips[-1, :2], axis=1)) < 1e-4
@@ -63,7 +63,9 @@ def test_the_tool_goes_straight_down_inside_all_limits(descent: Descent, enters:
 @given(descents())
 @settings(max_examples=20)
 def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Descent) -> None:
-    states = passed(CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, enters=True))
+    states = passed(
+        CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, starts_in_motion=True)
+    )
     middle = slice(1, -2)  # the last sample is not a whole step after the one before
     measured = (states.q[2:-1] - states.q[:-3]) / (2 * SOONER)
     assert np.allclose(measured, states.qd[middle], atol=1e-4)
@@ -74,10 +76,10 @@ def test_velocity_and_acceleration_are_the_derivatives_of_the_way(descent: Desce
 @given(descents())
 @settings(max_examples=20)
 def test_leaving_it_is_the_same_way_mirrored_in_time(descent: Descent) -> None:
-    down = CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, enters=True)
-    up = CartesianLine(descent.chain[::-1], descent.length, LIMITS, descent.speed, leaves=True)
+    down = CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, starts_in_motion=True)
+    up = CartesianLine(descent.chain[::-1], descent.length, LIMITS, descent.speed, ends_in_motion=True)
     assert up.duration == pytest.approx(down.duration, abs=1e-6)
-    gentle = CartesianLine(descent.chain[::-1], descent.length, LIMITS, acceleration=0.5, leaves=True)
+    gentle = CartesianLine(descent.chain[::-1], descent.length, LIMITS, acceleration=0.5, ends_in_motion=True)
     assert gentle.acceleration == 0.5 < up.acceleration
     heights = ARM.tips(passed(gentle).q)[0][:-1, 2]
     # The spline through four places advances up to 5 % faster than its parameter.

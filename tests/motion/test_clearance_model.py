@@ -104,7 +104,7 @@ def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) ->
     # Its end is here, so that the workspace beside does not count.
     found = slack(ClearanceModel(config, (), tip[None, :2]), tip, discs=discs)
     if nearest > 0:
-        spare = TILT_DISTANCE * (1 - discs.upright)
+        spare = TILT_DISTANCE * (1 - discs.min_cosine)
         assert found == pytest.approx(
             min(nearest - (config.motion.margin + SAMPLING_MARGIN), spare), abs=5e-4
         )
@@ -122,7 +122,7 @@ def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: 
     wide = 0.02 + 0.015 + POSITION_TOLERANCE
     assert np.allclose(washer.offset, [0.006, 0.0, -NECK_LENGTH]), "its underside, its top, the tool above it"
     assert np.allclose(washer.radius, [wide, wide, TOOL_RADIUS])
-    assert washer.upright > empty.upright
+    assert washer.min_cosine > empty.min_cosine
 
 
 @given(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.01, 0.06))
@@ -134,7 +134,9 @@ def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, 
     if away > OBSERVED_RADIUS + pile_height(config):
         assert slack(ClearanceModel(config, (), end), tip, discs=discs) < 0
     elif away < OBSERVED_RADIUS - 1e-9:
-        wanted = min(tip[2] - (config.motion.margin + SAMPLING_MARGIN), TILT_DISTANCE * (1 - discs.upright))
+        wanted = min(
+            tip[2] - (config.motion.margin + SAMPLING_MARGIN), TILT_DISTANCE * (1 - discs.min_cosine)
+        )
         assert slack(ClearanceModel(config, (), end), tip, discs=discs) == pytest.approx(wanted, abs=1e-9)
 
 
@@ -178,7 +180,7 @@ def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> 
                 require(tip)
     with pytest.raises(Blocked, match="too near to the table, with"):
         require((-0.6, 0.0, -0.01))
-    with pytest.raises(Blocked, match="too near to what may lie on the workspace, with"):
+    with pytest.raises(Blocked, match="too near to the space for undetected objects, with"):
         require((0.5, 0.0, 0.05))
     with pytest.raises(Blocked, match="too near to yellow_bin, with"):
         require((0.49, 0.308, 0.05))

@@ -67,7 +67,7 @@ def test_it_is_clear_and_much_faster_than_the_way_that_stops_at_every_corner(ove
     optimizer = improved(problem, corners)
     stopping = sum(piece.duration for piece in corners)
     for exactly in (False, True):
-        flown = Trajectory(optimizer.fly(exactly))
+        flown = Trajectory(optimizer.connect_states(exactly))
         assert direct.duration < flown.duration < 0.8 * stopping
         assert not exactly or flown.duration == pytest.approx(optimizer.cost, abs=0.01)
         qs = flown.check(LIMITS).q
@@ -80,7 +80,7 @@ def test_it_is_clear_and_much_faster_than_the_way_that_stops_at_every_corner(ove
 def test_no_detour_follows_a_way_in_no_time(over_the_post) -> None:
     problem, corners = over_the_post()
     first = sample_pieces(corners, SAMPLE_SHARES * sum(piece.duration for piece in corners)).q
-    with pytest.raises(NoProfile, match="no motion follows the way that stops at every corner"):
+    with pytest.raises(NoProfile, match="no course approximates the motion that stops at corners"):
         Optimizer(problem, first, 0.1)
 
 

@@ -167,7 +167,7 @@ def test_when_all_ways_are_blocked_the_error_is_the_first_ones_and_counts(config
     with pytest.raises(Blocked) as caught:
         build_planner(config, check).plan(home, pick(0.5, 0.0))
     assert 5 < len(asked) < 40
-    assert str(caught.value) == f"way 1 is too near; of {len(asked)} ways tried none is free"
+    assert str(caught.value) == f"way 1 is too near; all {len(asked)} motions that were tried are blocked"
 
 
 def pull(planner: Planner, motion: Trajectory, kind: ObjectClass) -> float:

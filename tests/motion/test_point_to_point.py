@@ -56,8 +56,8 @@ def test_a_profile_that_is_too_fast_between_its_phases_counts_for_none() -> None
         for values, value in zip(state, third, strict=True):
             values[2] = value
     assert max(peaks(passed(CONNECTOR.connect(*ends)), LIMITS)) <= 1 + 1e-6
-    with pytest.raises(NoProfile, match="the one it found exceeds a velocity limit"):
-        CONNECTOR.connect(*ends, least=0.16881258)
+    with pytest.raises(NoProfile, match="its profile exceeds a velocity limit"):
+        CONNECTOR.connect(*ends, min_duration=0.16881258)
 
 
 @pytest.mark.parametrize("values", [np.full(7, math.nan), np.array([math.inf, *[0.0] * 6]), np.zeros(6)])

@@ -40,15 +40,15 @@ def test_pieces_that_do_not_meet_are_a_fault(field: str, off: str) -> None:
 
 
 def test_a_motion_that_does_not_begin_or_end_at_rest_is_a_fault() -> None:
-    with pytest.raises(Fault, match="rest and how a trajectory begins do not fit together: their qd"):
+    with pytest.raises(Fault, match="rest and the start of a trajectory do not fit together: their qd"):
         Trajectory([CONNECTOR.connect(MOVING, JointState.rest(B))])
-    with pytest.raises(Fault, match="rest and how a trajectory ends do not fit together: their qd"):
+    with pytest.raises(Fault, match="rest and the end of a trajectory do not fit together: their qd"):
         Trajectory([CONNECTOR.connect(JointState.rest(A), MOVING)])
 
 
 @pytest.mark.parametrize("s", [math.nan, math.inf, -math.inf])
 def test_a_time_that_would_crash_ruckig_is_a_fault(s: float) -> None:
-    with pytest.raises(Fault, match=rf"asked for the time {s}; its times are 0 to \d\.\d\d\d s"):
+    with pytest.raises(Fault, match=rf"has no state at the time {s}; its times are 0 to \d\.\d\d\d s"):
         by_way_of().at(s)
 
 
@@ -57,11 +57,11 @@ def test_a_time_that_would_crash_ruckig_is_a_fault(s: float) -> None:
 def test_slowed_it_takes_the_same_path_in_more_time(between: JointState, rate: float) -> None:
     """The chain rule: velocities are multiplied by the rate, accelerations by its square."""
     trajectory = by_way_of(between)
-    slow = trajectory.slowed(rate)
+    slow = trajectory.slow_down(rate)
     assert slow.duration == pytest.approx(trajectory.duration / rate)
     assert np.array_equal(slow.start, trajectory.start)
     assert np.allclose(slow.end, trajectory.end, atol=1e-9)
-    assert Trajectory(trajectory._pieces, 0.2).slowed(rate).guarded == pytest.approx(0.2 / rate)
+    assert Trajectory(trajectory._pieces, 0.2).slow_down(rate).guarded == pytest.approx(0.2 / rate)
     assert slow.guarded == math.inf
     for s in np.linspace(0, trajectory.duration, 13):
         fast = trajectory.at(s)

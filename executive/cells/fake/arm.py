@@ -113,11 +113,11 @@ class FakeArm:
         The result raises Unreachable for a goal beyond `MAX_REACH` from the base, and Blocked if the tool tip
         or the load would enter the table or a bin, even on the guarded part, as with the simulated arm.
         """
-        return self._plans.now(self.destination, goal, task)
+        return self._plans.plan(self.destination, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
         """Plan a motion from the end of the running motion, before `plan` is called for it."""
-        self._plans.ahead(self.destination, goal, task)
+        self._plans.plan_ahead(self.destination, goal, task)
 
     def start(self, motion: Motion) -> None:
         """Begin to follow a motion.

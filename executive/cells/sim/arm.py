@@ -128,7 +128,7 @@ class SimArm:
         """
         self._require_rest("plan a motion")
         self._require_pose(goal)
-        return self._plans.now(self._command, goal, task)
+        return self._plans.plan(self._command, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
         """Plan a motion, from where the running one will end, before anybody asks for it.
@@ -138,7 +138,7 @@ class SimArm:
         """
         self._require_pose(goal)
         if self._braking is None:  # else nobody knows yet where it will end
-            self._plans.ahead(self._goal, goal, task)
+            self._plans.plan_ahead(self._goal, goal, task)
 
     def start(self, motion: Motion) -> None:
         """Begin to follow `motion`; the arm must be at rest where it starts.
