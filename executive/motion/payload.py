@@ -75,7 +75,7 @@ class PayloadLimit:
         rows = np.arange(POSITION_STRIDE - 1, len(qs) - 1, POSITION_STRIDE)[:, None] + np.array([-1, 0, 1])
         centres = self._load_centres(qs)
         acceleration = _SECOND_DIFFERENCE @ centres[rows] / time**2
-        pull = acceleration + (0.0, 0.0, GRAVITY)
+        pull = acceleration + np.array([0.0, 0.0, GRAVITY])
         strength = np.linalg.norm(pull, axis=1)
         slack = DISTANCE_PER_ACCELERATION * (self._max_pull - strength)
         chosen = np.nonzero(slack < max_slack)[0]
