@@ -57,9 +57,10 @@ def test_without_a_name_all_skills_are_checked_and_mistakes_have_exit_code_1() -
     lines = [line for line in result.stdout.splitlines() if not line.startswith("ok")]
     assert lines[:3] == [
         "failed   Nap.defaults_allowed: Nap.gap has the default 0.3, which is more than 0.2. "
-        "Mend the default, or its limits. (and 1 more)",
-        'failed   Dream.arranged: Dream cannot be tried: no value can be made up for "story" (a text). '
-        'Give it in a test: conformance(Dream, lambda stage: {"story": ...}), as skills/README.md shows.',
+        "Correct the default, or the limits. (and 1 more)",
+        'failed   Dream.arranged: Dream cannot be tried: no value can be generated for "story" (a text). '
+        'Return it from a function in a test: conformance(Dream, lambda stage: {"story": ...}), '
+        "as skills/README.md shows.",
         "not run  Dream.comes_to_an_end",
     ]
     not_run = len(lines) - 3
@@ -75,6 +76,6 @@ def test_as_json_all_checks_are_one_array() -> None:
     assert {verdict["skill"] for verdict in told} == {"Nap"}
     (failed,) = (verdict for verdict in told if verdict["status"] != "ok")
     assert (failed["check"], failed["status"]) == ("defaults_allowed", "failed")
-    assert failed["doc"].startswith("Every default is one that a mission could give")
+    assert failed["doc"].startswith("Each default is a value that a mission may give")
     assert len(failed["problems"]) == 2
     assert result.exit_code == 1

@@ -14,7 +14,7 @@ from executive.testing.conformance.skill_runs import SkillRuns
 from executive.testing.conformance.stage import Stage
 
 Rule = Callable[[SkillRuns], Iterator[str]]
-"""Yields what is wrong with a skill: what happened, where, what to do. Its docstring states the rule."""
+"""Yields the violations by a skill, with place and correction. The docstring states the rule."""
 
 RULES: tuple[Rule, ...] = tuple(
     rule
@@ -22,10 +22,10 @@ RULES: tuple[Rule, ...] = tuple(
     for name, rule in vars(module).items()
     if inspect.isfunction(rule) and rule.__module__ == module.__name__ and not name.startswith("_")
 )
-"""The public functions of the two modules, in the order in which they stand there."""
+"""The public functions of `declarations` and `conduct`, in the order of their definition."""
 
 
-class NotConforming(AssertionError):
+class ConformanceError(AssertionError):
     """A skill violates a rule; the text names the rule, the place and the correction."""
 
 
@@ -50,7 +50,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Check:
-    """One rule applied to one skill; a call raises `NotConforming` if the skill violates the rule.
+    """One rule applied to one skill; a call raises `ConformanceError` if the skill violates the rule.
 
     Attributes:
         skill_runs: The runs of the skill.
@@ -77,19 +77,20 @@ class Check:
         """Apply the rule to the skill and return the result."""
         try:
             problems = tuple(self.rule(self.skill_runs))
+            status = "failed" if problems else "ok"
         except NotTried as problem:
-            return Verdict(self.skill_runs.name, self.name, self.doc, "not run", (str(problem),))
-        return Verdict(self.skill_runs.name, self.name, self.doc, "failed" if problems else "ok", problems)
+            problems, status = (str(problem),), "not run"
+        return Verdict(self.skill_runs.name, self.name, self.doc, status, problems)
 
     def __call__(self) -> None:
         """Run the check.
 
         Raises:
-            NotConforming: The skill violates the rule, or cannot be tried.
+            ConformanceError: The skill violates the rule, or cannot be tried.
         """
         verdict = self.run()
         if verdict.problems:
-            raise NotConforming("\n".join((f"{self.doc} Violated:", *verdict.problems)))
+            raise ConformanceError("\n".join((f"{self.doc} Violated:", *verdict.problems)))
 
 
 def leave_as_is(stage: Stage) -> Mapping[str, Any]:

@@ -1,4 +1,4 @@
-"""Checks of a skill's declarations and source text; nothing is run."""
+"""Checks of a skill's declarations and source text, without a run."""
 
 from __future__ import annotations
 
@@ -12,22 +12,23 @@ from executive.testing.conformance import source
 from executive.testing.conformance.skill_runs import SkillRuns
 
 RESOURCES = ("arm", "tool", "camera")
-FOREIGN = (
+FORBIDDEN_PACKAGES = (
     "py_trees", "pybullet", "ruckig", "threading", "multiprocessing", "concurrent", "subprocess", "time",
     "asyncio",
 )  # fmt: skip
-"""Packages that no skill may import: it runs on the tick thread, on the run's clock, on any cell."""
+"""Packages that no skill may import: skills run in the tick thread, with the run's clock, on any cell."""
 HALT = "halt"
+"""Key of `tool_left` for a halt."""
 
 
 def documented(runs: SkillRuns) -> Iterator[str]:
-    """The docstring of the class begins with a sentence, and every param and port says what it is."""
+    """The docstring of the class begins with a sentence, and each param and port has a `doc`."""
     doc = vars(runs.skill).get("__doc__") or ""
     summary = inspect.cleandoc(doc).partition("\n")[0]
     if not summary.endswith("."):
         yield (
             f'the docstring of {runs.name} begins with "{summary}", which is no sentence. '
-            "Say in its first line what is true when the skill has succeeded."
+            "State in the first line what is true after success."
         )
     declarations: dict[str, Param | Port] = {**runs.skill.params, **runs.skill.ports}
     for name, declared in declarations.items():
@@ -37,32 +38,30 @@ def documented(runs: SkillRuns) -> Iterator[str]:
 
 
 def defaults_allowed(runs: SkillRuns) -> Iterator[str]:
-    """Every default is one that a mission could give: of the type, inside the bounds, among the choices."""
+    """Each default is a value that a mission may give: of the type, inside the bounds, among the choices."""
     for param in runs.skill.params.values():
-        if not param.required and (problem := _default_fault(param)):
-            yield (
-                f"{runs.name}.{param.name} has the default {param.default!r}{problem}. "
-                "Mend the default, or its limits."
-            )
+        if not param.required and (problem := _default_problem(param)):
+            default = f"{runs.name}.{param.name} has the default {param.default!r}"
+            yield f"{default}{problem}. Correct the default, or the limits."
 
 
 def reasons_declared(runs: SkillRuns) -> Iterator[str]:
-    """Its reasons are a tuple, and none is raised that is not declared."""
+    """The reasons are a tuple, and the code fails only with declared reasons."""
     reasons = runs.skill.reasons
     if isinstance(reasons, str):
         yield f'{runs.name}.reasons is the text "{reasons}". Write a tuple: ("{reasons}",).'
         return
-    for written in source.functions_reached(runs.skill):
-        for reason, node in _raised(written.tree):
+    for function in source.walk_functions(runs.skill):
+        for reason, node in _find_reasons(function.tree):
             if reason not in reasons:
                 yield (
-                    f'{written.place(node)} fails with "{reason}", which {runs.name} does not declare. '
+                    f'{function.locate(node)} fails with "{reason}", which {runs.name} does not declare. '
                     f"Add it to reasons; there are: {', '.join(reasons) or 'none'}."
                 )
 
 
 def resources_declared(runs: SkillRuns) -> Iterator[str]:
-    """It uses arm, tool and camera, the arm if it moves, and says how the tool is left by its own reasons."""
+    """`uses` has only arm, tool and camera, and the arm with `moves`; `tool_left` has only own reasons."""
     skill, name = runs.skill, runs.name
     unknown = [repr(skill.uses)] if isinstance(skill.uses, str) else sorted(set(skill.uses) - set(RESOURCES))
     if unknown:
@@ -72,38 +71,36 @@ def resources_declared(runs: SkillRuns) -> Iterator[str]:
     known = (*skill.reasons, HALT)
     for ending in skill.tool_left:
         if ending not in known:
-            yield f'{name}.tool_left has "{ending}", which is no ending of it. There are: {", ".join(known)}.'
+            allowed = ", ".join(known)
+            yield f'{name}.tool_left has "{ending}", which is no reason of the skill. Allowed: {allowed}.'
 
 
 def imports_allowed(runs: SkillRuns) -> Iterator[str]:
-    """Its file imports nothing that has another clock, other threads, or one sort of cell only."""
-    for path in filter(lambda path: path.is_file(), source.files_of(runs.skill)):
+    """The file imports no package with another clock, other threads, or one kind of cell only."""
+    for path in filter(lambda path: path.is_file(), source.find_files(runs.skill)):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            for package in FOREIGN:
-                if package in _imported(node):
+            for package in _find_imports(node):
+                if package in FORBIDDEN_PACKAGES:
                     yield (
                         f"{path.name}:{getattr(node, 'lineno', 0)} imports {package}. "
-                        "A skill waits on cell.clock and acts through cell alone; find there what it needs."
+                        "A skill takes the time from cell.clock and acts only through cell."
                     )
 
 
 def calls_take_effect(runs: SkillRuns) -> Iterator[str]:
-    """No call is without effect: steps are yielded from, and failures are raised."""
-    for written in source.functions_reached(runs.skill):
-        for call in _dropped(written):
-            callee, text = written.called(call), f"{ast.unparse(call.func)}(...)"
-            where = written.place(call)
-            if source.returns_steps(callee):
-                yield (
-                    f"{where} calls {text} and makes none of its steps, so it does nothing. "
-                    f'Write "yield from {text}".'
-                )
-            elif source.returns_failure(callee):
-                yield f'{where} calls {text} and does not raise it, so nothing fails. Write "raise {text}".'
+    """Each call takes effect: generators are run by `yield from`, and failures are raised."""
+    for function in source.walk_functions(runs.skill):
+        for call in _find_dropped_calls(function):
+            callee, text = function.resolve_callee(call), f"{ast.unparse(call.func)}(...)"
+            where = function.locate(call)
+            if source.is_returning_steps(callee):
+                yield f'{where} calls {text} without running its steps. Write "yield from {text}".'
+            elif source.is_returning_failure(callee):
+                yield f'{where} calls {text} without raising the failure. Write "raise {text}".'
 
 
-def _default_fault(param: Param) -> str:
-    """Return what is wrong with a default, to follow its value, or ""."""
+def _default_problem(param: Param) -> str:
+    """Return the problem with a default, as a continuation of its value, or ""."""
     try:
         value = convert(param.default, param.type)
     except (WrongType, TypeError) as problem:
@@ -115,14 +112,14 @@ def _default_fault(param: Param) -> str:
         return f", which is less than {param.ge!r}"
     if number is not None and param.le is not None and number > param.le:
         return f", which is more than {param.le!r}"
-    # Where a param names something of the cell, its choices are further words.
+    # If a param names a part of the cell, its choices are additional values.
     if param.choices is not None and not param.refers and value not in param.choices:
         return f", which is not among {', '.join(map(repr, param.choices))}"
     return ""
 
 
-def _raised(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
-    """Yield every reason that stands in a function as `self.failed("reason", ...)`."""
+def _find_reasons(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
+    """Yield each reason and call `self.failed("reason", ...)` in a function."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("self.failed", "skill.failed"):
             reason = node.args[0] if node.args else None
@@ -130,8 +127,8 @@ def _raised(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
                 yield reason.value, node
 
 
-def _imported(node: ast.AST) -> Sequence[str]:
-    """Return the outermost packages that a statement imports."""
+def _find_imports(node: ast.AST) -> Sequence[str]:
+    """Return the top-level packages that a statement imports."""
     if isinstance(node, ast.Import):
         return [alias.name.partition(".")[0] for alias in node.names]
     if isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -139,12 +136,12 @@ def _imported(node: ast.AST) -> Sequence[str]:
     return []
 
 
-def _dropped(written: source.Written) -> Iterator[ast.Call]:
-    """Yield the calls in a function of which the value is not used."""
-    nodes = list(ast.walk(written.tree))
+def _find_dropped_calls(function: source.FunctionSource) -> Iterator[ast.Call]:
+    """Yield the calls in a function whose value is not used."""
+    nodes = list(ast.walk(function.tree))
     read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
-    # The value that `run` returns is dropped if it is a generator; of another function its caller may use it.
-    is_run = written.function.__name__ == "run" and inspect.isgeneratorfunction(written.function)
+    # The return value of a generator `run` is dropped; callers may use that of other functions.
+    is_run = function.function.__name__ == "run" and inspect.isgeneratorfunction(function.function)
     for node in nodes:
         if isinstance(node, ast.Expr) or (is_run and isinstance(node, ast.Return)):
             is_dropped = True

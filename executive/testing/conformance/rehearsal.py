@@ -1,4 +1,4 @@
-"""One run of a skill in a situation, to its end or until it is halted, with everything noted."""
+"""One recorded run of a skill in a situation, to its end or to a halt."""
 
 from __future__ import annotations
 
@@ -21,18 +21,17 @@ from executive.errors import Fault
 from executive.events import NodeStarted, TimedEvent
 from executive.skill import Skill, SkillFailed
 from executive.testing.conformance.faults import NamedFault
-from executive.testing.conformance.situations import Arrange, Situation, begin
-from executive.testing.conformance.source import place_in
+from executive.testing.conformance.situations import Arrange, Situation, prepare
+from executive.testing.conformance.source import find_own_line
 from executive.testing.faults import FaultyCell, during
 from executive.tree.skill_run import SkillRun
 
 MAX_TIME = 60.0
-"""Time on the run's clock after which a skill must have ended [s]: nothing takes so long on a fake table."""
+"""Maximum duration of a skill on the run's clock [s]; longer than any skill needs on the fake table."""
 STUCK_TIMEOUT = 10.0
-"""Time by the wall clock after which a skill that gets no further is stuck [s]."""
-
-LOOKS = 2
-"""Number of looks in this time: a machine that slept has let one pass at most."""
+"""Wall time without progress after which a tick counts as stuck [s]."""
+PROGRESS_CHECKS = 2
+"""Number of checks of the progress in this time; the sleep of a machine can delay only one."""
 _ROLES = ("arm", "tool", "camera", "detector", "ledger", "localizer", "operator")
 
 
@@ -41,7 +40,7 @@ class Call:
     """A call of a part of the cell.
 
     Attributes:
-        tick: Control step in which it was made.
+        tick: Control step of the call.
         name: Part and method, for instance `arm.start`.
         arguments: Arguments of the call.
     """
@@ -52,7 +51,7 @@ class Call:
 
 
 class SkillRehearsal:
-    """One run of a skill, driven as the tree would.
+    """One run of a skill, driven as by the tree.
 
     Args:
         skill: Class of the skill.
@@ -62,20 +61,20 @@ class SkillRehearsal:
         halt_at: Control step before which the skill is halted; None for a run to its end.
 
     Attributes:
-        where: The situation and the fault, for a sentence.
-        status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` if it did not end, `STUCK` if a tick did not come
-            back, or `FAULT`.
+        where: Situation and fault, as the beginning of a sentence.
+        status: `SUCCESS`, `FAILURE`, `HALTED`, `RUNNING` without an end, `STUCK` if a tick did not return,
+            or `FAULT`.
         reason: Reason of a failure.
-        message: Sentence of a failure or fault, or where a tick got stuck.
-        ticks: Control steps it took, that of its end left out.
-        outputs: Its outputs after success.
-        calls: Every call it made of the cell.
-        durations: Computing time of every tick, by the wall clock [s].
-        changed: Names of the params and inputs that are no longer what they were.
-        held: The tool held something when it began.
-        holds: The tool holds something at the end.
-        is_known: The ledger believes an item in the tool at the end.
-        at_rest: The arm has nothing left to do at the end.
+        message: Message of a failure or fault, or the place of a stuck tick.
+        ticks: Number of control steps before that of the end.
+        outputs: Outputs after success.
+        calls: All calls of the cell.
+        durations: Wall time of each tick [s].
+        changed: Names of the changed params and inputs.
+        held: True if the tool held an object at the start.
+        holds: True if the tool holds an object at the end.
+        is_known: True if the ledger believes an item in the tool at the end.
+        at_rest: True if the arm is at rest at the end.
     """
 
     def __init__(
@@ -86,7 +85,7 @@ class SkillRehearsal:
         fault: NamedFault | None = None,
         halt_at: int | None = None,
     ) -> None:
-        stage, values = begin(skill, situation, arrange)
+        stage, values = prepare(skill, situation, arrange)
         fake = stage.cell
         before = values if halt_at else copy.deepcopy(values, {id(fake): fake})
         script = [during("*", fault.effect)] * fault.times if fault else []
@@ -97,11 +96,11 @@ class SkillRehearsal:
         self.outputs: Mapping[str, Any] = {}
         self.calls, self.durations = list[Call](), list[float]()
         self.held = fake.tool.holding
-        watched = intercept(cell.cell, self._watch, _ROLES)
+        observed_cell = intercept(cell.cell, self._note_call, _ROLES)
         try:
-            with patience(skill, lambda: self.ticks):
-                self.status = self._act(values, cell, watched, fault.tick if fault else 0)
-        except Stuck as stuck:
+            with stuck_detection(skill, lambda: self.ticks):
+                self.status = self._execute(values, cell, observed_cell, fault.tick if fault else 0)
+        except TickStuck as stuck:
             self.status, self.message = "STUCK", str(stuck)
         self.changed = [name for name in values if not is_same(values[name], before[name])]
         self.holds, self.is_known = fake.tool.holding, fake.ledger.find_held_item() is not None
@@ -109,27 +108,29 @@ class SkillRehearsal:
 
     @property
     def end(self) -> str:
-        """Place and kind of its end, as a part of a sentence."""
-        words = {
+        """Situation and kind of the end, as a part of a sentence."""
+        ends = {
             "SUCCESS": "it succeeded",
             "FAILURE": f'it failed with "{self.reason}" ({self.message})',
             "HALTED": f"it was halted at tick {self.ticks}",
             "RUNNING": "it was not over",
         }
-        return f"{self.where} {words.get(self.status, f'it ended as a fault: {self.message}')}"
+        return f"{self.where} {ends.get(self.status, f'it ended as a fault: {self.message}')}"
 
     @property
     def has_moved(self) -> bool:
-        """True if it started the arm."""
+        """True if the skill started the arm."""
         return any(call.name == "arm.start" for call in self.calls)
 
-    def _watch(self, access: Access) -> Any:
+    def _note_call(self, access: Access) -> Any:
         if access.is_call and access.role in _ROLES:
             self.calls.append(Call(self.ticks, access.name, access.all_arguments))
         return access.proceed()
 
-    def _act(self, values: Mapping[str, Any], cell: FaultyCell, watched: Cell, fault_tick: int) -> str:
-        """Run the skill and return its status at the end."""
+    def _execute(
+        self, values: Mapping[str, Any], cell: FaultyCell, observed_cell: Cell, fault_tick: int
+    ) -> str:
+        """Run the skill and return the status at the end."""
         skill = self._skill
         run: SkillRun | None = None
         try:
@@ -139,10 +140,10 @@ class SkillRehearsal:
                     return "HALTED"
                 if self.ticks == fault_tick:
                     cell.hear(TimedEvent(0, 0.0, NodeStarted("skill")))
-                began = perf_counter()
-                run = run or SkillRun(skill(**values), watched)
+                start = perf_counter()
+                run = run or SkillRun(skill(**values), observed_cell)
                 has_succeeded = run.step()
-                self.durations.append(perf_counter() - began)
+                self.durations.append(perf_counter() - start)
                 if has_succeeded:
                     self.outputs = run.read_outputs()
                     return "SUCCESS"
@@ -153,54 +154,56 @@ class SkillRehearsal:
             return "FAILURE"
         except Exception as error:
             frames = extract_tb(error.__traceback__)
-            place = place_in(skill, ((frame.filename, frame.lineno or 0) for frame in reversed(frames)))
+            place = find_own_line(skill, ((frame.filename, frame.lineno or 0) for frame in reversed(frames)))
             kind = "" if isinstance(error, Fault) else f"{type(error).__name__}: "
             self.message = f"{kind}{error}" + (f" ({place})" if place else "")
             return "FAULT"
         return "RUNNING"
 
 
-class Stuck(BaseException):
-    """A skill did not come back; the text, to follow its name, says for how long and where.
+class TickStuck(BaseException):
+    """A tick did not return; the message continues the name of the skill with duration and place.
 
-    It is no Exception, so that a skill that catches those is broken off like any other.
+    The class is no subclass of Exception: a skill that catches exceptions is interrupted, too.
     """
 
 
 @contextmanager
-def patience(skill: type[Skill], progress: Callable[[], object]) -> Iterator[None]:
-    """Break off what is done inside as soon as `progress` returns the same for `STUCK_TIMEOUT`.
+def stuck_detection(skill: type[Skill], progress: Callable[[], object]) -> Iterator[None]:
+    """Interrupt the body if `progress` returns the same value during `STUCK_TIMEOUT`.
 
-    Python hands signals to its main thread alone: in another one nothing is broken off.
+    Only the main thread is interrupted, because Python handles signals only there.
 
     Raises:
-        Stuck: It was broken off.
+        TickStuck: The body was interrupted.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    last, looks = progress(), 0
+    last, unchanged_checks = progress(), 0
 
-    def look(_: int, frame: FrameType | None) -> None:
-        nonlocal last, looks
+    def check(_: int, frame: FrameType | None) -> None:
+        nonlocal last, unchanged_checks
         now = progress()
-        looks, last = (looks + 1 if now == last else 0), now
-        if looks >= LOOKS:
-            where = place_in(skill, ((f.f_code.co_filename, line) for f, line in walk_stack(frame)))
-            raise Stuck(f"did not come back for {STUCK_TIMEOUT:g} s{where and f', at {where}'}")
+        unchanged_checks, last = (unchanged_checks + 1 if now == last else 0), now
+        if unchanged_checks >= PROGRESS_CHECKS:
+            where = find_own_line(skill, ((f.f_code.co_filename, line) for f, line in walk_stack(frame)))
+            raise TickStuck(f"did not return for {STUCK_TIMEOUT:g} s{where and f', at {where}'}")
 
-    answered = signal.signal(signal.SIGALRM, look)
-    before = signal.setitimer(signal.ITIMER_REAL, STUCK_TIMEOUT / LOOKS, STUCK_TIMEOUT / LOOKS)
+    old_handler = signal.signal(signal.SIGALRM, check)
+    old_timer = signal.setitimer(
+        signal.ITIMER_REAL, STUCK_TIMEOUT / PROGRESS_CHECKS, STUCK_TIMEOUT / PROGRESS_CHECKS
+    )
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, *before)
-        signal.signal(signal.SIGALRM, answered or signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, *old_timer)
+        signal.signal(signal.SIGALRM, old_handler or signal.SIG_DFL)
 
 
-def is_same(one: Any, other: Any) -> bool:
-    """Return True if two values are equal part by part; values that cannot be taken apart count as equal."""
+def is_same(value: Any, other: Any) -> bool:
+    """Return True if two values have equal pickles; values that cannot be pickled count as equal."""
     try:
-        return pickle.dumps(one) == pickle.dumps(other)
+        return pickle.dumps(value) == pickle.dumps(other)
     except (pickle.PicklingError, TypeError, AttributeError):
         return True

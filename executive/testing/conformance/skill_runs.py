@@ -1,4 +1,4 @@
-"""The runs of one skill that its conformance checks share; each run is made only once."""
+"""Runs of one skill that its conformance checks share; each run is executed only once."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from functools import cached_property
 import numpy as np
 
 from executive.skill import Skill
-from executive.testing.conformance.faults import NamedFault, faults_of
+from executive.testing.conformance.faults import NamedFault, list_skill_faults
 from executive.testing.conformance.rehearsal import SkillRehearsal
-from executive.testing.conformance.situations import Arrange, NotTried, Situation, situations
+from executive.testing.conformance.situations import Arrange, NotTried, Situation, list_situations
 
 MAX_HALTS = 40
 """Maximum number of evenly spaced halts of a run, and, counted separately, of halts around its calls."""
 
 
-class GotStuck(NotTried):
-    """A tick of a skill did not return, so that the skill is not run again; the text says where."""
+class TickNotReturned(NotTried):
+    """A tick of a skill did not return; the skill is not run again."""
 
 
 class SkillRuns:
@@ -35,34 +35,34 @@ class SkillRuns:
 
     @cached_property
     def situations(self) -> list[Situation]:
-        """Every situation in which the skill is tried; raises NotArranged."""
-        return list(situations(self.skill, self._arrange))
+        """All situations in which the skill is tried; raises NotArranged."""
+        return list(list_situations(self.skill, self._arrange))
 
     @cached_property
     def repeated_runs(self) -> list[tuple[Situation, SkillRehearsal, SkillRehearsal]]:
-        """Two runs to the end in every situation, without a fault."""
+        """Two runs to the end in each situation, without a fault."""
         return [(situation, self._run(situation), self._run(situation)) for situation in self.situations]
 
     @cached_property
     def complete_runs(self) -> list[SkillRehearsal]:
-        """Runs to the end: in every situation one without a fault, and one under each fault."""
+        """Runs to the end: in each situation one without a fault, and one under each fault."""
         plain = [first for _, first, _ in self.repeated_runs]
         return plain + [
             self._run(situation, fault)
             for situation, first, _ in self.repeated_runs
             # If the undisturbed run does not end, a run under a fault will not end either.
             if first.status != "RUNNING"
-            for fault in faults_of(self.skill, first.ticks, holding=first.held)
+            for fault in list_skill_faults(self.skill, first.ticks, holding=first.held)
         ]
 
     @cached_property
     def halted_runs(self) -> list[SkillRehearsal]:
-        """Halted runs: in every situation one for each tick that `_halt_ticks` returns."""
+        """Halted runs: in each situation one for each tick that `_choose_halt_ticks` returns."""
         return [
             self._run(situation, halt_at=tick)
             for situation, first, _ in self.repeated_runs
             if first.status != "RUNNING"
-            for tick in _halt_ticks(first)
+            for tick in _choose_halt_ticks(first)
         ]
 
     def _run(
@@ -71,10 +71,10 @@ class SkillRuns:
         """Run the skill once.
 
         Raises:
-            GotStuck: A tick did not return, in this run or in an earlier one.
+            TickNotReturned: A tick did not return, in this run or in an earlier one.
         """
         if self._stuck:
-            raise GotStuck(self._stuck)
+            raise TickNotReturned(self._stuck)
         rehearsal = SkillRehearsal(self.skill, situation, self._arrange, fault, halt_at)
         if rehearsal.status == "STUCK":
             halted = ", halted there," if rehearsal.ticks == halt_at else ""
@@ -83,15 +83,15 @@ class SkillRuns:
                 "A tick blocks the arm: yield in each loop that waits, "
                 "and leave long computations to a detector."
             )
-            raise GotStuck(self._stuck)
+            raise TickNotReturned(self._stuck)
         if fault is not None or halt_at is not None:
-            # The arguments of calls may be large: frames are among them.
+            # Arguments of calls may be large, such as frames.
             rehearsal.calls = [replace(call, arguments=()) for call in rehearsal.calls]
         return rehearsal
 
 
-def _halt_ticks(rehearsal: SkillRehearsal) -> list[int]:
-    """Return the ticks at which to halt a run: evenly spaced ones, and those of calls and after calls."""
+def _choose_halt_ticks(rehearsal: SkillRehearsal) -> list[int]:
+    """Return the ticks at which to halt: evenly spaced ones, and those of and after calls."""
     evenly_spaced = np.linspace(1, rehearsal.ticks, min(rehearsal.ticks, MAX_HALTS), dtype=int).tolist()
     call_ticks = sorted({call.tick + offset for call in rehearsal.calls for offset in (0, 1)})
     return sorted(tick for tick in {*evenly_spaced, *call_ticks[:MAX_HALTS]} if 1 <= tick <= rehearsal.ticks)

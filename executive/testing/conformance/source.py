@@ -1,4 +1,4 @@
-"""The functions of which a skill is made, as syntax trees, and the functions that they call."""
+"""Syntax trees of the functions of a skill, and of the functions that they call."""
 
 from __future__ import annotations
 
@@ -14,104 +14,106 @@ from typing import Any, get_origin, get_type_hints
 from executive.cell.protocols import Cell, Clock
 from executive.skill import Skill, SkillFailed
 
-_CUSTOMARY: Mapping[str, Any] = {"cell": Cell, "clock": Clock, "skill": Skill}
-"""Types of the arguments and local names that every skill calls so."""
+_CONVENTIONAL_TYPES: Mapping[str, Any] = {"cell": Cell, "clock": Clock, "skill": Skill}
+"""Types of arguments and local variables with these names."""
 
 
 @dataclass(frozen=True)
-class Written:
-    """A function as it stands in its file.
+class FunctionSource:
+    """A function and its syntax tree.
 
     Attributes:
         function: The function.
         tree: Its syntax tree, with the file's line numbers.
-        skill: The skill that it belongs to, or that calls it.
+        skill: The skill that has or calls the function.
     """
 
     function: FunctionType
     tree: ast.AST
     skill: type[Skill]
 
-    def place(self, node: ast.expr | ast.stmt) -> str:
-        """Return where a part of it stands: `wave.py:12`."""
+    def locate(self, node: ast.expr | ast.stmt) -> str:
+        """Return file and line of a node of the tree: `wave.py:12`."""
         return f"{Path(self.function.__code__.co_filename).name}:{node.lineno}"
 
-    def called(self, call: ast.Call) -> Any:
-        """Return the function or class that is called, or None where only a run would show it."""
-        return self._meaning(call.func)
+    def resolve_callee(self, call: ast.Call) -> Any:
+        """Return the called function or class, or None if it is known only during a run."""
+        return self._resolve(call.func)
 
-    def _meaning(self, node: ast.expr) -> Any:
-        """Return the value of an expression, or its class where only that is known."""
+    def _resolve(self, node: ast.expr) -> Any:
+        """Return the value of an expression, or only its class, or None."""
         if isinstance(node, ast.Attribute):
-            return _member(self._meaning(node.value), node.attr)
+            return _find_member(self._resolve(node.value), node.attr)
         if not isinstance(node, ast.Name):
             return None
         if node.id == "self":
             return self.skill
         code = self.function.__code__
         if node.id in (*code.co_varnames, *code.co_cellvars):
-            return _CUSTOMARY.get(node.id)
+            return _CONVENTIONAL_TYPES.get(node.id)
         return self.function.__globals__.get(node.id)
 
 
-def own_functions(skill: type[Skill]) -> list[FunctionType]:
-    """Return the functions of a skill's class and of the skills from which it derives, its own first."""
+def list_functions(skill: type[Skill]) -> list[FunctionType]:
+    """Return the functions of a skill's class, followed by those of its base skills."""
     parents = [parent for parent in skill.__mro__ if issubclass(parent, Skill) and parent is not Skill]
     members = [member for parent in parents for member in vars(parent).values()]
     plain = [getattr(member, "__func__", member) for member in members]
     return [member for member in plain if isinstance(member, FunctionType)]
 
 
-def files_of(skill: type[Skill]) -> list[Path]:
-    """Return the files in which a skill is written, its own first."""
-    return [*dict.fromkeys(Path(function.__code__.co_filename) for function in own_functions(skill))]
+def find_files(skill: type[Skill]) -> list[Path]:
+    """Return the files with the code of a skill and of its base skills, in this order."""
+    return [*dict.fromkeys(Path(function.__code__.co_filename) for function in list_functions(skill))]
 
 
-def place_in(skill: type[Skill], frames: Iterable[tuple[str, int]]) -> str:
-    """Return the first of some files and lines that is in the skill's own files, as `wave.py:12`, or ""."""
-    files = set(map(str, files_of(skill)))
+def find_own_line(skill: type[Skill], frames: Iterable[tuple[str, int]]) -> str:
+    """Return the first of the `(file, line)` in the skill's own files, as `wave.py:12`, or ""."""
+    files = set(map(str, find_files(skill)))
     return next((f"{Path(file).name}:{line}" for file, line in frames if file in files), "")
 
 
-def functions_reached(skill: type[Skill]) -> Iterator[Written]:
-    """Yield the functions of a skill's class, and those of its author's package that they call by name."""
+def walk_functions(skill: type[Skill]) -> Iterator[FunctionSource]:
+    """Yield the functions of a skill's class, and the called functions of the same package."""
     package = skill.__module__.partition(".")[0]
-    waiting, seen = own_functions(skill), set[FunctionType]()
+    waiting, seen = list_functions(skill), set[FunctionType]()
     while waiting:
         function = waiting.pop(0)
-        if function in seen or (tree := _tree_of(function)) is None:
+        if function in seen or (tree := _parse(function)) is None:
             continue
         seen.add(function)
-        written = Written(function, tree, skill)
-        yield written
-        callees = [written.called(node) for node in ast.walk(tree) if isinstance(node, ast.Call)]
+        function_source = FunctionSource(function, tree, skill)
+        yield function_source
+        callees = [
+            function_source.resolve_callee(node) for node in ast.walk(tree) if isinstance(node, ast.Call)
+        ]
         functions = [callee for callee in callees if isinstance(callee, FunctionType)]
         waiting += [callee for callee in functions if callee.__module__.partition(".")[0] == package]
 
 
-def returns_steps(callee: Any) -> bool:
-    """Return True if a call of this returns steps that nobody has taken yet."""
-    returned = _returned(callee)
+def is_returning_steps(callee: Any) -> bool:
+    """Return True if a call returns an iterator of steps."""
+    returned = _find_return_type(callee)
     return inspect.isgeneratorfunction(callee) or (get_origin(returned) or returned) in (Iterator, Generator)
 
 
-def returns_failure(callee: Any) -> bool:
-    """Return True if a call of this returns a failure that nobody has raised yet."""
-    return callee is SkillFailed or _returned(callee) is SkillFailed
+def is_returning_failure(callee: Any) -> bool:
+    """Return True if a call returns a SkillFailed."""
+    return SkillFailed in (callee, _find_return_type(callee))
 
 
-def _returned(callee: Any) -> Any:
-    """Return the declared type of what a function returns, or None."""
+def _find_return_type(callee: Any) -> Any:
+    """Return the declared return type of a function, or None."""
     if not isinstance(callee, FunctionType):
         return None
     try:
         return get_type_hints(callee).get("return")
     except (NameError, AttributeError, TypeError):
-        return None  # A type that is imported for type checkers alone is not known.
+        return None  # The type is imported only for type checkers.
 
 
-def _member(owner: Any, name: str) -> Any:
-    """Return a member of a module or class; of an attribute of an instance its class."""
+def _find_member(owner: Any, name: str) -> Any:
+    """Return a member of a module or class, or the declared type of an attribute, or None."""
     if owner is None:
         return None
     if isinstance(owner, type) and not issubclass(owner, Skill) and name in get_type_hints(owner):
@@ -120,8 +122,8 @@ def _member(owner: Any, name: str) -> Any:
     return member.__func__ if isinstance(member, staticmethod | classmethod) else member
 
 
-def _tree_of(function: FunctionType) -> ast.AST | None:
-    """Return the tree of a function that begins with `def`, or None."""
+def _parse(function: FunctionType) -> ast.AST | None:
+    """Return the syntax tree of a function, or None without source text."""
     try:
         lines, first = inspect.getsourcelines(function)
         tree = ast.parse(textwrap.dedent("".join(lines)))

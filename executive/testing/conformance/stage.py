@@ -1,4 +1,4 @@
-"""A fake cell with objects on its table, or one in its tool, for a skill to work on."""
+"""Stage of a skill: a fake cell with objects on the table, and perhaps one in the tool."""
 
 from __future__ import annotations
 
@@ -12,19 +12,18 @@ from executive.cell.objects import Item, Target
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import ROUTES, FakeCell, SilentOperator, bare_table
 from executive.geometry import tool_down
-from executive.skill import HOLDING, Direction, Skill
+from executive.skill import HOLDING, Direction, Port, Skill
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A fake cell of which one look has been taken.
+    """A fake cell after one look.
 
     Attributes:
-        cell: The cell: one object of every class in a row on its table, an operator who wants one of each.
-        detections: Result of the look: everything but the object in the tool.
+        cell: Cell with one object of each class in a row on the table, and an operator who requests each.
+        detections: Result of the look, without the object in the tool.
         targets: One target per detection.
-        item: The item that the skill is about: that in the tool if the skill needs one there, else the first
-            target's.
+        item: Item in the tool if the skill requires one there, else the item of the first target.
     """
 
     cell: FakeCell
@@ -36,12 +35,12 @@ class Stage:
 def set_up(skill: type[Skill], *, holding: bool) -> Stage:
     """Return a stage for a skill.
 
-    The cup rests on the first target if the skill works on a target with the tool but without the arm:
-    another skill has brought it there.
+    The cup is on the first target if the skill needs a target and the tool but not the arm, as after another
+    skill.
 
     Args:
-        skill: The skill that is to act on it.
-        holding: The tool holds an object, and the ledger knows; else it is empty.
+        skill: The skill.
+        holding: True if the tool holds an object that the ledger knows; False if the tool is empty.
     """
     fake = FakeCell(options=CellOptions(SilentOperator(list(ROUTES)), base=Path()))
     table, labels = bare_table().table, list(fake.cell.classes)
@@ -64,7 +63,7 @@ def set_up(skill: type[Skill], *, holding: bool) -> Stage:
 
 
 def look(fake: FakeCell) -> tuple[Detections, list[Target]]:
-    """Return what the first detector sees on the table, and where the ledger takes everything to be."""
+    """Return the detections of the first detector on the table, and the targets of the ledger."""
     camera, view = fake.camera, "table"
     frame = camera.capture()
     request = next(iter(fake.cell.detectors.values())).request(frame, view)
@@ -75,5 +74,10 @@ def look(fake: FakeCell) -> tuple[Detections, list[Target]]:
 
 
 def _works_on_target(skill: type[Skill]) -> bool:
-    inputs = [port.type for port in skill.ports.values() if port.direction is Direction.IN]
-    return "tool" in skill.uses and "arm" not in skill.uses and Target in inputs
+    input_types = [port.type for port in list_inputs(skill)]
+    return "tool" in skill.uses and "arm" not in skill.uses and Target in input_types
+
+
+def list_inputs(skill: type[Skill]) -> list[Port]:
+    """Return the input ports of a skill."""
+    return [port for port in skill.ports.values() if port.direction is Direction.IN]

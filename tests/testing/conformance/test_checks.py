@@ -14,40 +14,34 @@ import pytest
 from executive.plugins import discover
 from executive.skill import Skill
 from executive.testing.conformance import conformance
-from executive.testing.conformance.check import RULES, Check, NotConforming
+from executive.testing.conformance.check import RULES, Check, ConformanceError
 
 ARRANGE = "as skills/README.md shows."
-FAULT = " That is a fault, which ends the run: fail with a declared reason where this can happen, or mend it."
-FINALLY = "What finally does must be done at once and cannot fail."
+FAULT = " That is a fault, which ends the run: fail with a declared reason, or correct the code."
+FINALLY = "The code in finally must take no control step and raise no exception."
 REST = "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
-CHANCE = "Nothing may depend on chance, on time, or on an earlier run; a seed may be a param."
-TOOL = "Leave the tool as declared, or declare how it is left."
+CHANCE = "The skill may not depend on chance, wall time or earlier runs; a seed may be a param."
+TOOL = "Leave the tool in this state, or change the declaration."
 EMPTY = "with an empty tool"
 
 
 def unmade(text: str) -> str:
-    return (
-        f"faulty_skills.py:N calls {text}(...) and makes none of its steps, so it does nothing. "
-        f'Write "yield from {text}(...)".'
-    )
+    return f'faulty_skills.py:N calls {text}(...) without running its steps. Write "yield from {text}(...)".'
 
 
 def unraised(text: str) -> str:
-    return (
-        f"faulty_skills.py:N calls {text}(...) and does not raise it, so nothing fails. "
-        f'Write "raise {text}(...)".'
-    )
+    return f'faulty_skills.py:N calls {text}(...) without raising the failure. Write "raise {text}(...)".'
 
 
 FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ("documented", faulty.Undocumented, [
-        'the docstring of Undocumented begins with "", which is no sentence. Say in its first line what is '
-        "true when the skill has succeeded.",
+        'the docstring of Undocumented begins with "", which is no sentence. State in the first line what is '
+        "true after success.",
         'Undocumented.gap has no doc. Write param(..., doc="what it is").',
         'Undocumented.target has no doc. Write port(..., doc="what it is").',
     ]),
     ("defaults_allowed", faulty.BadDefaults, [
-        f"BadDefaults.{problem}. Mend the default, or its limits." for problem in (
+        f"BadDefaults.{problem}. Correct the default, or the limits." for problem in (
             "near has the default 0.1, which is less than 0.2",
             "far has the default 0.3, which is more than 0.2",
             "order has the default 'rows', which is not among 'columns', 'none'",
@@ -67,7 +61,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ("resources_declared", faulty.BadResources, [
         "BadResources uses gripper. Write a tuple of arm, tool, camera.",
         'BadResources moves the arm but does not use it. Add "arm" to uses, or leave moves out.',
-        'BadResources.tool_left has "dropped", which is no ending of it. There are: tired, halt.',
+        'BadResources.tool_left has "dropped", which is no reason of the skill. Allowed: tired, halt.',
     ]),
     ("calls_take_effect", faulty.StepsNotTaken, [
         unmade("follow"), unmade("follow"), unmade("cell.clock.sleep"), unmade("self._rest"), unmade("_wait"),
@@ -75,23 +69,24 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ]),
     ("arranged", faulty.AlwaysFails, [
         f'AlwaysFails never succeeded; {EMPTY} it failed with "tired" (after 1 step). Arrange a stage on '
-        f"which it can: conformance(AlwaysFails, lambda stage: ...), {ARRANGE}",
+        f"which it succeeds: conformance(AlwaysFails, lambda stage: ...), {ARRANGE}",
     ]),
     ("arranged", faulty.Shake, [
         'Shake never succeeded; with an item in the tool it failed with "blocked" (the motion would bring '
         "the held cube 0.030 m into the table, with the tool at (0.530, -0.110, 0.020) m). Arrange a stage "
-        f"on which it can: conformance(Shake, lambda stage: ...), {ARRANGE}",
+        f"on which it succeeds: conformance(Shake, lambda stage: ...), {ARRANGE}",
     ]),
     ("arranged", faulty.NeedsUnknown, [
-        'NeedsUnknown cannot be tried: no value can be made up for "plan" (dict) and "words" (a text). Give '
-        f'it in a test: conformance(NeedsUnknown, lambda stage: {{"plan": ..., "words": ...}}), {ARRANGE}',
+        'NeedsUnknown cannot be tried: no value can be generated for "plan" (dict) and "words" (a text). '
+        f'Return it from a function in a test: '
+        f'conformance(NeedsUnknown, lambda stage: {{"plan": ..., "words": ...}}), {ARRANGE}',
     ]),
     ("comes_to_an_end", faulty.WaitsForEver, [
-        f"{EMPTY} WaitsForEver was not over after 60 s. Whatever it waits for may never come: wait for so "
-        "long at most, then fail with a reason.",
+        f"{EMPTY} WaitsForEver was not over after 60 s. Limit the duration of each wait, and fail with "
+        "a reason afterwards.",
     ]),
     ("ends_as_declared", faulty.TrustsTheDetector, [
-        f"{EMPTY} while everything on the table is gone at tick 12 IndexError: tuple index out of range "
+        f"{EMPTY} while the table is empty at tick 12 IndexError: tuple index out of range "
         f"(faulty_skills.py:N).{FAULT}",
         f"{EMPTY} while the arm hides the table at tick 12 IndexError: tuple index out of range "
         f"(faulty_skills.py:N).{FAULT}",
@@ -101,38 +96,39 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f"(faulty_skills.py:N).{FAULT}",
     ]),
     ("ends_as_declared", faulty.FailsWithoutSentence, [
-        'with an item in the tool at tick 1 it failed with "tired" and no sentence. '
-        "Say what happened, with the numbers: it is all that the operator will read.",
+        'with an item in the tool at tick 1 it failed with "tired" and no message. '
+        "Write what happened, with numbers: the operator reads only this message.",
     ]),
     ("outputs_fit", faulty.WrongOutputs, [
         f"{EMPTY} WrongOutputs.chosen is of the type int, not a text. "
-        "Set what it declares, or declare what it is.",
+        "Set a value of this type, or change the declaration.",
         f"{EMPTY} WrongOutputs.targets is of the type list, not a list of Target. "
-        "Set what it declares, or declare what it is.",
+        "Set a value of this type, or change the declaration.",
     ]),
     ("inputs_unchanged", faulty.ChangesInput, [
-        f"{EMPTY} it changed what self.targets holds. Others read the same value after it: work on a copy.",
+        f"{EMPTY} it changed the value of self.targets. Other nodes read the same value later: "
+        "work on a copy.",
     ]),
     ("uses_only_what_it_declares", faulty.UsesUndeclared, [
-        'UsesUndeclared calls cell.camera.capture and does not use the camera. Add "camera" to uses.',
-        "UsesUndeclared calls cell.camera.capture and does not say that it senses. Add senses = True.",
-        "UsesUndeclared calls cell.operator.ask and does not say that it senses. Add senses = True.",
-        'UsesUndeclared calls cell.arm.stop and does not use the arm. Add "arm" to uses.',
+        'UsesUndeclared calls cell.camera.capture and does not declare the camera. Add "camera" to uses.',
+        "UsesUndeclared calls cell.camera.capture and does not declare that it senses. Add senses = True.",
+        "UsesUndeclared calls cell.operator.ask and does not declare that it senses. Add senses = True.",
+        'UsesUndeclared calls cell.arm.stop and does not declare the arm. Add "arm" to uses.',
     ]),
     ("uses_only_what_it_declares", faulty.MovesUndeclared, [
-        "MovesUndeclared calls cell.arm.start and does not say that it moves. Add moves = True.",
+        "MovesUndeclared calls cell.arm.start and does not declare that it moves. Add moves = True.",
     ]),
     ("tool_left_as_declared", faulty.LetsGo, [
-        "with an item in the tool it succeeded, and the tool is empty. It should hold something: tool_state "
-        f"says so. {TOOL}",
+        "with an item in the tool it succeeded, and the tool is empty. It should hold something, by "
+        f"tool_state. {TOOL}",
     ]),
     ("tool_left_as_declared", faulty.GraspsInSecret, [
-        f"{EMPTY} it succeeded, and the tool holds an object that the ledger does not know of. "
-        "Tell it by cell.ledger.record_grasp, or open the tool in finally.",
+        f"{EMPTY} it succeeded, and the tool holds an object that the ledger does not know. "
+        "Call cell.ledger.record_grasp, or open the tool in finally.",
     ]),
     ("tool_left_as_declared", faulty.HoldsOnWhenHalted, [
-        f"{EMPTY} it was halted at tick 1, and the tool holds something. It should be empty: as before, for "
-        f'tool_left says nothing of "halt". {TOOL}',
+        f"{EMPTY} it was halted at tick 1, and the tool holds something. It should be empty, as before, "
+        f'because tool_left has no "halt". {TOOL}',
     ]),
     ("arm_left_at_rest", faulty.RunsOnWhenHalted, [
         f"{EMPTY} it was halted at tick 25, and the arm still moves. {REST}",
@@ -141,17 +137,18 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f"{EMPTY} at tick 1 it yielded while it was halted; \"finally\" must not contain a yield. {FINALLY}",
     ]),
     ("repeats_itself", faulty.DependsOnChance, [
-        f"{EMPTY}, twice the same, it set its outputs to different values. {CHANCE}",
+        f"{EMPTY}, in two equal runs, it set its outputs to different values. {CHANCE}",
     ]),
     ("repeats_itself", faulty.CallsByChance, [
-        f"{EMPTY}, twice the same, it called camera.area at tick 1 with different arguments. {CHANCE}",
+        f"{EMPTY}, in two equal runs, it called camera.area at tick 1 with different arguments. {CHANCE}",
     ]),
     ("repeats_itself", faulty.WaitsByChance, [
-        f"{EMPTY}, twice the same, it ended as SUCCESS after 1 ticks and then as SUCCESS after 0. {CHANCE}",
+        f"{EMPTY}, in two equal runs, it ended as SUCCESS after 1 ticks and then as SUCCESS after 0. "
+        f"{CHANCE}",
     ]),
     ("ticks_are_quick", faulty.ComputesTooLong, [
-        "with an item in the tool it computed for N ms in tick 1, which holds up the arm. "
-        "Spread the work over ticks by yield, or let a detector do it.",
+        "with an item in the tool it computed for N ms in tick 1, which blocks the arm. "
+        "Distribute the work over ticks by yield, or leave it to a detector.",
     ]),
 ]  # fmt: skip
 """Check, skill, and the first problems that the check tells of it."""
@@ -222,20 +219,19 @@ def test_a_file_that_imports_another_clock_or_threads_is_found(statement: str, t
         del sys.modules[path.stem]
     package = statement.split()[1].partition(".")[0]
     assert check_of(module.Wave, "imports_allowed").run().problems == (
-        f"waving.py:2 imports {package}. A skill waits on cell.clock and acts through cell alone; "
-        "find there what it needs.",
+        f"waving.py:2 imports {package}. A skill takes the time from cell.clock and acts only through cell.",
     )
 
 
 def test_a_problem_is_raised_with_the_rule_and_without_a_stage_nothing_succeeds() -> None:
-    with pytest.raises(NotConforming) as raised:
+    with pytest.raises(ConformanceError) as raised:
         check_of(faulty.AlwaysFails, "arranged")()
     assert str(raised.value).splitlines()[0] == (
-        "It can be tried, and it succeeds in one situation at least. Violated:"
+        "The skill can be tried, and succeeds in at least one situation. Violated:"
     )
     check = check_of(faulty.NeedsUnknown, "arm_left_at_rest")
     assert check.run().status == "not run"
-    with pytest.raises(NotConforming, match='no value can be made up for "plan"'):
+    with pytest.raises(ConformanceError, match='no value can be generated for "plan"'):
         check()
 
 
@@ -244,7 +240,7 @@ def test_a_tick_that_does_not_come_back_is_broken_off_once(monkeypatch: pytest.M
     answered = signal.getsignal(signal.SIGALRM)
     checks = {check.name: check for check in conformance(faulty.LoopsWithoutYield)}
     problem = (
-        f"{EMPTY} while the table has changed since the look at tick 1 LoopsWithoutYield did not come back "
+        f"{EMPTY} while the table has changed since the look at tick 1 LoopsWithoutYield did not return "
         "for 0.3 s, at faulty_skills.py:N. "
         "A tick blocks the arm: yield in each loop that waits, and leave long computations to a detector."
     )

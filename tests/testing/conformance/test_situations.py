@@ -14,7 +14,7 @@ from executive.plugins import discover
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 from executive.testing.conformance import Stage
 from executive.testing.conformance.check import leave_as_is
-from executive.testing.conformance.situations import Arrange, NotArranged, Situation, begin, situations
+from executive.testing.conformance.situations import Arrange, NotArranged, Situation, list_situations, prepare
 from executive.testing.conformance.skill_runs import MAX_HALTS, SkillRuns
 
 
@@ -45,15 +45,15 @@ class Everything(Skill):
 
 
 def names(skill: type[Skill], arrange: Arrange = leave_as_is) -> list[str]:
-    return [situation.name for situation in situations(skill, arrange)]
+    return [situation.name for situation in list_situations(skill, arrange)]
 
 
 def values_of(skill: type[Skill], situation: Situation) -> dict[str, Any]:
-    return begin(skill, situation, leave_as_is)[1]
+    return prepare(skill, situation, leave_as_is)[1]
 
 
 def test_what_a_skill_needs_is_made_up() -> None:
-    stage, values = begin(Everything, Situation("", False), leave_as_is)
+    stage, values = prepare(Everything, Situation("", False), leave_as_is)
     assert [target.label for target in stage.targets] == ["cube", "sphere", "duck"]
     assert values["targets"] == stage.targets and values["targets"] is not stage.targets
     assert (values.pop("target"), values.pop("targets")[0]) == (stage.targets[0], stage.targets[0])
@@ -77,7 +77,7 @@ def test_a_skill_is_tried_in_every_situation_that_it_may_begin_in() -> None:
     ]
     assert names(discover()["Grasp"]) == ["with an empty tool"]
     assert names(Everything)[:3] == [
-        "with an empty tool", "with an item in the tool", "with an empty tool and every input given",
+        "with an empty tool", "with an item in the tool", "with an empty tool and all inputs given",
     ]  # fmt: skip
     given = names(discover()["MoveToScan"], lambda stage: {"pose": "home"})
     assert given == ["with an empty tool", "with an item in the tool"], "a param that is given is not varied"
@@ -86,10 +86,10 @@ def test_a_skill_is_tried_in_every_situation_that_it_may_begin_in() -> None:
 @pytest.mark.parametrize(("needs", "held"), [(EMPTY, [False]), (HOLDING, [True]), (ANY, [False, True])])
 def test_the_tool_holds_what_the_skill_needs(needs: Any, held: list[bool]) -> None:
     skill = type("Needy", (faulty.Pause,), {"tool_state": (needs, ANY), "__annotations__": {}})
-    found = list(situations(skill, leave_as_is))
+    found = list(list_situations(skill, leave_as_is))
     assert [situation.holding for situation in found] == held
     for situation in found:
-        stage, _ = begin(skill, situation, leave_as_is)
+        stage, _ = prepare(skill, situation, leave_as_is)
         assert stage.cell.tool.holding is situation.holding
         assert (stage.cell.ledger.find_held_item() is not None) is situation.holding
         assert (stage.item == stage.cell.ledger.find_held_item()) is (needs is HOLDING)
@@ -97,7 +97,7 @@ def test_the_tool_holds_what_the_skill_needs(needs: Any, held: list[bool]) -> No
 
 def test_a_skill_without_arm_finds_the_cup_on_its_target() -> None:
     for name, touches in (("Grasp", True), ("Approach", False)):
-        stage, _ = begin(discover()[name], Situation("", False), leave_as_is)
+        stage, _ = prepare(discover()[name], Situation("", False), leave_as_is)
         assert stage.cell.tool.touching is touches
 
 
@@ -110,7 +110,7 @@ def broken(stage: Stage) -> dict[str, Any]:
     [
         ("empty", leave_as_is, "its tool_state is 'empty'; it must begin with ANY, EMPTY or HOLDING"),
         ((), leave_as_is, "its tool_state is (); it must begin with ANY, EMPTY or HOLDING"),
-        ((EMPTY, EMPTY), broken, "what arranges it raised KeyError: 'cube'"),
+        ((EMPTY, EMPTY), broken, "the function `arrange` raised KeyError: 'cube'"),
     ],
 )
 def test_a_skill_that_cannot_be_arranged_is_told_why(state: Any, arrange: Arrange, text: str) -> None:
