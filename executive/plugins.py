@@ -1,6 +1,6 @@
 """Plugins: skills, cell kinds and other classes that packages register by entry points.
 
-The project in whose folder one works counts as a package even if it is not installed.
+The project of the working directory counts as a package even if it is not installed.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ PROJECT_FILE = "pyproject.toml"
 SKILLS = "executive.skills"
 CELL_KINDS = "executive.cells"
 
-_VALUE = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
-_LINE = 'Wave = "my_package.wave:Wave"'
+_CLASS_PATH = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
+_EXAMPLE_LINE = 'Wave = "my_package.wave:Wave"'
 
 
 def discover() -> dict[str, type[Skill]]:
-    """Return every skill by name, found through the entry-point group `executive.skills`.
+    """Return every skill of the entry-point group `executive.skills`, by name.
 
     Raises:
-        InputError: Two packages register one name, an entry is no skill or cannot be loaded, or the
+        InputError:
             pyproject.toml of the project one works in is wrong.
     """
     found: dict[str, type[Skill]] = {}
@@ -50,10 +50,10 @@ def discover() -> dict[str, type[Skill]]:
 
 
 def cell_kind(name: str) -> CellKind:
-    """Return the class that makes cells of a kind.
+    """Return the class that builds cells of a kind.
 
     Raises:
-        InputError: No package offers this kind, or it cannot be loaded.
+        InputError: No package registers this kind, or its class cannot be loaded.
     """
     entries = registered(CELL_KINDS, "kind of cell")
     if name not in entries:
@@ -67,13 +67,13 @@ def cell_kind(name: str) -> CellKind:
 
 @dataclass(frozen=True)
 class PluginEntry:
-    """A class that some package offers under a name.
+    """A class that a package registers under a name.
 
     Attributes:
-        name: The name.
-        value: Where it is: `module:Class`.
-        kind: What it is, for the text of an error: `skill`.
-        remedy: What helps where it cannot be loaded.
+        name: Name of the entry point.
+        value: Place of the class: `module:Class`.
+        kind: Kind of plugin as named in an error message: `skill`.
+        remedy: Advice to the user if the class cannot be loaded.
     """
 
     name: str
@@ -85,30 +85,30 @@ class PluginEntry:
         """Return the class.
 
         Raises:
-            InputError: Something is wrong in its module, whatever it is.
+            InputError: Importing the module of the class raised an exception.
         """
         try:
             return EntryPoint(self.name, self.value, "").load()
-        except Exception as error:  # whatever stands in somebody's module
+        except Exception as error:  # A plugin's module may raise anything.
             raise InputError(
                 f'the {self.kind} "{self.name}" ({self.value}) cannot be loaded: {type(error).__name__}: '
-                f"{error}{_place(error)}; mend it, or {self.remedy}"
+                f"{error}{_locate_error(error)}; mend it, or {self.remedy}"
             ) from error
 
 
 def registered(group: str, kind: str) -> dict[str, PluginEntry]:
-    """Return what is registered in a group by name, in the order of the names; nothing is loaded.
+    """Return the entries of a group by name, sorted by name, without loading their classes.
 
     The project one works in (`project_here`) need not be installed: its folder is the last
     place where modules are looked for afterwards. If it is, its pyproject.toml counts all the same, not what
     it said when it was installed.
 
     Raises:
-        InputError: Two packages register one name, or the project's pyproject.toml is wrong.
+        InputError: Two packages register one name, or the project's pyproject.toml is invalid.
     """
     project = project_here()
     found: dict[str, PluginEntry] = {}
-    entries = (*_installed(group, kind, project), *_own(group, kind, project))
+    entries = (*_list_installed(group, kind, project), *_list_own(group, kind, project))
     for entry in sorted(entries, key=lambda entry: (entry.name, entry.value)):
         if entry.name in found and found[entry.name].value != entry.value:
             raise InputError(
@@ -119,40 +119,40 @@ def registered(group: str, kind: str) -> dict[str, PluginEntry]:
     return found
 
 
-def _installed(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
-    """Yield what installed packages register, the project itself left out."""
+def _list_installed(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
+    """Yield the entries of all installed packages except the project itself."""
     for point in entry_points(group=group):
         package = point.dist.name if point.dist else point.module.partition(".")[0]
-        if project is None or _normal(package) != _normal(project.name):
+        if project is None or _normalize(package) != _normalize(project.name):
             yield PluginEntry(point.name, point.value, kind, f"uninstall the package {package}")
 
 
-def _own(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
-    """Yield what the project registers; its modules can be imported afterwards."""
+def _list_own(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
+    """Yield the entries of the project, and make its modules importable."""
     if project is None or not (entries := project.registers(group)):
         return
     folder = str(project.file.parent)
     if folder not in sys.path:
-        # At the end: nothing in the folder can stand in for what is installed.
+        # At the end of the path, the folder cannot shadow installed modules.
         sys.path.append(folder)
     for name, value in entries.items():
         yield PluginEntry(name, value, kind, f"take it out of {project.file}")
 
 
-def _normal(package: str) -> str:
-    """Return the form of a package's name in which all its spellings are the same."""
+def _normalize(package: str) -> str:
+    """Return the normalized name of a package: `my-package` for `My_Package`."""
     return re.sub(r"[-_.]+", "-", package).lower()
 
 
-def _place(error: Exception) -> str:
-    """Return file and line at which a module goes wrong, or "" if that is not in its own code."""
+def _locate_error(error: Exception) -> str:
+    """Return the file and line in which a module raised an error, or "" if no code of the plugin did."""
     if isinstance(error, SyntaxError):
-        return ""  # its text says so
-    others = Path(__file__).parent, Path(traceback.__file__).parent
+        return ""  # The message of a syntax error names file and line.
+    own_folders = Path(__file__).parent, Path(traceback.__file__).parent
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         file = Path(frame.filename)
-        installed = "site-packages" in file.parts
-        if file.is_file() and (installed or not any(folder in file.parents for folder in others)):
+        is_installed = "site-packages" in file.parts
+        if file.is_file() and (is_installed or not any(folder in file.parents for folder in own_folders)):
             return f", in {file}:{frame.lineno}"
     return ""
 
@@ -163,8 +163,8 @@ class Project:
 
     Attributes:
         file: The pyproject.toml.
-        name: What the project is called there, or "".
-        tables: Everything that the file holds below `project`.
+        name: Name of the project in this file, or "".
+        tables: Content of the table `project` in this file.
     """
 
     file: Path
@@ -172,19 +172,19 @@ class Project:
     tables: Mapping[str, Any]
 
     def registers(self, group: str) -> dict[str, str]:
-        """Return what the table `[project.entry-points."<group>"]` says: `module:Class` by name.
+        """Return the entries of the table `[project.entry-points."<group>"]`: `module:Class` by name.
 
         Raises:
-            InputError: It is no such table.
+            InputError: The entry is not a table of strings `module:Class`.
         """
         groups = self.tables.get("entry-points", {})
         entries = groups.get(group, {}) if isinstance(groups, dict) else groups
         if not isinstance(entries, dict):
-            raise InputError(f"{self._locate(group)} is no table; write lines as {_LINE} below it")
+            raise InputError(f"{self._locate(group)} is no table; write lines as {_EXAMPLE_LINE} below it")
         for name, value in entries.items():
-            if not isinstance(value, str) or _VALUE.fullmatch(value) is None:
+            if not isinstance(value, str) or _CLASS_PATH.fullmatch(value) is None:
                 raise InputError(
-                    f'{self._locate(group)}: "{name}" names no class: {value!r}; write it as {_LINE}'
+                    f'{self._locate(group)}: "{name}" names no class: {value!r}; write it as {_EXAMPLE_LINE}'
                 )
         return entries
 
@@ -193,29 +193,29 @@ class Project:
 
 
 def project_here() -> Project | None:
-    """Return the project of the working directory, None outside of any.
+    """Return the project of the working directory, or None if there is no project.
 
     It is that of the nearest pyproject.toml, in the working directory or above it. Whoever works in a folder
     has its code run, as with pytest: nothing else is trusted. So no pyproject.toml counts in a folder that is
     everybody's, as /tmp is, where it may be anyone's.
 
     Raises:
-        InputError: The file cannot be read, or is no TOML.
+        InputError: The file cannot be read, or is not TOML.
     """
     try:
-        here = Path.cwd()
+        working_directory = Path.cwd()
     except FileNotFoundError:
-        return None  # Somebody deleted it meanwhile.
-    for folder in (here, *here.parents):
+        return None  # The working directory was deleted.
+    for folder in (working_directory, *working_directory.parents):
         file = folder / PROJECT_FILE
-        # Unlike Path's method this says no of a folder that may not be looked into.
-        if os.path.isfile(file) and not _is_everybodys(folder):
+        # Unlike `Path.is_file`, `os.path.isfile` returns False if the folder is not readable.
+        if os.path.isfile(file) and not _is_shared(folder):
             return _read_project(file)
     return None
 
 
-def _is_everybodys(folder: Path) -> bool:
-    """Tell whether anybody may put a file there beside those of others."""
+def _is_shared(folder: Path) -> bool:
+    """Return True if every user may create files in a folder, as in `/tmp`."""
     mode = folder.stat().st_mode
     return bool(mode & stat.S_ISVTX and mode & stat.S_IWOTH)
 

@@ -1,1 +1,1 @@
-"""The commands: parse, call, print."""
+"""Command line: parses options, calls the packages, and prints results."""

@@ -1,4 +1,4 @@
-"""Which cell file an argument means."""
+"""Cell files by path or by name of a shipped cell."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def load_cells(names: tuple[str, ...], overrides: Mapping[str, str] | None = Non
     `overrides` name keys of the cells as `cell.<key>.<key>`.
 
     Raises:
-        InputError: There is no such cell, two have one name, or something is wrong with a file.
+        InputError: A cell does not exist, two cells have the same name, or a file is invalid.
     """
     from executive.errors import InputError
     from executive.mission.parse.cell_file import load_cell
@@ -31,10 +31,10 @@ def load_cells(names: tuple[str, ...], overrides: Mapping[str, str] | None = Non
 
 
 def find_cell(name: str) -> Path:
-    """Return the cell file that `name` means.
+    """Return the cell file at a path, or the shipped cell with this name.
 
     Raises:
-        InputError: There is none.
+        InputError: Neither a file nor a shipped cell has this name.
     """
     from executive.errors import InputError
     from executive.mission.findings import alternatives

@@ -1,4 +1,4 @@
-"""`executive check`: say everything that is wrong with missions before anything moves."""
+"""`executive check`: find mistakes in missions before a run."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 @json_option
 @click.pass_context
 def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, str], as_json: bool) -> None:
-    """Print everything that is wrong with each MISSION, and which failures can still end it.
+    """Print all mistakes in each MISSION, and the failures that can end its run.
 
-    Exit code 2 if any cannot be run.
+    Exit code 2 if a mission cannot be run.
     """
     with stdout_kept_clean():
         from executive.errors import InputError
@@ -39,7 +39,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
             try:
                 loaded = load_mission(mission, skills, overrides, cell_kind)
                 findings, endings, ok = loaded.warnings, loaded.endings, True
-                texts.append(_verdict(mission, findings, endings))
+                texts.append(_describe(mission, findings, endings))
             except InputError as error:
                 missing = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
                 findings, endings, ok = getattr(error, "findings", missing), (), False
@@ -59,14 +59,14 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     ctx.exit(0 if all(report["ok"] for report in reports) else 2)
 
 
-def _verdict(mission: str, findings: Sequence[Finding], endings: Sequence[Ending]) -> str:
-    """Return the warnings of a mission that can be run, and which failures can still end it."""
+def _describe(mission: str, findings: Sequence[Finding], endings: Sequence[Ending]) -> str:
+    """Return the warnings of a valid mission, and the failures that can end its run, as text."""
     from executive.mission.findings import describe_findings
 
     lines = [*describe_findings(findings), f"{mission}: ok"]
     if endings:
         lines.append("  nothing deals with these failures; each would end the mission:")
-        # A subtree used twice is one place.
+        # Endings of a subtree that is used twice have the same place, and count once.
         reasons: dict[tuple[str, str, int], dict[str, None]] = {}
         for ending in endings:
             reasons.setdefault((ending.source, ending.path, ending.line), {})[ending.reason] = None

@@ -34,7 +34,7 @@ FRAME_SIZE = (640, 480)
 DRAW_TIMEOUT = 30.0
 """Time after which a drawing process is ended [s]."""
 SERVER_TIMEOUT = 3.0
-"""Time after which a server counts as out of reach [s]."""
+"""Time after which a server counts as unreachable [s]."""
 
 
 class Diagnosed(NamedTuple):
@@ -75,7 +75,7 @@ def command(ctx: click.Context, as_json: bool) -> None:
 
 
 def examine() -> Iterator[Diagnosed]:
-    """Run every check and yield its findings, even if a package that a check needs is missing."""
+    """Run every check and yield its results, even if a package that a check needs is missing."""
     for check in (check_system, check_packages, check_plugins, check_renderer, check_roboflow):
         subject = check.__name__.removeprefix("check_")
         try:
@@ -91,11 +91,11 @@ def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Di
     python = f"{'.'.join(map(str, version))} on {platform.system()} {platform.machine()}"
     is_supported = MIN_PYTHON <= version[:2] <= MAX_PYTHON
     fix = "use 3.10 or 3.11 (uv takes 3.11 by itself)"
-    yield _choose(is_supported, "python", python, "problem", f"{python} has no pybullet wheel", fix)
+    yield _make_result(is_supported, "python", python, "problem", f"{python} has no pybullet wheel", fix)
     name = os.environ.get("DISPLAY")
     shown = f"DISPLAY is {name}, where --gui opens the simulator's window"
     fix = "run without --gui; the terminal, `--view` and the report also show a run"
-    yield _choose(bool(name), "display", shown, "note", "DISPLAY is not set", fix)
+    yield _make_result(bool(name), "display", shown, "note", "DISPLAY is not set", fix)
 
 
 def check_packages() -> Iterator[Diagnosed]:
@@ -118,13 +118,13 @@ def check_packages() -> Iterator[Diagnosed]:
             fix = f"run `pip uninstall -y {' '.join(packages)}`, then `pip install opencv-python-headless`"
         alone = f"{opencv} is the only package that provides `cv2`"
         message = f"{len(packages)} packages provide `cv2` and overwrite each other ({opencv})"
-        yield _choose(len(packages) == 1, "opencv", alone, "problem", message, fix)
+        yield _make_result(len(packages) == 1, "opencv", alone, "problem", message, fix)
     for extra, purpose in EXTRAS.items():
         names = required(extra)
         missing = [name for name in names if not installed(name)]
         versions = ", ".join(f"{name} {installed(name)}" for name in names)
         fix = f"to {purpose}, run `uv sync --extra {extra}`"
-        yield _choose(not missing, extra, versions, "note", f"not installed: {', '.join(missing)}", fix)
+        yield _make_result(not missing, extra, versions, "note", f"not installed: {', '.join(missing)}", fix)
     if version := installed("av"):
         yield Diagnosed("ok", "film", f"av {version} encodes videos; the program ffmpeg is not needed")
 
@@ -147,7 +147,7 @@ def check_renderer() -> Iterator[Diagnosed]:
     time, problem = measure_frame_time("tiny")
     drawn = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 of the overhead cell"
     message, fix = f"TinyRenderer draws nothing: {problem}", "run `uv sync --reinstall-package pybullet`"
-    yield _choose(not problem, "renderer", drawn, "problem", message, fix)
+    yield _make_result(not problem, "renderer", drawn, "problem", message, fix)
     _, problem = measure_frame_time("egl")
     state = f"draws nothing: {problem}" if problem else "can be loaded and draws"
     status = "note" if problem else "ok"
@@ -160,13 +160,13 @@ def check_roboflow() -> Iterator[Diagnosed]:
     from executive.perception.detectors.roboflow.options import HOSTED
 
     fix, is_set = "set it for models that Roboflow hosts", ApiKey(os.environ).is_set
-    yield _choose(is_set, "key", f"{VARIABLE} is set", "note", f"{VARIABLE} is not set", fix)
+    yield _make_result(is_set, "key", f"{VARIABLE} is set", "note", f"{VARIABLE} is not set", fix)
     message = f"{HOSTED} does not answer within {SERVER_TIMEOUT:.0f} s"
     fix = "check the network; only models that Roboflow hosts need it"
-    yield _choose(is_reachable(HOSTED), "roboflow", f"{HOSTED} answers", "note", message, fix)
+    yield _make_result(is_reachable(HOSTED), "roboflow", f"{HOSTED} answers", "note", message, fix)
 
 
-def _choose(is_ok: bool, subject: str, good: str, status: str, bad: str, fix: str) -> Diagnosed:
+def _make_result(is_ok: bool, subject: str, good: str, status: str, bad: str, fix: str) -> Diagnosed:
     return Diagnosed("ok", subject, good) if is_ok else Diagnosed(status, subject, bad, fix)
 
 
@@ -179,7 +179,7 @@ def measure_frame_time(renderer: str) -> tuple[float, str]:
         )
     except subprocess.TimeoutExpired:
         return 0.0, f"no frame came in {DRAW_TIMEOUT:.0f} s"
-    # Drivers print what they like around the result, and may crash after it.
+    # Drivers may print text around the result, and may crash after it.
     if result := re.search(r"^milliseconds: ([0-9.]+)$", completed.stdout, re.MULTILINE):
         return float(result[1]), ""
     *_, last = ["no error output", *filter(str.strip, completed.stderr.splitlines())]
@@ -187,7 +187,7 @@ def measure_frame_time(renderer: str) -> tuple[float, str]:
 
 
 def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
-    """Return True if a server gives any answer at all within `timeout` [s]."""
+    """Return True if a server answers within `timeout` [s], even with an error."""
     import urllib.error
     import urllib.request
 

@@ -1,4 +1,4 @@
-"""`executive evaluate`: measure how good a detector is."""
+"""`executive evaluate`: measure the accuracy of a detector."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import click
 from executive.cli import options
 from executive.cli.streams import print_json, stdout_kept_clean
 
-PICTURES = (".png", ".jpg", ".jpeg")
-"""Kinds of files that the sheet of misses can be."""
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+"""Suffixes of the file formats in which the sheet of misses can be saved."""
 
 
 @click.command(name="evaluate")
 @click.option(
     "--cell", "cells", metavar="CELL", multiple=True,
-    help="Cell whose detector is measured, on fresh scenes of it; repeatable.",
+    help="Cell whose detector is measured on random scenes of the cell; repeatable.",
 )  # fmt: skip
-@click.option("--detector", metavar="NAME", help="Which of the cell's detectors; without it, the first.")
+@click.option("--detector", metavar="NAME", help="Name of the cell's detector; by default the first.")
 @click.option(
     "--dataset", type=options.FOLDER, metavar="FOLDER",
-    help="COCO or YOLO folder of labelled images to measure on, instead of fresh scenes.",
+    help="COCO or YOLO folder of labelled images to use instead of random scenes.",
 )  # fmt: skip
 @click.option(
     "--weights", type=options.FILE, metavar="ONNX",
@@ -31,30 +31,30 @@ PICTURES = (".png", ".jpg", ".jpeg")
 )  # fmt: skip
 @click.option(
     "--labels", type=options.FILE, metavar="FILE",
-    help="Its class names, one a line; without it, labels.txt or NAME.labels.txt beside it.",
+    help="Class names of --weights, one per line; by default labels.txt or NAME.labels.txt beside it.",
 )  # fmt: skip
-@click.option("--images", type=options.COUNT, default=200, help="Scenes to render of a cell.")
+@click.option("--images", type=options.COUNT, default=200, help="Number of scenes to render per cell.")
 @options.seed_option
 @click.option(
     "--threshold", type=click.FloatRange(0, 1),
-    help="Confidence from which a detection counts; without it, the detector's own.",
+    help="Lowest confidence at which a detection counts; by default the threshold of the detector.",
 )  # fmt: skip
 @click.option(
     "--varied", is_flag=True,
-    help="Scenes varied as widely as in training; else scenes as a run begins with, searched as in a run.",
+    help="Vary scenes as widely as in training; by default scenes are as at the start of a run.",
 )  # fmt: skip
 @click.option(
     "--view", type=click.Choice(["table", "full"]), default="table",
-    help="The part of a run's frame to search.",
+    help="Part of the frame to search.",
 )  # fmt: skip
 @options.scene_option
 @options.overrides_option
 @click.option(
     "--out", type=options.FILE, metavar="FILE",
-    help="File for the measurement that runs read; without it, CELL.measured.json beside the cell file.",
+    help="File for the measurement that runs read; by default CELL.measured.json beside the cell file.",
 )  # fmt: skip
-@click.option("--workers", type=options.COUNT, default=2, help="Processes to render.")
-@click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Picture of the worst misses to write.")
+@click.option("--workers", type=options.COUNT, default=2, help="Number of rendering processes.")
+@click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Image file for the worst misses.")
 @options.json_option
 def command(
     cells: tuple[str, ...], detector: str | None, dataset: Path | None, weights: Path | None,
@@ -62,14 +62,14 @@ def command(
     scene: Path | None, overrides: dict[str, str], out: Path | None, workers: int, sheet: Path | None,
     as_json: bool,
 ) -> None:  # fmt: skip
-    """Measure a detector on fresh scenes of cells, or on labelled images.
+    """Measure a detector on random scenes of cells, or on labelled images.
 
     The detector is that of a cell with all settings of its section, or a model file (--weights), or with
     neither the one that ships with this project. The measurement of a cell's detector, as it is declared, is
     stored: runs take the error rates of the detector from it.
     """
     unknown = next((key for key in overrides if not key.startswith("cell.")), "")
-    is_picture = sheet is None or sheet.suffix.lower() in PICTURES
+    is_picture = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES
     options.refuse(
         (detector and weights, "--detector is of a cell and --weights a model file; give one of them"),
         (detector and dataset and not cells, f"--detector {detector} is of which cell? Name it with --cell"),
@@ -80,10 +80,10 @@ def command(
         (varied and view != "table", f"--view {view} is a part of a run's frame; leave out --varied"),
         (out and len(cells) != 1, f"--out {out} is the file for one cell; name the cell with --cell"),
         (unknown, f"--set {unknown} is no key of a cell; write cell.KEY.KEY=VALUE"),
-        (not is_picture, f'"{sheet}" is no picture; its name must end in {", ".join(PICTURES)}'),
+        (not is_picture, f'"{sheet}" is no picture; its name must end in {", ".join(IMAGE_SUFFIXES)}'),
     )
     measured: dict[str, Any] = {}
-    # Under other conditions than those of a run, a measurement says nothing about runs.
+    # A measurement under other conditions than those of a run does not predict the error rates of runs.
     as_declared = not (weights or varied or scene or threshold) and view == "table"
     stored = bool(cells) and as_declared and (out is not None or not overrides)
     with stdout_kept_clean():
@@ -94,25 +94,25 @@ def command(
         from executive.view.figures.detector import print_figures
 
         worst, scenes = WorstMisses(), evaluation.SceneSettings(images, seed, varied, view, workers, scene)
-        named = cells or (() if dataset else ("overhead",))
-        files = dict(zip(map(find_cell, named), load_cells(named, overrides).values(), strict=True))
-        asked = list(evaluation.list_detectors(files, detector, weights, labels))
+        cell_names = cells or (() if dataset else ("overhead",))
+        files = dict(zip(map(find_cell, cell_names), load_cells(cell_names, overrides).values(), strict=True))
+        tested_detectors = list(evaluation.list_detectors(files, detector, weights, labels))
         if dataset is not None:
             report_polygons(dataset)
-        for tested in asked:
+        for tested in tested_detectors:
             evaluation.check_detector(tested, renders_scenes=dataset is None, scene=scene)
-        for tested in asked:
-            where, began = tested.name_measurement(dataset), time.monotonic()
+        for tested in tested_detectors:
+            measurement, start = tested.name_measurement(dataset), time.monotonic()
             result = evaluation.measure(
                 tested, dataset, scenes, threshold=threshold, worst_misses=worst, progress=bar
             )
-            print_figures(where, tested.name, result)
+            print_figures(measurement, tested.name, result)
             kind = tested.configs[tested.name].kind
-            measured[where] = {"detector": tested.name, "kind": kind, **result.as_dict()}
+            measured[measurement] = {"detector": tested.name, "kind": kind, **result.as_dict()}
             if stored and tested.cell is not None:
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
                 repeat = f"executive evaluate --cell {tested.cell.cell} --detector {tested.name} {source}"
-                seconds = time.monotonic() - began
+                seconds = time.monotonic() - start
                 path = evaluation.store_evaluation(tested, result, out, command=repeat, seconds=seconds)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:

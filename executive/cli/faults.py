@@ -1,4 +1,4 @@
-"""`executive faults`: let everything go wrong in a mission, and see what survives."""
+"""`executive faults`: inject faults into a mission, and judge how its runs end."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from executive.cli import options
 from executive.cli.streams import print_json, stdout_kept_clean
 
 
-def fault_numbers(text: str) -> tuple[int, ...]:
-    """Return the numbers that `N`, or `N+M` for several at once, names."""
+def parse_fault_numbers(text: str) -> tuple[int, ...]:
+    """Return the fault numbers in a text such as `12`, or `3+12` for two faults in one run."""
     if re.fullmatch(r"\d+(\+\d+)*", text) is None:
         raise click.BadParameter(f'"{text}" is no fault; write it as 12, or 3+12 for two at once')
     return tuple(dict.fromkeys(int(number) for number in text.split("+")))
@@ -22,13 +22,17 @@ def fault_numbers(text: str) -> tuple[int, ...]:
 @click.command(name="faults")
 @options.MISSION
 @options.oracle_option
-@click.option("--pairs", type=options.COUNT, help="Instead, so many pairs of them, drawn by the seed.")
 @click.option(
-    "--fault", "numbers", type=fault_numbers, metavar="N[+M]",
-    help="One of them only, with a record of its run.",
+    "--pairs",
+    type=options.COUNT,
+    help="Inject this number of random pairs of faults instead of single faults.",
+)
+@click.option(
+    "--fault", "numbers", type=parse_fault_numbers, metavar="N[+M]",
+    help="Inject only this fault, and record its run.",
 )  # fmt: skip
 @click.option(
-    "--list", "listed", is_flag=True, help="Print them, and run nothing but the undisturbed mission."
+    "--list", "is_list", is_flag=True, help="Print the faults, and run only the undisturbed mission."
 )
 @options.workers_option
 @options.seed_option
@@ -38,9 +42,9 @@ def fault_numbers(text: str) -> tuple[int, ...]:
 @click.pass_context
 def command(
     ctx: click.Context, mission: str, oracle: bool, pairs: int | None, numbers: tuple[int, ...] | None,
-    listed: bool, workers: int, seed: int, overrides: dict[str, str], runs: Path, as_json: bool,
+    is_list: bool, workers: int, seed: int, overrides: dict[str, str], runs: Path, as_json: bool,
 ) -> None:  # fmt: skip
-    """Let every single fault happen in MISSION, each in a run; exit code 1 if one was not dealt with.
+    """Inject each fault into a run of MISSION; exit code 1 if a run does not handle its fault.
 
     Every reason of every node, bugs in every skill, detectors, objects and the tool: what happens is made
     from the mission's tree. Where something in the cell makes a node fail, its skill need not say so by
@@ -48,7 +52,7 @@ def command(
     of reach, that misplaces something, whose books are not what the world is, or that ends in any other
     disorder.
     """
-    if sum((pairs is not None, numbers is not None, listed)) > 1:
+    if sum((pairs is not None, numbers is not None, is_list)) > 1:
         raise click.UsageError("--pairs, --fault and --list exclude each other")
     with stdout_kept_clean():
         from executive.campaign.faults.campaign import Campaign
@@ -58,10 +62,10 @@ def command(
         from executive.view.figures.fault import as_plain, fault_text, trial_as_plain, trial_text
 
         subject = load_subject(mission, overrides, oracle, seed)
-        with bar("tried", quiet=as_json or listed or numbers is not None) as progress:
+        with bar("tried", quiet=as_json or is_list or numbers is not None) as progress:
             campaign = Campaign(subject, workers=workers, progress=progress, halting=print_halting)
             plain: Any
-            if listed:
+            if is_list:
                 plain = [{"fault": number, "told": str(one)} for number, one in enumerate(campaign.faults, 1)]
                 text, code = "\n".join(f"{fault['fault']:4} {fault['told']}" for fault in plain), 0
             elif numbers is not None:

@@ -1,4 +1,4 @@
-"""`executive film`: a recorded run as a film, the tree beside the robot."""
+"""`executive film`: make a film of a recorded run, with robot and tree side by side."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from executive.cli.streams import print_json, stdout_kept_clean
 @click.argument("run", metavar="RUN")
 @click.option(
     "-o", "--output", type=FILE, metavar="FILE",
-    help="The file to write, .mp4 or .gif; by default film.mp4 in the run directory.",
+    help="File to write, .mp4 or .gif; by default film.mp4 in the run directory.",
 )  # fmt: skip
-@click.option("--gif", is_flag=True, help="Make an animated GIF, as a README shows it.")
+@click.option("--gif", is_flag=True, help="Make an animated GIF, for instance for a README.")
 @click.option(
     "--speed", type=click.FloatRange(0.1, 100),
-    help="Seconds on the robot's clock per second of the film; by default 1, of a GIF 2.",
+    help="Seconds on the robot's clock per second of the film; by default 1, for a GIF 2.",
 )  # fmt: skip
-@click.option("--force", is_flag=True, help="Write over a file that is there.")
-@click.option("--quiet", is_flag=True, help="Show no progress.")
+@click.option("--force", is_flag=True, help="Overwrite an existing file.")
+@click.option("--quiet", is_flag=True, help="Do not show the progress.")
 @workers_option
 @runs_option
 @json_option
@@ -30,7 +30,7 @@ def command(
     run: str, output: Path | None, gif: bool, speed: float | None, force: bool, quiet: bool, workers: int,
     runs: Path, as_json: bool,
 ) -> None:  # fmt: skip
-    """Film RUN (a run directory, or `latest`): the robot at work, beside it the tree and every item.
+    """Make a film of RUN (a run directory, or `latest`): the robot, and beside it the tree and every item.
 
     The world is rebuilt from the run's world.log and looked at again, so this works for every run on a
     simulated cell, also one that was halted, cut off or taken up again. Needs no display.
@@ -38,7 +38,7 @@ def command(
     with stdout_kept_clean():
         from executive.cli.progress import bar
         from executive.record.run_directory import RunDirectory, find_run
-        from executive.view.film.film import HOLD, film
+        from executive.view.film.film import END_DURATION, film
         from executive.view.film.formats import file_for, format_of
         from executive.view.film.source import FilmSource
 
@@ -47,15 +47,15 @@ def command(
         file = output or directory.path / f"film{format.suffix}"
         source = FilmSource(directory)
         speed = speed or format.speed
-        with file_for(file, force=force) as part:
+        with file_for(file, force=force) as partial_file:
             if not quiet:
-                seconds = source.events[-1].clock / speed + HOLD
+                seconds = source.events[-1].clock / speed + END_DURATION
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)
             with bar("frames", quiet=quiet, print_lines=True) as progress:
-                frames = film(source, part, format, speed=speed, workers=workers, progress=progress)
-        made = {
+                frames = film(source, partial_file, format, speed=speed, workers=workers, progress=progress)
+        result = {
             "file": str(file), "frames": frames, "seconds": frames / format.rate, "size": file.stat().st_size
         }  # fmt: skip
-        click.echo(f"{file}: {made['seconds']:.1f} s, {file.stat().st_size / 1e6:.1f} MB", err=True)
+        click.echo(f"{file}: {result['seconds']:.1f} s, {file.stat().st_size / 1e6:.1f} MB", err=True)
     if as_json:
-        print_json(made)
+        print_json(result)

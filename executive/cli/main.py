@@ -1,4 +1,4 @@
-"""The command `executive`: finds the command asked for, and turns every error into text and exit code."""
+"""The command `executive`: finds the requested command, and reports every error as text and exit code."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ PATH_ERRORS = (
     errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
     errno.EPERM, errno.EROFS,
 )  # fmt: skip
-"""Errors of the operating system that mean a wrong path of the user."""
+"""Errors of the operating system that are caused by a wrong path of the user."""
 BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
-"""Exit codes of what ends a command early."""
+"""Exit codes of a command that ends early."""
 
 COMMANDS = (
     "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep", "faults",
     "replay", "report", "film", "doctor", "init",
 )  # fmt: skip
-"""Every command, each in the module of its name, in the order in which `--help` lists them."""
+"""Every command, in the order of `--help`; each command is in the module of its name."""
 
 
 class Executive(click.Group):
-    """Loads a command only when it is asked for, and ends the process with the documented exit codes."""
+    """Command group that imports only the requested command, and exits with the documented exit codes."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
@@ -53,7 +53,7 @@ class Executive(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that `args` begin with, or say which one may have been meant."""
+        """Return the command at the start of `args`; suggest the right one if it is misspelled."""
         close = difflib.get_close_matches(args[0], COMMANDS, n=1)
         if args[0] not in COMMANDS and close and not args[0].startswith("-"):
             ctx.fail(f'there is no command "{args[0]}"; did you mean "{close[0]}"?')
@@ -67,8 +67,8 @@ class Executive(click.Group):
         standalone_mode: bool = True,
         **extra: Any,
     ) -> Any:
-        """Run a command and exit with its code; tracebacks are shown only where asked for."""
-        del standalone_mode  # This group always stands alone: it is a program, not a part of one.
+        """Run a command and exit with its code; tracebacks are shown only with `--debug`."""
+        del standalone_mode  # The group is always a program of its own.
         args = list(sys.argv[1:] if args is None else args)
         with tolerant_streams():
             try:
@@ -98,12 +98,12 @@ def _show_error(error: BaseException, *, debug: bool) -> int:
         click.echo(shorten_quotations(f"{error.filename}: {error.strerror}"), err=True)
         return BAD_INPUT
     if not debug:
-        click.echo(_apology(error), err=True)
+        click.echo(_report_internal_error(error), err=True)
     return BROKEN
 
 
-def _apology(error: BaseException) -> str:
-    """Keep the traceback of `error` in a file and return one sentence that says where."""
+def _report_internal_error(error: BaseException) -> str:
+    """Write the traceback of `error` to a file, and return a message with the path of this file."""
     with tempfile.NamedTemporaryFile(
         "w", prefix="executive-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:
@@ -124,7 +124,7 @@ def main(debug: bool) -> None:
     Exit codes: 0 success, 1 mission failed or the audit disagrees, 2 invalid input, 3 fault, 4 incomplete
     (objects were rejected), 130 halted by the user.
     """
-    del debug  # Read by `Executive.main`, which also sees errors from outside of any command.
+    del debug  # `Executive.main` reads the option: it also handles errors outside of commands.
 
 
 if __name__ == "__main__":

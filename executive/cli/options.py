@@ -9,8 +9,8 @@ from typing import Any
 import click
 
 
-def _by_key(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
-    """Return the overrides, each given as `KEY=VALUE`; the same key twice is a mistake, not a choice."""
+def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
+    """Return the values of overrides `KEY=VALUE`, by key; refuse a key that is given twice."""
     overrides: dict[str, str] = {}
     for value in values:
         key, equals, text = value.partition("=")
@@ -24,7 +24,7 @@ def _by_key(ctx: click.Context, param: click.Parameter, values: tuple[str, ...])
 
 
 class PathType(click.Path):
-    """A path that is not empty, which would mean the working directory, and no link without a target."""
+    """Path that is neither empty (`Path("")` is the working directory) nor a link without a target."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path, or end the command with an error."""
@@ -58,8 +58,8 @@ def refuse(*conflicts: tuple[object, str]) -> None:
 
 
 overrides_option = click.option(
-    "--set", "overrides", metavar="KEY=VALUE", multiple=True, callback=_by_key,
-    help="Give a param another value, or with cell.KEY.KEY the cell; repeatable.",
+    "--set", "overrides", metavar="KEY=VALUE", multiple=True, callback=_parse_overrides,
+    help="Set a param, or with cell.KEY.KEY a key of the cell; repeatable.",
 )  # fmt: skip
 runs_option = click.option("--runs", type=FOLDER, default=Path("runs"), help="Folder of the run directories.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
@@ -70,7 +70,9 @@ scene_option = click.option(
     "--scene", type=FILE, metavar="FILE",
     help="Change the simulated world without the executive's knowledge: light, table, objects, camera.",
 )  # fmt: skip
-workers_option = click.option("--workers", type=COUNT, default=2, help="Runs at a time.")
+workers_option = click.option("--workers", type=COUNT, default=2, help="Number of concurrent runs.")
 oracle_option = click.option(
-    "--oracle", is_flag=True, help="Detections from the truth: a simulated sort then takes a second or two."
+    "--oracle",
+    is_flag=True,
+    help="Take detections from the true world: a simulated sort then takes about two seconds.",
 )

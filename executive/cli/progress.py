@@ -45,21 +45,21 @@ def bar(
 
 def _line_printer(description: str) -> Callable[[int, int], None]:
     """Return an update function `(done, total)` that prints a line at most every `LINE_PERIOD`."""
-    began = shown = time.monotonic()
+    start = shown = time.monotonic()
 
     def update(done: int, total: int) -> None:
         nonlocal shown
         now = time.monotonic()
         if done and now - shown >= LINE_PERIOD:
             shown = now
-            left = (now - began) / done * (total - done)
+            left = (now - start) / done * (total - done)
             click.echo(f"{description}: {done} of {total}, about {left:.0f} s left", err=True)
 
     return update
 
 
 def report_polygons(folder: Path) -> None:
-    """Say how many boxes of labelled images are made from polygons, if any."""
+    """Print how many boxes of labelled images are made from polygons, if any."""
     from executive.training.samples import Samples
 
     if count := Samples(folder).polygon_count:

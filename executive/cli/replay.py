@@ -1,4 +1,4 @@
-"""`executive replay`: decide a recorded run once more and say what would be decided otherwise."""
+"""`executive replay`: repeat the decisions of a recorded run, and report the first difference."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from executive.cli.streams import print_json, stdout_kept_clean
 @click.argument("run", metavar="RUN")
 @click.option(
     "--mission", "edited", type=FILE, metavar="FILE",
-    help="Decide by another mission file than the one that was run.",
+    help="Mission file to use instead of the recorded mission.",
 )  # fmt: skip
 @runs_option
 @json_option
 @click.pass_context
 def command(ctx: click.Context, run: str, edited: Path | None, runs: Path, as_json: bool) -> None:
-    """Decide RUN (a run directory, or `latest`) once more, from what its cell answered then.
+    """Repeat the decisions of RUN (a run directory, or `latest`) with the recorded answers of its cell.
 
     Nothing moves and nothing is simulated: tree, skills and ledger get the recorded answers of arm, tool,
     camera, detectors and operator. Says which decision differs first; exit code 1 if one does.
@@ -32,11 +32,13 @@ def command(ctx: click.Context, run: str, edited: Path | None, runs: Path, as_js
         from executive.record.run_directory import find_run
 
         path = find_run(run, runs)
-        done = replay(path, read_journal(path / "journal.jsonl"), discover(), edited)
-        if done.same:
-            click.echo(f"{done.decisions} decisions, all as recorded ({path})", err=True)
+        result = replay(path, read_journal(path / "journal.jsonl"), discover(), edited)
+        if result.same:
+            click.echo(f"{result.decisions} decisions, all as recorded ({path})", err=True)
         else:
-            click.echo(f"{done.decisions} decisions as recorded, then {done.difference} ({path})", err=True)
+            click.echo(
+                f"{result.decisions} decisions as recorded, then {result.difference} ({path})", err=True
+            )
     if as_json:
-        print_json({"run": str(path), "same": done.same, **done.as_json()})
-    ctx.exit(0 if done.same else 1)
+        print_json({"run": str(path), "same": result.same, **result.as_json()})
+    ctx.exit(0 if result.same else 1)

@@ -15,9 +15,9 @@ from executive.cli.streams import print_json, stdout_kept_clean
 @runs_option
 @json_option
 def command(run: str, runs: Path, as_json: bool) -> None:
-    """Write the report of RUN (a run directory, or `latest`) once more, and say where it is.
+    """Write the report of RUN (a run directory, or `latest`) again, and print its path.
 
-    Every run leaves one; a run that was killed has none yet.
+    Every run writes a report at its end; a killed run has none yet.
     """
     with stdout_kept_clean():
         from executive.record.run_directory import find_run

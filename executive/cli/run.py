@@ -35,20 +35,26 @@ if TYPE_CHECKING:
 @click.argument("mission", metavar="MISSION", required=False)
 @click.option(
     "--resume", metavar="RUN",
-    help="Instead of a mission: take up again a run that was cut off, by its directory or as `latest`.",
+    help="Instead of a mission: resume an interrupted run, given by its directory or as `latest`.",
 )  # fmt: skip
 @seed_option
 @overrides_option
 @scene_option
 @runs_option
 @json_option
-@click.option("--quiet", is_flag=True, help="Show nothing on the terminal, unless the run does not succeed.")
-@click.option("--view", "live", is_flag=True, help="Show it on a page in the browser, at the address told.")
-@click.option("--paused", is_flag=True, help="Stand still before the first step, until somebody goes on.")
+@click.option("--quiet", is_flag=True, help="Print only the result of a run that does not succeed.")
+@click.option(
+    "--view", "live", is_flag=True, help="Show the run on a page in the browser; its address is printed."
+)
+@click.option("--paused", is_flag=True, help="Wait before the first step until the operator continues.")
 @click.option("--gui", is_flag=True, help="Open the simulator's window.")
 @click.option("--realtime", is_flag=True, help="Run on the wall clock instead of as fast as possible.")
 @click.option(
-    "--request", "requests", metavar="CLASS", multiple=True, help="Asked for by the operator; repeatable."
+    "--request",
+    "requests",
+    metavar="CLASS",
+    multiple=True,
+    help="Class that the operator requests; repeatable.",
 )
 @click.pass_context
 def command(
@@ -58,16 +64,16 @@ def command(
 ) -> None:  # fmt: skip
     """Run MISSION (a file or the name of a shipped mission) and record it."""
     sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
-    has_source = any(source is not click.core.ParameterSource.DEFAULT for source in sources)
-    typing = sys.stdin is not None and sys.stdin.isatty()
-    is_stuck = paused and not live and (quiet or not typing)
+    has_mission_options = any(source is not click.core.ParameterSource.DEFAULT for source in sources)
+    has_keyboard = sys.stdin is not None and sys.stdin.isatty()
+    cannot_continue = paused and not live and (quiet or not has_keyboard)
     refuse(
-        (mission is None and resume is None, "name a MISSION, or a run to take up again with --resume RUN"),
+        (mission is None and resume is None, "name a MISSION, or a run to resume with --resume RUN"),
         (
-            resume is not None and has_source,
+            resume is not None and has_mission_options,
             "--resume takes mission, seed, params, requests and scene from the run: leave them out here",
         ),
-        (is_stuck, "nobody could let it go on: --paused needs --view or a terminal to type in"),
+        (cannot_continue, "nobody could continue the run: --paused needs --view or a terminal to type in"),
         # The simulator would end the process with a message of its own.
         (
             gui and not os.environ.get("DISPLAY"),
@@ -85,12 +91,12 @@ def command(
         from executive.view.report.page import leave_report
         from executive.view.terminal.summary import repeat_command, summary, verdict
 
-        shown = None if quiet else _view()
-        with _page(live) as page:
-            views = [GuardedView(view) for view in (shown, page) if view is not None]
+        terminal_view = None if quiet else _make_view()
+        with _serve_page(live) as page:
+            views = [GuardedView(view) for view in (terminal_view, page) if view is not None]
             record = RecordOptions(views, paused)
             options = RunOptions(
-                seed, requests or None, keyboard=page is None or typing, gui=gui, realtime=realtime,
+                seed, requests or None, keyboard=page is None or has_keyboard, gui=gui, realtime=realtime,
                 scene=scene,
             )  # fmt: skip
             if mission is None:
@@ -98,11 +104,11 @@ def command(
                 result, start = _resume(resume, options, runs, record)
                 origin = start.file, start.seed, start.overrides
             else:
-                result = _start(mission, overrides, options, runs, record)
+                result = _run_mission(mission, overrides, options, runs, record)
                 origin = mission, seed, overrides
-            # What was asked for by a person is asked for again.
-            asked_for, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
-            repeat = repeat_command(*origin, asked_for, used_scene)
+            # The command that repeats the run makes the same requests as the operator.
+            used_requests, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
+            repeat = repeat_command(*origin, used_requests, used_scene)
             report, problem = leave_report(result.run)
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
@@ -110,8 +116,10 @@ def command(
         problem = "; ".join(filter(None, (problem, *(view.problem for view in views))))
         if problem and (views or result.story is not None):
             click.echo(f"note: {problem}", err=True)
-        if shown is not None:
-            click.echo(summary(result, shown.timeline.items.now(), repeat, report), err=True, nl=False)
+        if terminal_view is not None:
+            click.echo(
+                summary(result, terminal_view.timeline.items.now(), repeat, report), err=True, nl=False
+            )
         elif result.story is not None:
             click.echo("\n".join(diagnosis_lines(result.story, result.run, repeat, report)), err=True)
         elif result.status == "INCOMPLETE" or disagreement(result):
@@ -122,7 +130,7 @@ def command(
     ctx.exit(exit_code(result))
 
 
-def _start(
+def _run_mission(
     mission: str, overrides: dict[str, str], options: RunOptions, runs: Path, record: RecordOptions
 ) -> Result:
     """Run a mission from its start and return the result."""
@@ -137,7 +145,7 @@ def _start(
     if options.scene is not None:
         from executive.cells.sim.scene_file import load_scene
 
-        # A cell that is not simulated would not read it.
+        # Only a simulated cell reads the scene: check the file for every cell.
         load_scene(options.scene, loaded.cell_config)
     return record_run(loaded, skills, options, runs, record)
 
@@ -155,9 +163,9 @@ def _resume(name: str, options: RunOptions, runs: Path, record: RecordOptions) -
 
 
 @contextlib.contextmanager
-def _page(wanted: bool) -> Iterator[LivePage | None]:
-    """Serve a page for a run while it goes on, and say where."""
-    if not wanted:
+def _serve_page(is_enabled: bool) -> Iterator[LivePage | None]:
+    """Serve a page during a run, and print its address."""
+    if not is_enabled:
         yield None
         return
     from executive.view.live.page import LivePage
@@ -170,8 +178,8 @@ def _page(wanted: bool) -> Iterator[LivePage | None]:
         page.finish()
 
 
-def _view() -> Lines | Terminal:
-    """Return the live view where a person watches a terminal, plain lines elsewhere."""
+def _make_view() -> Lines | Terminal:
+    """Return the live view if stderr is a terminal, else a view that prints lines."""
     from rich.console import Console
 
     from executive.view.terminal.lines import Lines

@@ -1,4 +1,4 @@
-"""`executive schema`: what an editor needs to complete mission files and to mark mistakes in them."""
+"""`executive schema`: print the JSON Schemas with which editors complete and check mission files."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from executive.cli.streams import print_json, stdout_kept_clean
 
 
 @click.command(name="schema")
-@click.option("--cell", is_flag=True, help="The schema of cell files.")
-@click.option("--library", is_flag=True, help="The schema of library files.")
-@click.option("--journal", is_flag=True, help="The schema of the lines of a journal.")
+@click.option("--cell", is_flag=True, help="Print the schema of cell files.")
+@click.option("--library", is_flag=True, help="Print the schema of library files.")
+@click.option("--journal", is_flag=True, help="Print the schema of the lines of a journal.")
 def command(cell: bool, library: bool, journal: bool) -> None:
-    """Print the JSON Schema of mission files, with the skills that are installed.
+    """Print the JSON Schema of mission files, including the installed skills.
 
     A file that begins with `# yaml-language-server: $schema=mission.schema.json` names the schema beside
     it to every editor with the YAML language server.
     """
     if cell + library + journal > 1:
-        raise click.UsageError("--cell, --library and --journal are three schemas; ask for one at a time")
+        raise click.UsageError("--cell, --library and --journal exclude each other; give one of them")
     with stdout_kept_clean():
         from executive.mission.schema.files import library_schema, mission_schema
         from executive.mission.schema.types import cell_schema

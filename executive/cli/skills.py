@@ -1,4 +1,4 @@
-"""`executive skills`: what the installed skills do, need and may fail with."""
+"""`executive skills`: list the installed skills with their ports, params and failure reasons."""
 
 from __future__ import annotations
 
@@ -19,21 +19,23 @@ if TYPE_CHECKING:
     from executive.skill import Param, Port, Skill
     from executive.testing.conformance.check import Verdict
 
-_WIDTH = 100
+_LINE_WIDTH = 100
 
-Facts = Mapping[str, Any]
-"""What a skill, a port or a param declares, as plain JSON values."""
+Declaration = Mapping[str, Any]
+"""Declaration of a skill, a port or a param, as plain JSON values."""
 
 
 @click.command(name="skills")
 @click.argument("name", required=False)
-@click.option("--conform", is_flag=True, help="Check that NAME, or every skill, does what any skill must.")
+@click.option(
+    "--conform", is_flag=True, help="Check that NAME, or every skill, conforms to the contract of skills."
+)
 @json_option
 @click.pass_context
 def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) -> None:
     """List the installed skills, or all declarations of the skill NAME.
 
-    With --conform the exit code is 1 if a check fails, or cannot be run.
+    Exit code 1 if a check of --conform fails or cannot be run.
     """
     with stdout_kept_clean():
         from executive.errors import InputError
@@ -46,15 +48,15 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
         if name is not None:
             skills = {name: skills[name]}
     if conform:
-        ctx.exit(0 if _conform(skills, as_json) else 1)
+        ctx.exit(0 if _check_conformance(skills, as_json) else 1)
     known = [declared(key, skill) for key, skill in skills.items()]
     if as_json:
         print_json(known if name is None else known[0])
     else:
-        click.echo("\n".join(map(_briefly, known)) if name is None else _fully(known[0]))
+        click.echo("\n".join(map(_summarize, known)) if name is None else _describe(known[0]))
 
 
-def _conform(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
+def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
     """Check skills, print the results of each skill at once, and return True if all are ok."""
     verdicts: list[Verdict] = []
     for name, skill in skills.items():
@@ -62,15 +64,17 @@ def _conform(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
             from executive.testing.conformance import conformance
             from executive.view.figures.conformance import conformance_lines, conformance_total
 
-            found = [check.run() for check in conformance(skill, name=name)]
+            skill_verdicts = [check.run() for check in conformance(skill, name=name)]
         if not as_json:
-            click.echo("\n".join(conformance_lines(found)))
-        verdicts += found
-    print_json([asdict(one) for one in verdicts]) if as_json else click.echo(conformance_total(verdicts))
+            click.echo("\n".join(conformance_lines(skill_verdicts)))
+        verdicts += skill_verdicts
+    print_json([asdict(verdict) for verdict in verdicts]) if as_json else click.echo(
+        conformance_total(verdicts)
+    )
     return all(verdict.status == "ok" for verdict in verdicts)
 
 
-def declared(name: str, skill: type[Skill]) -> Facts:
+def declared(name: str, skill: type[Skill]) -> Declaration:
     """Return the declarations of a skill as plain JSON values."""
     from pydantic_core import to_json
 
@@ -78,32 +82,32 @@ def declared(name: str, skill: type[Skill]) -> Facts:
     facts = {
         "name": name,
         "doc": inspect.getdoc(skill) or "",
-        "params": [_declared(param) for param in skill.params.values()],
-        "ports": [_declared(port) for port in skill.ports.values()],
+        "params": [_declaration_of(param) for param in skill.params.values()],
+        "ports": [_declaration_of(port) for port in skill.ports.values()],
         "reasons": skill.reasons,
         "uses": skill.uses,
         "senses": skill.senses,
         "moves": skill.moves,
         "tool": {"before": before, "after": after, "left": skill.tool_left},
     }
-    return cast(Facts, json.loads(to_json(facts, inf_nan_mode="strings", fallback=str)))
+    return cast(Declaration, json.loads(to_json(facts, inf_nan_mode="strings", fallback=str)))
 
 
-def _declared(declared: Param | Port) -> dict[str, Any]:
+def _declaration_of(value: Param | Port) -> dict[str, Any]:
     """Return the declaration of a param or port by its attributes; the bounds are `min` and `max`."""
-    facts = {**vars(declared), "type": _type(declared.type), "required": declared.required}
-    facts["default"] = None if declared.default is ... else declared.default
+    facts = {**vars(value), "type": _format_type(value.type), "required": value.required}
+    facts["default"] = None if value.default is ... else value.default
     return {{"ge": "min", "le": "max"}.get(name, name): value for name, value in facts.items()}
 
 
-def _type(declared: Any) -> str:
-    plain = isinstance(declared, type) and not get_args(declared)
-    name = declared.__name__ if plain else str(declared)
+def _format_type(annotation: Any) -> str:
+    is_plain = isinstance(annotation, type) and not get_args(annotation)
+    name = annotation.__name__ if is_plain else str(annotation)
     return re.sub(r"\b(typing|executive\.cell\.\w+)\.", "", name)
 
 
-def _briefly(facts: Facts) -> str:
-    """Return a skill in two lines: what it does, and what flows through it."""
+def _summarize(facts: Declaration) -> str:
+    """Return two lines about a skill: its purpose, and its ports, params and reasons."""
     reads, writes = (", ".join(port["name"] for port in _ports(facts, way)) for way in ("in", "out"))
     parts = [f"{reads or '-'} -> {writes or '-'}"]
     if facts["params"]:
@@ -114,15 +118,15 @@ def _briefly(facts: Facts) -> str:
     return f"{facts['name']:15} {summary}\n{'':16}{' | '.join(parts)}"
 
 
-def _fully(facts: Facts) -> str:
-    """Return all declarations of a skill for authors of missions."""
+def _describe(facts: Declaration) -> str:
+    """Return the complete declaration of a skill as text."""
     lines = [facts["name"], "", facts["doc"], ""]
     for title, entries, nothing in (
         ("reads", _ports(facts, "in"), "nothing"),
         ("writes", _ports(facts, "out"), "nothing"),
         ("params", facts["params"], "none"),
     ):
-        lines += [f"{title}:", *(map(_entry, entries) if entries else [f"  {nothing}"])]
+        lines += [f"{title}:", *(map(_describe_value, entries) if entries else [f"  {nothing}"])]
     lines.append(f"may fail with: {', '.join(facts['reasons']) or 'nothing'}")
     effects = ("; senses" if facts["senses"] else "") + ("; moves the arm" if facts["moves"] else "")
     lines.append(f"uses: {', '.join(facts['uses']) or 'nothing'}{effects}")
@@ -132,27 +136,28 @@ def _fully(facts: Facts) -> str:
     return "\n".join(lines)
 
 
-def _ports(facts: Facts, direction: str) -> list[Facts]:
+def _ports(facts: Declaration, direction: str) -> list[Declaration]:
     return [port for port in facts["ports"] if port["direction"] == direction]
 
 
-def _entry(of: Facts) -> str:
-    """Return a param or port with everything about it."""
-    words = [of["type"] + (f" [{of['unit']}]" if of.get("unit") else "")]
-    if of["required"] or "direction" not in of:
-        words.append("required" if of["required"] else f"default {of['default']!r}")
-    elif of["direction"] == "in":
+def _describe_value(declaration: Declaration) -> str:
+    """Return the complete declaration of a param or port as text."""
+    words = [declaration["type"] + (f" [{declaration['unit']}]" if declaration.get("unit") else "")]
+    if declaration["required"] or "direction" not in declaration:
+        words.append("required" if declaration["required"] else f"default {declaration['default']!r}")
+    elif declaration["direction"] == "in":
         words.append("may be left out")
-    if of.get("min") is not None:
-        words.append(f"at least {of['min']:g}")
-    if of.get("max") is not None:
-        words.append(f"at most {of['max']:g}")
-    if of.get("choices"):
-        words.append(f"one of {', '.join(map(str, of['choices']))}")
-    if of["refers"]:
-        words.append(f"names {'an' if of['refers'][0] in 'aeiou' else 'a'} {of['refers']}")
-    text = f"{of['name']}: {', '.join(words)}" + (f". {of['doc']}" if of["doc"] else "")
+    if declaration.get("min") is not None:
+        words.append(f"at least {declaration['min']:g}")
+    if declaration.get("max") is not None:
+        words.append(f"at most {declaration['max']:g}")
+    if declaration.get("choices"):
+        words.append(f"one of {', '.join(map(str, declaration['choices']))}")
+    if declaration["refers"]:
+        words.append(f"names {'an' if declaration['refers'][0] in 'aeiou' else 'a'} {declaration['refers']}")
+    doc = f". {declaration['doc']}" if declaration["doc"] else ""
+    text = f"{declaration['name']}: {', '.join(words)}{doc}"
     return textwrap.fill(
-        text, _WIDTH, initial_indent="  ", subsequent_indent=" " * 6,
+        text, _LINE_WIDTH, initial_indent="  ", subsequent_indent=" " * 6,
         break_long_words=False, break_on_hyphens=False,
     )  # fmt: skip

@@ -20,19 +20,19 @@ class TolerantStream(io.TextIOBase):
     """A text stream that escapes control characters, and drops its output after the first write error.
 
     Args:
-        stream: Where to write; None: the process was started with this stream closed.
-        drawing: True to write control characters as they are: a library draws on the terminal.
+        stream: Underlying stream; None if the process was started with this stream closed.
+        is_unescaped: True to write control characters unchanged, for a library that draws on the terminal.
 
     Attributes:
         error: First write error as text, or "".
     """
 
-    def __init__(self, stream: TextIO | None, *, drawing: bool = False) -> None:
+    def __init__(self, stream: TextIO | None, *, is_unescaped: bool = False) -> None:
         if isinstance(stream, io.TextIOWrapper):
             # A character that the encoding lacks is escaped; it would be an error otherwise.
             stream.reconfigure(errors="backslashreplace")
         self._stream = stream
-        self._drawing = drawing
+        self._is_unescaped = is_unescaped
         self.error = ""
 
     @property
@@ -46,7 +46,7 @@ class TolerantStream(io.TextIOBase):
             self.error = "it is closed"
         elif not self.error:
             try:
-                self._stream.write(text if self._drawing else escape_control_characters(text))
+                self._stream.write(text if self._is_unescaped else escape_control_characters(text))
             except OSError as error:
                 self._stop_writing(self._stream, error)
         return len(text)
@@ -65,7 +65,7 @@ class TolerantStream(io.TextIOBase):
 
     def unescaped(self) -> TolerantStream:
         """Return the same stream without the escaping of control characters."""
-        return TolerantStream(self._stream, drawing=True)
+        return TolerantStream(self._stream, is_unescaped=True)
 
     def fileno(self) -> int:
         """Return the number of the stream's file descriptor.
@@ -85,7 +85,7 @@ class TolerantStream(io.TextIOBase):
 
 
 def unescaped_stderr() -> TextIO:
-    """Return standard error for a library that draws on the terminal, and so writes control characters."""
+    """Return standard error without escaping, for a library that draws on the terminal."""
     if isinstance(sys.stderr, TolerantStream):
         return cast(TextIO, sys.stderr.unescaped())
     return sys.stderr
@@ -122,22 +122,22 @@ def _open_closed_descriptors() -> None:
 
 @contextlib.contextmanager
 def stdout_kept_clean() -> Iterator[None]:
-    """Send the output of Python to stderr, and drop what C libraries print to stdout, as pybullet does."""
+    """Send Python's output to stderr, and drop the output of C libraries such as pybullet to stdout."""
     sys.stdout.flush()
-    kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    real_stdout = os.dup(1)
+    null = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)
+        os.dup2(null, 1)
         with contextlib.redirect_stdout(sys.stderr):
             yield
     finally:
         # Without a flush, the C library would write its buffer to the real standard output later.
         ctypes.CDLL(None).fflush(None)
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nowhere)
+        os.dup2(real_stdout, 1)
+        os.close(real_stdout)
+        os.close(null)
 
 
 def print_json(value: Any) -> None:
-    """Write `value` as the one object or array on standard output."""
+    """Write `value` to standard output as one JSON object or array."""
     click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))

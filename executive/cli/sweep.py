@@ -1,4 +1,4 @@
-"""`executive sweep`: run a mission for many seeds and say how it did."""
+"""`executive sweep`: run a mission for many seeds, and summarize the results."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from executive.cli import options
 from executive.cli.streams import print_json, stdout_kept_clean
 
 
-def seed_range(text: str) -> range:
-    """Return the seeds that `A-B`, both included, or a single seed names."""
+def parse_seed_range(text: str) -> range:
+    """Return the seeds from A to B (both included) for `A-B`, or the single seed for `A`."""
     match = re.fullmatch(r"(\d{1,10})(?:-(\d{1,10}))?", text)
     if match is None:
         raise click.BadParameter(f'"{text}" is no range of seeds; write it as 0-99')
@@ -28,10 +28,14 @@ def seed_range(text: str) -> range:
 @click.command(name="sweep")
 @options.MISSION
 @click.option(
-    "--seeds", type=seed_range, metavar="A-B", required=True, help="First and last seed, for instance 0-99."
+    "--seeds",
+    type=parse_seed_range,
+    metavar="A-B",
+    required=True,
+    help="First and last seed, for instance 0-99.",
 )
 @options.workers_option
-@click.option("--frames", is_flag=True, help="Save the pictures behind every decision.")
+@click.option("--frames", is_flag=True, help="Save the images on which the decisions are based.")
 @options.overrides_option
 @options.scene_option
 @options.runs_option
@@ -43,7 +47,8 @@ def command(
 ) -> None:  # fmt: skip
     """Run MISSION once for every seed; exit code 1 if any run did not succeed.
 
-    Ctrl-C halts the runs under way and tells of those that were done; a second one ends at once.
+    Ctrl-C halts the current runs, and results of the complete runs are printed; a second Ctrl-C quits at
+    once.
     """
     with stdout_kept_clean():
         from executive.campaign.sweep import Job, summarize, sweep
@@ -53,7 +58,7 @@ def command(
         from executive.plugins import cell_kind, discover
         from executive.record.run_directory import check_runs_folder
 
-        # What is wrong with the mission, or with the place, is told once and not for every seed.
+        # A mistake in the mission or the folder is reported once, not for every seed.
         loaded = load_mission(mission, discover(), overrides, cell_kind)
         if scene is not None:
             from executive.cells.sim.scene_file import load_scene
@@ -64,15 +69,15 @@ def command(
             jobs = [Job(mission, seed, overrides, runs, frames, scene) for seed in seeds]
             results = sweep(jobs, workers=workers, progress=progress, halting=print_halting)
         figures = summarize(results, len(seeds))
-        click.echo(_text(figures), err=True)
+        click.echo(_describe(figures), err=True)
     if as_json:
-        asked = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}
-        print_json({**asked, **figures, "results": plain(results)})
-    wrong = figures["succeeded"] < figures["runs"] or bool(figures["disagreements"])
-    ctx.exit(130 if figures["cut_off"] else int(wrong))
+        settings = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}
+        print_json({**settings, **figures, "results": plain(results)})
+    has_problem = figures["succeeded"] < figures["runs"] or bool(figures["disagreements"])
+    ctx.exit(130 if figures["cut_off"] else int(has_problem))
 
 
-def _text(figures: dict[str, Any]) -> str:
+def _describe(figures: dict[str, Any]) -> str:
     """Return the figures of a sweep as lines of text."""
     from executive.view.terminal.summary import verdict
 
@@ -110,7 +115,7 @@ def _text(figures: dict[str, Any]) -> str:
         lines.append(f"{len(figures['failures'])} runs did not succeed:")
     keys = ("status", "reason", "node", "message")
     for entry in figures["failures"]:
-        # A run whose process broke, or that found no place for its record, has no directory.
+        # A run whose process crashed, or that could not create its directory, has no directory.
         where = entry["run"] and f"; {entry['run']}"
         lines.append(f"  seed {entry['seed']}: {verdict(*map(entry.get, keys))}{where}")
     return "\n".join(lines)

@@ -49,11 +49,11 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
 
 def _epoch_printer(epochs: int) -> Callable[[int, dict[str, float]], None]:
     """Return a function that prints the metrics of an epoch and the estimated remaining time."""
-    began = time.monotonic()
+    start_time = time.monotonic()
 
     def print_epoch(epoch: int, metrics: dict[str, float]) -> None:
         figures = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
-        minutes = (time.monotonic() - began) / epoch * (epochs - epoch) / 60
+        minutes = (time.monotonic() - start_time) / epoch * (epochs - epoch) / 60
         left = f"; about {minutes:.0f} min left" if epoch < epochs else ""
         click.echo(f"epoch {epoch} of {epochs}: {figures}{left}", err=True)
 

@@ -1,4 +1,4 @@
-"""`executive tree`: show the behaviour tree that a mission becomes."""
+"""`executive tree`: print the behaviour tree of a mission."""
 
 from __future__ import annotations
 
@@ -21,18 +21,22 @@ if TYPE_CHECKING:
 @MISSION
 @overrides_option
 @click.option(
-    "--ports", is_flag=True, help="Say below every skill what it reads (? where it may be unset) and writes."
+    "--ports", is_flag=True, help="Print the inputs (? if it may be unset) and outputs of every skill."
 )
-@click.option("--reasons", is_flag=True, help="Say why every skill may fail, and what every catch is for.")
-@click.option("--fold", is_flag=True, help="Show every subtree once, then only its name.")
-@click.option("--svg", "as_svg", is_flag=True, help="Print the tree as a picture, as SVG on stdout.")
+@click.option(
+    "--reasons",
+    is_flag=True,
+    help="Print the failure reasons of every skill, and those that every catch handles.",
+)
+@click.option("--fold", is_flag=True, help="Print every subtree once, and afterwards only its name.")
+@click.option("--svg", "as_svg", is_flag=True, help="Print the tree as an SVG image on stdout.")
 @click.option("--dot", "as_dot", is_flag=True, help="Print the tree as Graphviz text on stdout.")
 @json_option
 def command(
     mission: str, overrides: dict[str, str], ports: bool, reasons: bool, fold: bool, as_svg: bool,
     as_dot: bool, as_json: bool,
 ) -> None:  # fmt: skip
-    """Print the tree of MISSION, subtrees in their places."""
+    """Print the tree of MISSION with all subtrees expanded."""
     forms = [name for name, wanted in (("--svg", as_svg), ("--dot", as_dot), ("--json", as_json)) if wanted]
     extras = [name for name, wanted in (("--ports", ports), ("--reasons", reasons)) if wanted]
     alone = f"{' and '.join(forms)} exclude each other: standard output holds one of them"

@@ -1,1 +1,1 @@
-"""What a person watches while a mission runs."""
+"""Views of a run: terminal, live page, report, film, and pictures of the tree."""

@@ -1,4 +1,4 @@
-"""Texts of pictures and pages: length, shortening, and templates in which every text is escaped."""
+"""Text in drawings and pages: estimated length, shortening, and templates with escaping."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import unicodedata
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_INVALID_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
-# Advance widths in DejaVu Sans, the widest of the usual sans-serif fonts: no viewer needs more room.
+# Advance widths [share of the font size] in DejaVu Sans, the widest of the common sans-serif fonts.
 _ADVANCES = {
     0.36: "ijlIJ',./:;\\| ",
     0.42: "frt!()-[]",
@@ -19,23 +19,23 @@ _ADVANCES = {
     1.0: "mW%@",
 }
 _ADVANCE = {character: advance for advance, characters in _ADVANCES.items() for character in characters}
-_USUAL = 0.64
-_BOLD = 1.12
+_DEFAULT_ADVANCE = 0.64
+_BOLD_FACTOR = 1.12
 
 
 def extent(text: str, size: float, *, bold: bool = False) -> float:
-    """Return about how long a text is in a sans-serif font of this size; never too short in usual fonts."""
+    """Return an upper estimate of the length of a text in a sans-serif font of this size."""
     advances = sum(
-        1.05 if unicodedata.east_asian_width(character) in "WF" else _ADVANCE.get(character, _USUAL)
+        1.05 if unicodedata.east_asian_width(character) in "WF" else _ADVANCE.get(character, _DEFAULT_ADVANCE)
         for character in text
     )
-    return advances * size * (_BOLD if bold else 1.0)
+    return advances * size * (_BOLD_FACTOR if bold else 1.0)
 
 
 def fitted(text: str, columns: int, lines: int = 1) -> tuple[str, ...]:
-    """Return a text in so many lines of so many characters at most, cut behind a comma where it can be.
+    """Return a text in at most `lines` lines of `columns` characters, preferably broken after a comma.
 
-    What is left out becomes `…`.
+    The rest of a longer text is replaced by `…`.
     """
     rows: list[str] = []
     for clause in " ".join(text.split()).replace(", ", ",\n").splitlines():
@@ -49,13 +49,13 @@ def fitted(text: str, columns: int, lines: int = 1) -> tuple[str, ...]:
     return tuple(rows)
 
 
-def writable(text: str) -> str:
-    """Return a text with the replacement character for whatever XML cannot hold."""
-    return _NOT_XML.sub("�", text)
+def replace_invalid(text: str) -> str:
+    """Return a text in which `�` replaces the characters that XML does not allow."""
+    return _INVALID_IN_XML.sub("�", text)
 
 
 def render(template: str, **values: object) -> str:
-    """Return a template of this package, filled in; texts are escaped, and replaced where XML lacks them."""
+    """Return a rendered template of this package; texts are escaped, and characters outside XML replaced."""
     environment = Environment(
         loader=PackageLoader("executive.view", "."),
         autoescape=True,
@@ -63,4 +63,4 @@ def render(template: str, **values: object) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return writable(environment.get_template(template).render(values))
+    return replace_invalid(environment.get_template(template).render(values))

@@ -177,7 +177,10 @@ def test_help_names_every_command_and_every_exit_code():
         ("run sort --set =1", '"=1" is no override; write it as KEY=VALUE'),
         ("run sort --set a=1 --set a=2", '"a" is set twice'),
         ("run sort --gui", "--gui needs a display, and DISPLAY names none; leave it out"),
-        ("run sort --paused", "nobody could let it go on: --paused needs --view or a terminal to type in"),
+        (
+            "run sort --paused",
+            "nobody could continue the run: --paused needs --view or a terminal to type in",
+        ),
         ("sweep sort --seeds 3-1", '"3-1" holds no seed: 1 is less than 3'),
         ("sweep sort --seeds a-b", '"a-b" is no range of seeds; write it as 0-99'),
         (

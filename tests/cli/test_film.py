@@ -51,8 +51,8 @@ def test_a_film_is_made_where_it_was_wanted(run: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("-o", "a.mp4", "--gif"), '"a.mp4" is no name for a GIF'),
-        (("-o", "a.webm"), '"a.webm" is no name for a film'),
+        (("-o", "a.mp4", "--gif"), '"a.mp4" is not a name of a GIF'),
+        (("-o", "a.webm"), '"a.webm" is not a name of a film'),
         (("-o", "/nowhere/a.mp4"), 'cannot write the film "/nowhere/a.mp4": no such file or directory'),
         (("--speed", "0"), "0.1<=x<=100"),
     ],
@@ -91,8 +91,6 @@ def test_name_form_and_speed_are_chosen_and_nothing_is_written_over(
     path.write_text("mine")
     refused = invoke("film", str(run), *words.split())
     assert (refused.exit_code, path.read_text()) == (2, "mine")
-    assert refused.stderr.endswith(
-        "is there already; name another file with -o, or write over it with --force\n"
-    )
+    assert refused.stderr.endswith("exists; name another file with -o, or overwrite it with --force\n")
     assert invoke("film", str(run), *words.split(), "--force").exit_code == 0
     assert path.read_text() == f"10-00-00_sort_s5 {made}"

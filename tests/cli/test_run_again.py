@@ -77,7 +77,7 @@ def test_a_replay_says_what_is_decided_otherwise(runs: Path, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ((), "name a MISSION, or a run to take up again with --resume RUN"),
+        ((), "name a MISSION, or a run to resume with --resume RUN"),
         (
             ("sort_fruit", "--resume", "latest"),
             "--resume takes mission, seed, params, requests and scene from the run",

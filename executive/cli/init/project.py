@@ -1,4 +1,4 @@
-"""The files of a new project, made from the template beside this file."""
+"""Files of a new project, rendered from the template beside this module."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from executive.errors import InputError
 
 TEMPLATE = Path(__file__).parent / "template"
 SUFFIX = ".jinja"
-"""Ends the name of every file of the template, so that nothing takes it for code of this project."""
+"""Suffix of every template file: without it, tools would treat the template as code of this project."""
 PACKAGE = "package"
-"""The template's folder that gets the package's name."""
+"""Folder of the template that is renamed to the name of the package."""
 MISSION = "sort.yaml"
 FOLDERS = ("cells", "runs", "tests")
-"""Folders of every new project, which its package stands beside."""
+"""Folders beside the package in every new project."""
 
-_NAME = re.compile(r"[a-z]([a-z0-9_]*[a-z0-9])?")
-_NEXT = "give another name with --name"
+_NAME_PATTERN = re.compile(r"[a-z]([a-z0-9_]*[a-z0-9])?")
+_ADVICE = "give another name with --name"
 
 
 def write_project(folder: Path, package: str) -> list[str]:
-    """Fill an empty or new folder with a project whose package has this name; return the files' paths.
+    """Create a project in an empty or new folder; return the paths of its files.
 
     Raises:
-        InputError: The folder holds something, is a file, or cannot be written to.
+        InputError: The folder is not empty, is a file, or cannot be written to.
     """
     _require_empty(folder)
-    # Code and YAML, not HTML: nothing is escaped.
+    # The files are code and YAML, not HTML: nothing is escaped.
     environment = Environment(autoescape=False, undefined=StrictUndefined, keep_trailing_newline=True)
     files = {
-        _place(file, package): environment.from_string(file.read_text(encoding="utf-8")).render(name=package)
+        _locate(file, package): environment.from_string(file.read_text(encoding="utf-8")).render(name=package)
         for file in sorted(TEMPLATE.rglob(f"*{SUFFIX}"))
     }
     try:
-        for place, text in files.items():
-            path = folder / place
+        for path_in_project, text in files.items():
+            path = folder / path_in_project
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
     except OSError as error:
@@ -51,57 +51,57 @@ def write_project(folder: Path, package: str) -> list[str]:
 
 
 def _require_empty(folder: Path) -> None:
-    """Return if nothing can be overwritten in a folder, or beside what somebody keeps there."""
+    """Raise an InputError if a folder is a file, or holds files."""
     if folder.is_file():
         raise InputError(f'"{folder}" is a file; name a folder that is empty, or not there yet')
-    held = sorted(os.listdir(folder)) if folder.exists() else []
-    if held:
+    entries = sorted(os.listdir(folder)) if folder.exists() else []
+    if entries:
         raise InputError(
-            f'the folder "{folder}" is not empty: it holds {held[0]}'
-            f"{f' and {len(held) - 1} more' if held[1:] else ''}; name one that is empty, or not there yet"
+            f'the folder "{folder}" is not empty: it holds {entries[0]}'
+            f"{f' and {len(entries) - 1} more' if entries[1:] else ''}; name an empty or a new folder"
         )
 
 
-def _place(file: Path, package: str) -> str:
-    """Return where in the project a file of the template belongs."""
+def _locate(file: Path, package: str) -> str:
+    """Return the path of a template file in the project."""
     parts = file.relative_to(TEMPLATE).with_suffix("").parts
     return str(PurePosixPath(*(package if part == PACKAGE else part for part in parts)))
 
 
 def package_name(folder: Path) -> str:
-    """Return the name of a package that is called as `folder` is: `blue_table` for `Blue-Table`.
+    """Return a package name made from the name of a folder: `blue_table` for `Blue-Table`.
 
     Raises:
-        InputError: No package can be called so, or its name is taken: importing it might bring another one.
+        InputError: The result is not a valid name, or another module has it and might be imported instead.
     """
-    called = folder.resolve().name
-    return require_free(re.sub(r"[-. ]", "_", called).lower(), f'the folder "{called}"')
+    folder_name = folder.resolve().name
+    return require_free(re.sub(r"[-. ]", "_", folder_name).lower(), f'the folder "{folder_name}"')
 
 
 def require_free(name: str, source: str) -> str:
-    """Return `name` if a package can be called so and none is; `source` says what the name was made from.
+    """Return `name` if it is free and a valid name of a package; `source` describes its origin.
 
     Raises:
-        InputError: It cannot, or the name is taken.
+        InputError: The name is invalid, or taken.
     """
-    if _NAME.fullmatch(name) is None:
+    if _NAME_PATTERN.fullmatch(name) is None:
         raise InputError(
             f"{source} names no package: such a name begins with a letter, goes on with letters, digits and "
-            f'"_", and does not end with "_"; {_NEXT}'
+            f'"_", and does not end with "_"; {_ADVICE}'
         )
-    if why := _taken(name):
-        raise InputError(f'a package cannot be called "{name}": {why}; {_NEXT}')
+    if conflict := _find_conflict(name):
+        raise InputError(f'a package cannot be called "{name}": {conflict}; {_ADVICE}')
     return name
 
 
-def _taken(name: str) -> str:
-    """Return why nobody else can have a name, or ""."""
+def _find_conflict(name: str) -> str:
+    """Return the reason why a package cannot have a name, or ""."""
     if keyword.iskeyword(name):
         return "that is a word of Python's own"
     if name in FOLDERS:
         return "that is another folder of the project"
     spec = find_spec(name)
-    # A folder without any Python is none: it may be the one that is to be filled.
+    # A folder without an `__init__.py` is no module: it may be the folder of the new project.
     if spec is not None and spec.origin is not None:
         return f"a module of that name is installed already: {spec.origin}"
     return ""

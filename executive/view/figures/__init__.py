@@ -1,1 +1,1 @@
-"""What measurements found, as text and as plain data."""
+"""Results of measurements, as text and as plain data."""

@@ -1,4 +1,4 @@
-"""What the checks of skills have found, a line each."""
+"""Results of the conformance checks of skills, as one line per check."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from executive.testing.conformance.check import Verdict
 
 
 def conformance_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
-    """Yield a line per check: how it went, of which skill, and what is wrong first."""
+    """Yield a line per check: its status, its skill, and the first problem."""
     for verdict in verdicts:
         line = f"{verdict.status:7}  {verdict.skill}.{verdict.check}"
         # The reason why the skill could not be run is stated once.
@@ -20,7 +20,7 @@ def conformance_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
 
 
 def conformance_total(verdicts: Sequence[Verdict]) -> str:
-    """Return how many checks went how."""
+    """Return the number of checks by status as text."""
     counts = Counter(verdict.status for verdict in verdicts)
     skills = len({verdict.skill for verdict in verdicts})
     counted = ", ".join(

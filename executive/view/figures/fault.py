@@ -6,37 +6,37 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
-from typing import Any
 
 COLUMNS = ("first", "middle", "late", "lasting")
-"""When a fault happens."""
+"""Occasions of a fault: columns of the table of verdicts."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One run in which something went wrong on purpose.
+    """One run with injected faults.
 
     Attributes:
-        numbers: Of the faults that happened in it, those first that the last one needs to happen at all.
+        numbers: Numbers of the injected faults; the last one is under test, and needs those before it to
+            occur.
         descriptions: The faults in words.
-        name: Skill of the node the last fault is about, or what else it is about.
+        name: Skill of the node that the last fault concerns, or name of another faulty part of the cell.
         place: File and line of that node, or "".
-        what: The reason it is to fail with, or what happens.
-        when: When that happens.
-        happened: Whether all faults found their occasion.
-        raised: Whether the node failed with the reason; True where none is meant.
-        cut: True where the user halted it.
-        status: How the run ended.
-        reason: What failed, or "".
-        message: One sentence.
-        node: Path of the node that decided, or "".
-        missing: Objects fewer in bins than in an undisturbed run.
-        items: The ledger's balance.
-        audit: What really became of the objects.
-        robot_time: Time on its clock [s].
-        entered: Paths of all nodes that ran.
-        problems: What was not as it has to be, in sentences.
-        remark: What was odd and may be right, or "".
+        what: Failure reason that the fault should cause, or kind of the fault.
+        when: Occasion of the fault, one of `COLUMNS`.
+        happened: True if all faults occurred.
+        raised: True if the node failed with the expected reason, or no reason is expected.
+        cut: True if the user halted the run.
+        status: Status of the run at its end.
+        reason: Reason of the status, or "".
+        message: One sentence that explains the status, or "".
+        node: Path of the node that determined the status, or "".
+        missing: Number of objects in bins after an undisturbed run, minus that of this run.
+        items: Number of items in the ledger by state.
+        audit: True number of objects by place, or None if there was no audit.
+        robot_time: Duration of the run on its clock [s].
+        entered: Paths of all nodes that were started.
+        problems: Sentences about violated requirements.
+        remark: Sentence about a doubtful but allowed behaviour, or "".
     """
 
     numbers: tuple[int, ...]
@@ -67,7 +67,7 @@ class Trial:
 
     @property
     def verdict(self) -> str:
-        """Status and reason; `-` if the fault found no occasion."""
+        """Short verdict: `!!` for a problem, `-` if the fault did not occur, else status and reason."""
         if self.problems:
             return "!!"
         if not self.happened:
@@ -81,13 +81,13 @@ class Trial:
 
 @dataclass(frozen=True)
 class Branch:
-    """A way on that a mission takes only after a failure, or in the end.
+    """A branch of the tree that runs only after a failure, or at the end.
 
     Attributes:
         place: File and line where it stands.
         what: `catch on Grasp.missed`, `recover`, `choice 2`, `finally`.
-        paths: Its nodes in the tree; a subtree that is used twice is there twice.
-        entered: How many trials entered it.
+        paths: Paths of its nodes in the tree; a subtree that is used twice has two paths.
+        entered: Number of trials that entered the branch.
     """
 
     place: str
@@ -98,7 +98,7 @@ class Branch:
 
 @dataclass(frozen=True)
 class FaultFigures:
-    """A mission in which everything went wrong, one thing at a time, or in pairs.
+    """Results of a fault campaign on one mission.
 
     Attributes:
         mission: Its name.
@@ -124,17 +124,17 @@ class FaultFigures:
 
     @property
     def failed(self) -> tuple[Trial, ...]:
-        """The runs that were not as they have to be."""
+        """Trials with a problem."""
         return tuple(trial for trial in self.trials if trial.problems)
 
     @property
     def unentered(self) -> tuple[Branch, ...]:
-        """The ways on that no run took."""
+        """Branches that no trial entered."""
         return tuple(branch for branch in self.branches if not branch.entered)
 
 
-def as_plain(figures: FaultFigures) -> dict[str, Any]:
-    """Return the figures as plain values; times in s."""
+def as_plain(figures: FaultFigures) -> dict[str, object]:
+    """Return the results as plain values; times in s."""
     plain = {
         name: getattr(figures, name) for name in ("mission", "cell", "seed", "listed", "pairs", "complete")
     }
@@ -151,8 +151,8 @@ def as_plain(figures: FaultFigures) -> dict[str, Any]:
     }
 
 
-def trial_as_plain(trial: Trial) -> dict[str, Any]:
-    """Return one run as plain values."""
+def trial_as_plain(trial: Trial) -> dict[str, object]:
+    """Return one trial as plain values."""
     plain = asdict(trial)
     for name in ("numbers", "descriptions", "name", "cut", "entered", "robot_time"):
         del plain[name]
@@ -161,16 +161,16 @@ def trial_as_plain(trial: Trial) -> dict[str, Any]:
 
 
 def fault_text(figures: FaultFigures) -> str:
-    """Return the figures as lines of text."""
-    return "\n".join(_lines(figures))
+    """Return the results as lines of text."""
+    return "\n".join(_describe(figures))
 
 
 def trial_text(trial: Trial) -> str:
-    """Return how one run went."""
-    return "\n".join(_trial(trial))
+    """Return the faults, the end and the problems of one trial as text."""
+    return "\n".join(_describe_trial(trial))
 
 
-def _lines(figures: FaultFigures) -> Iterator[str]:
+def _describe(figures: FaultFigures) -> Iterator[str]:
     trials = figures.trials
     faults = "pairs of faults" if figures.pairs else "faults"
     yield (
@@ -178,43 +178,43 @@ def _lines(figures: FaultFigures) -> Iterator[str]:
         f"undisturbed it takes {figures.robot_time:.1f} s"
     )
     if not figures.complete:
-        yield "  ended by the user; there was more to try"
+        yield "  ended by the user before the last run"
     if not figures.pairs:
         yield ""
-        yield from _matrix(trials)
+        yield from _tabulate(trials)
         yield ""
-    yield from _sums(trials)
-    yield f"  not as it has to be: {len(figures.failed) or 'none'}"
+    yield from _count_verdicts(trials)
+    yield f"  runs with a problem: {len(figures.failed) or 'none'}"
     for trial in figures.failed:
-        yield from (f"    {line}" for line in _trial(trial))
-    yield from _remarks(trials)
-    all_ways, none = figures.branches, figures.unentered
-    yield f"  ways on after a failure: {len(all_ways) - len(none)} of {len(all_ways)} entered"
-    for branch in none:
+        yield from (f"    {line}" for line in _describe_trial(trial))
+    yield from _list_remarks(trials)
+    branches, unentered = figures.branches, figures.unentered
+    yield f"  branches after a failure: {len(branches) - len(unentered)} of {len(branches)} entered"
+    for branch in unentered:
         yield f"    never entered: {branch.place}: {branch.what}"
 
 
-def _matrix(trials: Sequence[Trial]) -> Iterator[str]:
-    """Yield a row per node of the mission and fault, a column per occasion."""
+def _tabulate(trials: Sequence[Trial]) -> Iterator[str]:
+    """Yield a table of verdicts: a row per node and fault, a column per occasion."""
     cells: dict[tuple[str, str, str], dict[str, list[Trial]]] = defaultdict(lambda: defaultdict(list))
     for trial in trials:
         cells[(trial.name, trial.place, trial.what)][trial.when].append(trial)
     rows: list[tuple[str, ...]] = [("node", "place", "fault", *COLUMNS)]
-    for row, columns in sorted(cells.items(), key=lambda one: one[0][:2]):
-        rows.append((*row, *(_cell(columns.get(column, ())) for column in COLUMNS)))
+    for row, columns in sorted(cells.items(), key=lambda cell: cell[0][:2]):
+        rows.append((*row, *(_summarize(columns.get(column, ())) for column in COLUMNS)))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    listed: list[tuple[str, ...]] = [("", "", ""), *rows]
-    for before, line in pairwise(listed):
+    all_rows: list[tuple[str, ...]] = [("", "", ""), *rows]
+    for before, line in pairwise(all_rows):
         shown = line if line[:2] != before[:2] else ("", "", *line[2:])
         cells_of = (text.ljust(width) for text, width in zip(shown, widths, strict=True))
         yield f"  {'  '.join(cells_of).rstrip()}"
 
 
-def _cell(trials: Sequence[Trial]) -> str:
-    """Return what came of some runs: the verdict of one, or how many were ok and what most others were."""
+def _summarize(trials: Sequence[Trial]) -> str:
+    """Return the verdict of one trial, or the number of `ok` and the worst or most frequent other verdict."""
     if not trials:
         return ""
-    # What found no occasion tells nothing beside what was tried instead.
+    # Faults that did not occur are left out if others did.
     trials = [trial for trial in trials if trial.verdict != "-"] or trials
     verdicts = Counter(trial.verdict for trial in trials)
     if len(verdicts) == 1:
@@ -225,38 +225,39 @@ def _cell(trials: Sequence[Trial]) -> str:
     return f"ok {ok}/{len(trials)}, {worst}"
 
 
-def _sums(trials: Sequence[Trial]) -> Iterator[str]:
+def _count_verdicts(trials: Sequence[Trial]) -> Iterator[str]:
     def count(verdict: str) -> int:
         return sum(trial.verdict == verdict for trial in trials)
 
     fewer = sum(trial.verdict.startswith("ok -") for trial in trials)
     failed = sum(trial.verdict.startswith("FAILURE") for trial in trials)
     yield (
-        f"  as undisturbed: {count('ok')}; fewer objects sorted: {fewer}; ended as a failure: {failed}; "
-        f"a bug came up: {count('FAULT')}; no occasion: {count('-')}; wrong: {count('!!')}"
+        f"  as undisturbed: {count('ok')}; fewer objects sorted: {fewer}; failed: {failed}; "
+        f"ended by a fault: {count('FAULT')}; fault did not occur: {count('-')}; wrong: {count('!!')}"
     )
     ends = Counter(trial.reason for trial in trials if trial.verdict.startswith("FAILURE"))
     if ends:
         yield f"  failures: {', '.join(f'{reason} {number}' for reason, number in ends.most_common())}"
 
 
-def _remarks(trials: Sequence[Trial]) -> Iterator[str]:
-    """Yield a line per remark, with the faults after which it was made."""
-    made: dict[str, list[str]] = defaultdict(list)
+def _list_remarks(trials: Sequence[Trial]) -> Iterator[str]:
+    """Yield a line per remark, with the faults of its trials."""
+    labels_by_remark: dict[str, list[str]] = defaultdict(list)
     for trial in trials:
         if trial.remark:
-            made[trial.remark].append(trial.label)
-    if made:
-        yield "  failed for another reason than was brought about:"
-    for remark, labels in made.items():
+            labels_by_remark[trial.remark].append(trial.label)
+    if labels_by_remark:
+        yield "  failed for another reason than the injected one:"
+    for remark, labels in labels_by_remark.items():
         more = f" and {len(labels) - 3} more" if len(labels) > 3 else ""
         yield f"    {remark}: fault {', '.join(labels[:3])}{more}"
 
 
-def _trial(trial: Trial) -> Iterator[str]:
+def _describe_trial(trial: Trial) -> Iterator[str]:
     yield f"fault {trial.label}: {'; and '.join(trial.descriptions)}"
     if not trial.happened:
-        yield "  one of them found no occasion" if len(trial.descriptions) > 1 else "  it found no occasion"
+        subject = "one of the faults" if len(trial.descriptions) > 1 else "the fault"
+        yield f"  {subject} did not occur"
     ended = " ".join(filter(None, (trial.status, trial.reason)))
     where = f" at {trial.node}" if trial.node else ""
     yield f"  {ended}{where}{f': {trial.message}' if trial.message else ''}"

@@ -1,1 +1,1 @@
-"""Films of recorded runs: what the world looked like, and what the tree decided meanwhile."""
+"""Films of recorded runs: the world, and the decisions of the tree."""

@@ -11,7 +11,7 @@ from executive.record.timeline.activation import Activation, skill_name
 from executive.record.timeline.timeline import Timeline
 from executive.view.tree.outline import skills
 
-TROUBLE_TIME = 1.6
+FAILURE_TIME = 1.6
 """Time for which a failure is shown [s]."""
 
 
@@ -19,13 +19,13 @@ class FilmCourse:
     """Follows the events of a run up to a control step.
 
     Args:
-        events: Events of the run that count, in order.
+        events: Events of the run that no resumption made void, in order.
         nodes: The tree.
-        pictures: Pictures behind the decisions; their names begin with the control step.
+        pictures: Images on which decisions are based; their names begin with the control step.
 
     Attributes:
         timeline: Timeline of the run so far.
-        picture: The last picture; None before the first.
+        picture: The last image; None before the first.
         clock: Time of the control step [s].
     """
 
@@ -38,25 +38,25 @@ class FilmCourse:
         self._events = list(events)[::-1]
         self._pictures = sorted(pictures, reverse=True)
         self._skills = skills(nodes)
-        self._trouble: tuple[float, str] = (-TROUBLE_TIME, "")
+        self._failure: tuple[float, str] = (-FAILURE_TIME, "")
 
     @property
-    def open(self) -> frozenset[str]:
-        """Paths of the nodes that run; if the tree has ended, of those that ended with it and like it."""
+    def open_paths(self) -> frozenset[str]:
+        """Paths of the running nodes; after the end, of the nodes that ended with the tree and its status."""
         timeline = self.timeline
         if running := timeline.running():
-            return frozenset(one.node for one in running)
-        end = _end_of(timeline.last_end)
-        return frozenset(path for path, one in timeline.nodes.items() if _end_of(one) == end)
+            return frozenset(activation.node for activation in running)
+        end = _find_end(timeline.last_end)
+        return frozenset(path for path, activation in timeline.nodes.items() if _find_end(activation) == end)
 
     @property
-    def trouble(self) -> str:
-        """Sentence about a recent failure that concerned an item or the run; "" if there is none."""
-        when, sentence = self._trouble
-        return sentence if self.clock < when + TROUBLE_TIME else ""
+    def failure(self) -> str:
+        """Sentence about a recent failure of an item or the run; "" if there is none."""
+        when, sentence = self._failure
+        return sentence if self.clock < when + FAILURE_TIME else ""
 
     @property
-    def doing(self) -> str:
+    def current_action(self) -> str:
         """The first running skill, its item, and the bin of a held item; "" if no skill runs."""
         timeline = self.timeline
         for path, name in self._skills.items():
@@ -74,17 +74,17 @@ class FilmCourse:
         while self._events and self._events[-1].tick <= step:
             timed = self._events.pop()
             self.timeline(timed)
-            if trouble := _trouble(timed):
-                self._trouble = (timed.clock, trouble)
+            if failure := _describe_failure(timed):
+                self._failure = (timed.clock, failure)
         while self._pictures and int(self._pictures[-1].stem.partition("_")[0]) <= step:
             self.picture = self._pictures.pop()
 
 
-def _end_of(activation: Activation | None) -> tuple[int, str]:
+def _find_end(activation: Activation | None) -> tuple[int, str]:
     return (0, "") if activation is None else (activation.end_tick, activation.status)
 
 
-def _trouble(timed: TimedEvent) -> str:
+def _describe_failure(timed: TimedEvent) -> str:
     """Return a sentence about an event that concerns an item or the run; "" for other events."""
     match timed.event:
         case NodeEnded(status="FAILURE", skill=skill, item=item) as ended if skill and item:

@@ -17,16 +17,16 @@ from executive.record.atomic_file import atomic_replacement
 from executive.view.film.ink import FAILURE, RUNNING, SUCCESS
 
 GIF_SIZE = (960, 540)
-"""Size of a GIF's frames [pixel]: a README shows no more."""
-COLOURS = 255
-"""Colours of a GIF; one more says what is as in the frame before."""
-SAMPLED = 8
-"""First frames of a GIF that its colours are chosen from."""
-_COARSE, _ENDS = 3, 60
+"""Width and height of a GIF's frames [pixel]; a README shows no larger ones."""
+PALETTE_SIZE = 255
+"""Number of colours in the palette; the 256th marks pixels that are unchanged since the previous frame."""
+SAMPLE_FRAMES = 8
+"""Number of first frames from which the palette is chosen."""
+_DROPPED_BITS, _STATUS_WEIGHT = 3, 60
 
 
 def write_mp4(path: Path, frames: Iterable[Image.Image], rate: float) -> None:
-    """Write frames, `rate` of them a second, as H.264 that every browser and phone plays."""
+    """Write frames, `rate` per second, as H.264 for browsers and phones."""
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
         stream = container.add_stream("libx264", rate=round(rate), options={"crf": "20", "preset": "medium"})
         stream.pix_fmt = "yuv420p"
@@ -38,41 +38,50 @@ def write_mp4(path: Path, frames: Iterable[Image.Image], rate: float) -> None:
 
 
 def write_gif(path: Path, frames: Iterable[Image.Image], rate: float) -> None:
-    """Write frames, `rate` of them a second, as a GIF that begins again; all share one palette."""
+    """Write frames, `rate` per second, as an endless GIF with one palette."""
     small = (image.resize(GIF_SIZE, Image.Resampling.LANCZOS) for image in frames)
-    first = list(islice(small, SAMPLED))
-    palette = _palette(first)
-    drawn = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in chain(first, small))
-    next(drawn).save(
-        path, "GIF", save_all=True, append_images=drawn, duration=round(1000 / rate), loop=0, optimize=False
+    first = list(islice(small, SAMPLE_FRAMES))
+    palette = _choose_palette(first)
+    quantized = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in chain(first, small))
+    next(quantized).save(
+        path,
+        "GIF",
+        save_all=True,
+        append_images=quantized,
+        duration=round(1000 / rate),
+        loop=0,
+        optimize=False,
     )
 
 
-def _palette(frames: list[Image.Image]) -> Image.Image:
-    """Return an image with the colours that suit these frames, and those of how a run ends.
+def _choose_palette(frames: list[Image.Image]) -> Image.Image:
+    """Return an image whose palette has the colours of these frames and of the status of a run.
 
-    What covers little is seen as well as what covers much: each colour counts by the root of its share.
+    Each colour counts by the square root of its number of pixels, so that small objects keep their colours.
     """
-    seen = np.concatenate([np.asarray(frame).reshape(-1, 3) for frame in frames])
-    coarse = seen.astype(np.int32) >> _COARSE << _COARSE
+    pixels = np.concatenate([np.asarray(frame).reshape(-1, 3) for frame in frames])
+    coarse = pixels.astype(np.int32) >> _DROPPED_BITS << _DROPPED_BITS
     codes = coarse @ [1 << 16, 1 << 8, 1]
     _, places, counts = np.unique(codes, return_index=True, return_counts=True)
-    ends = np.array([ImageColor.getrgb(colour) for colour in (RUNNING, SUCCESS, FAILURE)], np.uint8)
-    weighed = np.concatenate(
-        [np.repeat(seen[places], np.sqrt(counts).astype(int), axis=0), np.repeat(ends, _ENDS, axis=0)]
+    status_colours = np.array([ImageColor.getrgb(colour) for colour in (RUNNING, SUCCESS, FAILURE)], np.uint8)
+    samples = np.concatenate(
+        [
+            np.repeat(pixels[places], np.sqrt(counts).astype(int), axis=0),
+            np.repeat(status_colours, _STATUS_WEIGHT, axis=0),
+        ]
     )
-    return Image.fromarray(weighed[None]).quantize(COLOURS, Image.Quantize.MEDIANCUT)
+    return Image.fromarray(samples[None]).quantize(PALETTE_SIZE, Image.Quantize.MEDIANCUT)
 
 
 @dataclass(frozen=True)
 class Format:
-    """What a film can be.
+    """File format of a film.
 
     Attributes:
-        suffix: How the names of such files end.
+        suffix: Suffix of the file name.
         rate: Frames per second.
-        speed: Seconds on the robot's clock per second of the film, where nobody says otherwise.
-        write: Writes frames to a file.
+        speed: Default number of seconds on the robot's clock per second of the film.
+        write: Function that writes frames to a file.
     """
 
     suffix: str
@@ -82,45 +91,43 @@ class Format:
 
 
 MP4 = Format(".mp4", 25.0, 1.0, write_mp4)
-"""A film to watch."""
+"""Video in full resolution."""
 GIF = Format(".gif", 10.0, 2.0, write_gif)
-"""A film that begins by itself where a picture can stand; its time is counted in hundredths of a second."""
+"""Animated image at lower resolution; the format counts time in hundredths of a second."""
 FORMATS = (MP4, GIF)
 
 
 def format_of(out: Path | None, gif: bool) -> Format:
-    """Return what a film is to be.
+    """Return the format of a film.
 
     Args:
         out: The file that it is to be in; None where nobody said.
         gif: Whether somebody asked for a GIF.
 
     Raises:
-        InputError: The name of the file says something else.
+        InputError: The suffix of the file is unknown or contradicts `gif`.
     """
-    wanted = GIF if gif else MP4
+    default = GIF if gif else MP4
     if out is None:
-        return wanted
+        return default
     suffix = out.suffix.lower()
     if gif and suffix != GIF.suffix:
-        raise InputError(f'"{out}" is no name for a GIF; end it in .gif, or leave out --gif')
+        raise InputError(f'"{out}" is not a name of a GIF; end it in .gif, or leave out --gif')
     found = next((format for format in FORMATS if format.suffix == suffix), None)
     if found is None:
-        raise InputError(f'"{out}" is no name for a film; end it in {MP4.suffix} or {GIF.suffix}')
+        raise InputError(f'"{out}" is not a name of a film; end it in {MP4.suffix} or {GIF.suffix}')
     return found
 
 
 @contextmanager
 def file_for(path: Path, *, force: bool) -> Iterator[Path]:
-    """Yield a file to write a film into; it gets to `path`, whole, when nothing went wrong.
+    """Yield a temporary file for a film; move it to `path` if no exception occurred.
 
     Raises:
-        InputError: There is something already, or nothing can be written there.
+        InputError: The file exists, or cannot be written.
     """
     if path.exists() and not force:
-        raise InputError(
-            f'"{path}" is there already; name another file with -o, or write over it with --force'
-        )
+        raise InputError(f'"{path}" exists; name another file with -o, or overwrite it with --force')
     instead = "name another place with -o"
     with explained(InputError, f'cannot write the film "{path}"', instead), atomic_replacement(path) as part:
         yield part

@@ -1,4 +1,4 @@
-"""Colours, type and marks of a film, and text that stays within its width."""
+"""Colours, font and status marks of a film, and text of limited width."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from functools import lru_cache
 from PIL import Image, ImageDraw, ImageFont
 
 BACK, RULE = "#14181D", "#2E3742"
-"""Colours behind everything, and of lines."""
+"""Colours of the background and of lines."""
 INK, DIM, FAINT = "#F3F6F8", "#9AA6B2", "#66727F"
-"""Colours of text: what is looked at, what is read, what is at rest."""
+"""Colours of important text, of other text, and of nodes that do not run."""
 RUNNING, SUCCESS, FAILURE = "#F2A71B", "#45BD70", "#F0685C"
-"""Colours of a status, those of `executive.view.tree.style` as they show on a dark ground."""
+"""Colours of a status: those of `executive.view.tree.style`, adapted to a dark background."""
 STATUS = {"RUNNING": RUNNING, "SUCCESS": SUCCESS, "FAILURE": FAILURE}
-"""Colour by status; a node of another one rests."""
+"""Colour by status; any other status is drawn as `FAINT`."""
 
-_FINE, _WIDTH = 8, 0.17
+_OVERSAMPLING, _LINE_WIDTH = 8, 0.17
 """Factor by which marks are drawn larger and then shrunk; width of their lines [share of their size]."""
 _TICK = [[(0.12, 0.54), (0.4, 0.82), (0.9, 0.22)]]
 _CROSS = [[(0.17, 0.17), (0.83, 0.83)], [(0.83, 0.17), (0.17, 0.83)]]
@@ -24,15 +24,15 @@ _ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 
 @lru_cache(maxsize=32)
 def font(size: float) -> ImageFont.FreeTypeFont:
-    """Return the type of that size [pixel]; it comes with Pillow, whatever else is installed."""
-    found = ImageFont.load_default(size)
-    assert isinstance(found, ImageFont.FreeTypeFont), "Pillow's wheels draw with FreeType"
-    return found
+    """Return Pillow's own font in a size [pixel]."""
+    default_font = ImageFont.load_default(size)
+    assert isinstance(default_font, ImageFont.FreeTypeFont), "Pillow's wheels draw with FreeType"
+    return default_font
 
 
 @lru_cache(maxsize=4096)
 def clipped(text: str, size: float, width: float) -> str:
-    """Return a text, its end left out where it is wider than `width` [pixel]."""
+    """Return a text, shortened with an ellipsis to `width` [pixel]."""
     line = " ".join(text.split())
     if font(size).getlength(line) <= width:
         return line
@@ -42,7 +42,7 @@ def clipped(text: str, size: float, width: float) -> str:
 
 
 def wrapped(text: str, size: float, width: float, most: int) -> list[str]:
-    """Return a text in at most so many lines, none wider than `width` [pixel]."""
+    """Return a text in at most `most` lines of at most `width` [pixel]."""
     lines: list[str] = []
     words = text.split()
     while words and len(lines) < most - 1:
@@ -56,7 +56,7 @@ def wrapped(text: str, size: float, width: float, most: int) -> list[str]:
 
 
 def put_mark(image: Image.Image, status: str, centre: tuple[float, float], size: int) -> None:
-    """Draw the mark of a status: a triangle runs, a tick succeeded, a cross failed, a dot rests.
+    """Draw the mark of a status: triangle for running, tick for success, cross for failure, dot for others.
 
     Args:
         image: Image to draw on.
@@ -65,19 +65,19 @@ def put_mark(image: Image.Image, status: str, centre: tuple[float, float], size:
         size: Side of the square around it [pixel].
     """
     left, top = round(centre[0] - size / 2), round(centre[1] - size / 2)
-    image.paste(STATUS.get(status, FAINT), (left, top, left + size, top + size), _mark(status, size))
+    image.paste(STATUS.get(status, FAINT), (left, top, left + size, top + size), _draw_mask(status, size))
 
 
 @lru_cache(maxsize=16)
-def _mark(status: str, size: int) -> Image.Image:
-    """Return how much of each pixel a mark covers, `(size, size)`."""
-    side = size * _FINE
+def _draw_mask(status: str, size: int) -> Image.Image:
+    """Return the coverage of each pixel by a mark, 0 to 255, `(size, size)`."""
+    side = size * _OVERSAMPLING
     mask = Image.new("L", (side, side))
     draw = ImageDraw.Draw(mask)
     if status == "RUNNING":
         draw.polygon([(0.16 * side, 0.08 * side), (0.92 * side, 0.5 * side), (0.16 * side, 0.92 * side)], 255)
     elif status in ("SUCCESS", "FAILURE"):
-        width = round(side * _WIDTH)
+        width = round(side * _LINE_WIDTH)
         for line in _TICK if status == "SUCCESS" else _CROSS:
             points = [(x * side, y * side) for x, y in line]
             draw.line(points, 255, width, joint="curve")

@@ -20,14 +20,14 @@ from executive.view.film.source import FilmSource
 
 WIDTH, HEIGHT = 1280, 720
 """Size of a frame [pixel]."""
-STAGE = (800, 720)
-"""Width and height of the picture of the cell [pixel]."""
-LEFT, RIGHT = STAGE[0] + 28, WIDTH - 28
+SCENE_SIZE = (800, 720)
+"""Width and height of the image of the cell [pixel]."""
+LEFT, RIGHT = SCENE_SIZE[0] + 28, WIDTH - 28
 """Left and right end of the panel's text [pixel]."""
 INSET = (224, 168)
-"""Largest width and height of the camera's picture [pixel]."""
+"""Largest width and height of the camera image [pixel]."""
 CAPTION, CARD = 620, 620
-"""Largest width of a caption's text and of the card at the end [pixel]."""
+"""Largest widths of the text of a caption and of the box with the result [pixel]."""
 _TITLE, _NOTE, _TREE_TOP, _BELOW = 26, 14, 122, 22
 _MARGIN, _PAD, _TYPE, _LABEL, _LINE = 20, 12, 17, 13, 23
 _END_STATUS, _END_TYPE, _END_LINE, _END_PAD = 40, 18, 26, 24
@@ -42,11 +42,11 @@ def draw_page(
     length: float,
     caption: bool = True,
 ) -> Image.Image:
-    """Return the page that shows a run as `course` has it.
+    """Return the frame for the state of a run in `course`.
 
     Args:
         source: The record of the run.
-        picture: Picture of the world, of the size `STAGE`.
+        picture: Picture of the world, of the size `SCENE_SIZE`.
         course: The run so far.
         note: Second line of the page: seed, cell, speed.
         length: Time on the robot's clock in all [s].
@@ -55,9 +55,9 @@ def draw_page(
     page = Image.new("RGB", (WIDTH, HEIGHT), BACK)
     page.paste(Image.fromarray(picture), (0, 0))
     _draw_camera(page, course.picture)
-    if caption and (course.trouble or course.doing):
-        lines = wrapped(course.trouble, _TYPE, CAPTION, 2) or [clipped(course.doing, _TYPE, CAPTION)]
-        _draw_caption(page, lines, FAILURE if course.trouble else RUNNING)
+    if caption and (course.failure or course.current_action):
+        lines = wrapped(course.failure, _TYPE, CAPTION, 2) or [clipped(course.current_action, _TYPE, CAPTION)]
+        _draw_caption(page, lines, FAILURE if course.failure else RUNNING)
     _draw_head(page, source.start.mission, note, course.clock, length)
     top = HEIGHT - _BELOW - panel.height(source.items)
     ImageDraw.Draw(page).line((LEFT, top - 10, RIGHT, top - 10), RULE, 1)
@@ -67,8 +67,8 @@ def draw_page(
 
 
 def draw_ending(page: Image.Image, result: Result | RunEnded | None) -> Image.Image:
-    """Return a page with the end of a run, by its result, written over the picture of the cell."""
-    status, sentence, figures = ending_of(result)
+    """Return a frame with the result of a run over the image of the cell."""
+    status, sentence, figures = describe_result(result)
     lines = wrapped(sentence, _END_TYPE, CARD - 2 * _END_PAD, 4)
     notes = wrapped(figures, _END_TYPE, CARD - 2 * _END_PAD, 2)
     height = (
@@ -76,7 +76,7 @@ def draw_ending(page: Image.Image, result: Result | RunEnded | None) -> Image.Im
     )
     longest = max((font(_END_TYPE).getlength(line) for line in [*lines, *notes]), default=0)
     width = max(longest, font(_END_STATUS).getlength(status)) + 2 * _END_PAD
-    left, top = STAGE[0] - width - _MARGIN, STAGE[1] - height - _MARGIN
+    left, top = SCENE_SIZE[0] - width - _MARGIN, SCENE_SIZE[1] - height - _MARGIN
     colour = _COLOURS.get(status, RUNNING)
     shown = page.copy()
     draw = ImageDraw.Draw(shown)
@@ -90,8 +90,8 @@ def draw_ending(page: Image.Image, result: Result | RunEnded | None) -> Image.Im
     return shown
 
 
-def ending_of(result: Result | RunEnded | None) -> tuple[str, str, str]:
-    """Return status, sentence and figures of the end of a run; without a result the run was cut off."""
+def describe_result(result: Result | RunEnded | None) -> tuple[str, str, str]:
+    """Return status, sentence and counts of the result of a run; None means that the run was interrupted."""
     if result is None:
         return "CUT OFF", "the record ends here; nothing says how the run would have ended", ""
     if isinstance(result, RunEnded):
@@ -102,7 +102,7 @@ def ending_of(result: Result | RunEnded | None) -> tuple[str, str, str]:
 
 
 def _draw_head(page: Image.Image, title: str, note: str, clock: float, length: float) -> None:
-    """Draw the title, the time, and how far the run is."""
+    """Draw the title, the time, and the progress of the run."""
     draw = ImageDraw.Draw(page)
     room = RIGHT - LEFT - font(_TITLE).getlength(f"{length:.1f} s") - 24
     draw.text((LEFT, 50), clipped(title, _TITLE, room), INK, font(_TITLE), "ls")
@@ -114,10 +114,10 @@ def _draw_head(page: Image.Image, title: str, note: str, clock: float, length: f
 
 
 def _draw_caption(page: Image.Image, lines: list[str], colour: str) -> None:
-    """Write lines at the bottom of the picture, beside a bar of this colour."""
+    """Write lines at the bottom of the image, beside a bar of this colour."""
     width = max(font(_TYPE).getlength(line) for line in lines) + 2 * _PAD + 8
     height = _LINE * len(lines) + 14
-    left, top = _MARGIN, STAGE[1] - _MARGIN - height
+    left, top = _MARGIN, SCENE_SIZE[1] - _MARGIN - height
     draw = ImageDraw.Draw(page)
     draw.rounded_rectangle((left, top, left + width, top + height), 6, BACK)
     draw.rounded_rectangle((left + 6, top + 7, left + 9, top + height - 7), 2, colour)
@@ -127,8 +127,8 @@ def _draw_caption(page: Image.Image, lines: list[str], colour: str) -> None:
 
 
 def _draw_camera(page: Image.Image, picture: Path | None) -> None:
-    """Draw a picture of the camera in the corner, with its subject by its name `<tick>_<item>_<reason>`."""
-    inset = None if picture is None else _inset(picture)
+    """Draw a camera image in the corner; its caption is from the file name `<tick>_<item>_<reason>`."""
+    inset = None if picture is None else _load_inset(picture)
     if inset is None or picture is None:
         return
     width, height = inset.size
@@ -141,8 +141,8 @@ def _draw_camera(page: Image.Image, picture: Path | None) -> None:
 
 
 @lru_cache(maxsize=2)
-def _inset(picture: Path) -> Image.Image | None:
-    """Return the image in a picture, without the strip below it; None where it cannot be read any more."""
+def _load_inset(picture: Path) -> Image.Image | None:
+    """Return the camera image in a file, without the strip of text below it; None if it cannot be read."""
     try:
         with Image.open(picture) as file:
             image = file.convert("RGB")

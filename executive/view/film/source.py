@@ -1,4 +1,4 @@
-"""Record of a run on a simulated cell, as far as a film is made from it."""
+"""Record of a run on a simulated cell, for a film."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ class FilmSource:
 
     Attributes:
         directory: The run directory.
-        events: The events of its journal that count.
+        events: Events of the journal that no resumption made void.
         start: Start of the run.
         nodes: Its tree.
         config: Its cell.
         bins: Colour of each bin, by name.
         items: Number of items in the run.
-        result: Its result; without one the end in the journal; None if the run was cut off.
+        result: Result, else the last event of the run in the journal; None if the run was interrupted.
 
     Raises:
-        InputError: The record lacks what a film is made from.
+        InputError: The record lacks the journal, the tree, the cell or the log of the world.
     """
 
     def __init__(self, directory: RunDirectory) -> None:
@@ -50,10 +50,10 @@ class FilmSource:
 
 
 def _require_log(directory: RunDirectory) -> None:
-    """Make sure that the record holds a simulated world.
+    """Check that the record holds the log of a simulated world.
 
     Raises:
-        InputError: It holds none.
+        InputError: The record holds no log of a simulated world.
     """
     if not directory.world.exists():
         raise InputError(

@@ -1,11 +1,11 @@
-"""State of the page at this moment, and its changes since the browsers got the last message."""
+"""State of the live page, and its changes since the last message to the browsers."""
 
 from __future__ import annotations
 
 import base64
 from collections import Counter
 from dataclasses import asdict
-from typing import Any
+from typing import cast
 
 import numpy as np
 
@@ -16,10 +16,10 @@ from executive.view.live.messages import CameraImage, Change, Message
 
 QUALITY = 80
 """JPEG quality of the camera's image, 0 to 100."""
-SHADE = 0.45
+ARM_SHADE = 0.45
 """Darkening of the pixels that the arm hides: 0 none, 1 black."""
 
-Json = dict[str, Any]
+Json = dict[str, object]
 """JSON object for `page.js`: nodes by path, items by name, and one key for each other part of the page."""
 
 
@@ -27,49 +27,49 @@ class Board:
     """Follows the messages of a run.
 
     Attributes:
-        everything: State of the page as JSON.
+        state: State of the page as JSON.
     """
 
     def __init__(self) -> None:
-        self.everything: Json = {"paused": False, "over": False, "nodes": {}, "items": {}}
-        self._news: Json = {}
+        self.state: Json = {"paused": False, "over": False, "nodes": {}, "items": {}}
+        self._changes: Json = {}
         self._timeline = Timeline(history=False)
 
-    def take(self, message: Message) -> None:
-        """Change the state of the page by a message."""
+    def apply(self, message: Message) -> None:
+        """Update the state of the page by a message."""
         match message:
             case events.TimedEvent():
                 self._timeline(message)
-                self._show(clock=message.clock)
-                self._take_event(message.event)
+                self._set(clock=message.clock)
+                self._apply_event(message.event)
             case CameraImage():
-                self._show(look=_encoded(message.frame, message.look))
+                self._set(look=_encode(message.frame, message.look))
             case Change():
-                self._show(**{part: value for part, value in asdict(message).items() if value is not None})
+                self._set(**{part: value for part, value in asdict(message).items() if value is not None})
 
-    def news(self) -> Json:
-        """Return the changes since the last call; empty if there are none."""
-        fresh, self._news = self._news, {}
-        return fresh
+    def take_changes(self) -> Json:
+        """Return the changes since the last call, and forget them; empty if there are none."""
+        changes, self._changes = self._changes, {}
+        return changes
 
-    def _take_event(self, event: events.Event) -> None:
+    def _apply_event(self, event: events.Event) -> None:
         match event:
             case events.NodeStarted(node) | events.NodeEnded(node):
-                self._put("nodes", node, self._node(node))
+                self._set_entry("nodes", node, self._describe_node(node))
             case events.ItemChanged():
-                self._put("items", event.item, vars(event))
+                self._set_entry("items", event.item, vars(event))
             case events.TargetSelected():
-                self._show(decision=vars(event))
+                self._set(decision=vars(event))
             case events.RunStarted():
-                self._show(run={"mission": event.mission, "seed": event.seed})
+                self._set(run={"mission": event.mission, "seed": event.seed})
             case events.OperatorAsked():
-                self._show(asking=event.choices)
+                self._set(asking=event.choices)
             case events.RequestGiven():
-                self._show(asking=None)
+                self._set(asking=None)
             case events.RunEnded():
-                self._show(asking=None, over=True)
+                self._set(asking=None, over=True)
 
-    def _node(self, path: str) -> Json:
+    def _describe_node(self, path: str) -> Json:
         last, counts = self._timeline.nodes[path], self._timeline.counts.get(path, Counter())
         ends = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
         return {
@@ -77,23 +77,24 @@ class Board:
             "status": last.status.lower(), "said": last.failure, "item": last.item,
         }  # fmt: skip
 
-    def _show(self, **parts: object) -> None:
-        self.everything |= parts
-        self._news |= parts
+    def _set(self, **parts: object) -> None:
+        self.state |= parts
+        self._changes |= parts
 
-    def _put(self, part: str, name: str, value: Json) -> None:
-        for shown in (self.everything, self._news):
-            shown.setdefault(part, {})[name] = value
+    def _set_entry(self, part: str, name: str, value: Json) -> None:
+        for shown in (self.state, self._changes):
+            entries = cast("Json", shown.setdefault(part, {}))
+            entries[name] = value
 
 
-def _encoded(frame: Frame, look: events.FrameSearched) -> Json:
+def _encode(frame: Frame, look: events.FrameSearched) -> Json:
     """Return a look with its image as JPEG, in which the pixels that the arm hides are darker."""
     import cv2
 
     shown = cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR)
     if frame.visible is not None:
         hidden = ~frame.visible
-        shown[hidden] = (shown[hidden] * (1 - SHADE)).astype(np.uint8)
+        shown[hidden] = (shown[hidden] * (1 - ARM_SHADE)).astype(np.uint8)
     _, data = cv2.imencode(".jpg", shown, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     height, width = frame.image.shape[:2]
     return {

@@ -25,11 +25,11 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Change:
-    """Change of the page besides those by events; None for a part that stays as it is.
+    """Change of the page that does not follow from an event; None for an unchanged part.
 
     Attributes:
         clock: Time of the run [s].
-        tree: Picture of the tree as SVG.
+        tree: Drawing of the tree as SVG.
         paused: True if the run is paused.
         note: Sentence about the record.
         result: End of the run.
@@ -51,12 +51,12 @@ class CameraImage:
 
 
 Bodies = Mapping[str, Sequence[float]]
-"""Places of all bodies by name: position [m] and quaternion (w, x, y, z)."""
+"""Poses of all bodies by name: position [m] and quaternion (w, x, y, z), `(7,)`."""
 
 
 @dataclass(frozen=True)
 class SceneChange:
-    """Change of the scene in three dimensions: its shapes at the start, then the places of its bodies."""
+    """Change of the three-dimensional scene: its shapes at the start, then the poses of its bodies."""
 
     shapes: Sequence[Shape] | None = None
     bodies: Bodies | None = None
@@ -67,14 +67,14 @@ Message = TimedEvent | Change | CameraImage | SceneChange
 
 
 @dataclass(frozen=True)
-class Wish:
+class PageCommand:
     """Command of a watcher, or the number of watchers.
 
     Attributes:
         do: `pause`, `resume`, `step`, `stop`, `request`, or `watched`.
         word: The requested class, `rescan` or `quit`.
         watchers: Number of watchers.
-        is_sparing: True if a browser draws on the processor that the run needs.
+        is_sparing: True if a browser renders on the CPU, which the run needs.
     """
 
     do: str
@@ -83,8 +83,8 @@ class Wish:
     is_sparing: bool = False
 
 
-def places_of(poses: Mapping[str, Pose]) -> Bodies:
-    """Return the places of bodies."""
+def encode_poses(poses: Mapping[str, Pose]) -> Bodies:
+    """Return the poses of bodies as positions and quaternions."""
     return {
         name: (*X_WB.position.tolist(), *np.roll(X_WB.quaternion, 1).tolist()) for name, X_WB in poses.items()
     }

@@ -1,22 +1,22 @@
 "use strict";
-// Shows what the server tells, and tells it which button was pressed.
+// Shows the messages of the server, and sends commands of the user to it.
 
 const SVG = "http://www.w3.org/2000/svg";
 const STATUS = ["running", "success", "failure", "invalid"];
 const COLOURS = ["#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00"];
-const FOLLOW_EVERY = 400; // ms
+const SCROLL_PERIOD = 400; // ms
 
 const find = (id) => document.getElementById(id);
 const state = { nodes: {}, items: {}, paused: false, over: false };
 const groups = new Map();
 const classes = [];
-let followed = 0;
+let lastScroll = 0;
 
 const address = new URL("live", location.href);
 address.protocol = "ws:";
 const socket = new WebSocket(address);
 socket.onopen = () => {
-  if (drawsOnProcessor()) wish({ do: "spare" });
+  if (rendersOnCpu()) send({ do: "spare" });
 };
 socket.onmessage = (message) => show(JSON.parse(message.data));
 socket.onclose = () => {
@@ -24,46 +24,46 @@ socket.onclose = () => {
   for (const button of document.querySelectorAll("button")) button.disabled = true;
 };
 find("whole").onchange = () => document.querySelector("#tree .scroll").classList.toggle("whole", find("whole").checked);
-for (const what of ["pause", "resume", "step", "stop"]) find(what).onclick = () => wish({ do: what });
+for (const command of ["pause", "resume", "step", "stop"]) find(command).onclick = () => send({ do: command });
 
-function wish(what) {
-  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(what));
+function send(command) {
+  if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
 }
 
-function drawsOnProcessor() {
+function rendersOnCpu() {
   const context = document.createElement("canvas").getContext("webgl");
-  const named = context && context.getExtension("WEBGL_debug_renderer_info");
-  return !named || /swiftshader|llvmpipe|software/i.test(context.getParameter(named.UNMASKED_RENDERER_WEBGL));
+  const extension = context && context.getExtension("WEBGL_debug_renderer_info");
+  return !extension || /swiftshader|llvmpipe|software/i.test(context.getParameter(extension.UNMASKED_RENDERER_WEBGL));
 }
 
-function show(news) {
-  const { nodes, items, ...rest } = news;
+function show(changes) {
+  const { nodes, items, ...rest } = changes;
   Object.assign(state, rest);
-  if ("tree" in news) plant(news.tree);
+  if ("tree" in changes) showTree(changes.tree);
   for (const [path, node] of Object.entries(nodes ?? {})) {
     state.nodes[path] = node;
-    light(path, node);
-    // What went wrong last, in the words of the skill: those of control nodes only pass it on.
+    showStatus(path, node);
+    // The last failure is shown with the message of its skill; control nodes only pass it on.
     const group = groups.get(path);
     if (node.status === "failure" && node.said && group?.classList.contains("skill")) {
       find("said").textContent = `${path.split("/").pop().split(":").pop()}: ${node.said}`;
     }
   }
   Object.assign(state.items, items);
-  if ("run" in news) {
-    find("mission").textContent = `${news.run.mission}, seed ${news.run.seed}`;
-    document.title = `${news.run.mission} · executive`;
+  if ("run" in changes) {
+    find("mission").textContent = `${changes.run.mission}, seed ${changes.run.seed}`;
+    document.title = `${changes.run.mission} · executive`;
   }
-  if ("clock" in news) find("clock").textContent = `${news.clock.toFixed(1)} s`;
-  if (items) table();
-  if ("look" in news || "decision" in news || (items && state.look)) picture();
-  if ("asking" in news) ask(news.asking);
-  if (news.note) find("said").textContent = news.note;
-  if (nodes) follow();
-  if ("result" in news) outcome(news.result);
+  if ("clock" in changes) find("clock").textContent = `${changes.clock.toFixed(1)} s`;
+  if (items) showItems();
+  if ("look" in changes || "decision" in changes || (items && state.look)) showCamera();
+  if ("asking" in changes) ask(changes.asking);
+  if (changes.note) find("said").textContent = changes.note;
+  if (nodes) scrollToRunning();
+  if ("result" in changes) showResult(changes.result);
   else if (!state.result) {
-    const doing = state.paused ? "paused" : state.asking ? "asking" : "running";
-    headline(state.over ? "invalid" : "running", state.over ? "ending" : doing);
+    const status = state.paused ? "paused" : state.asking ? "asking" : "running";
+    headline(state.over ? "invalid" : "running", state.over ? "ending" : status);
   }
   find("pause").disabled = state.paused || state.over;
   find("resume").disabled = !state.paused || state.over;
@@ -75,47 +75,47 @@ function headline(kind, text) {
   find("status").textContent = text;
 }
 
-function plant(text) {
+function showTree(text) {
   const tree = document.importNode(new DOMParser().parseFromString(text, "image/svg+xml").documentElement, true);
   document.querySelector("#tree .scroll").replaceChildren(tree);
   groups.clear();
   for (const group of tree.querySelectorAll("g.node")) groups.set(group.dataset.path, group);
-  for (const [path, node] of Object.entries(state.nodes)) light(path, node);
+  for (const [path, node] of Object.entries(state.nodes)) showStatus(path, node);
 }
 
-function light(path, node) {
+function showStatus(path, node) {
   const group = groups.get(path);
   if (!group) return;
   group.classList.remove(...STATUS);
   group.classList.add(node.status);
   const counts = [[node.done, "✓"], [node.failed, "✗"], [node.halted, "–"]];
-  const told = counts.filter(([number]) => number).map(([number, mark]) => `${number} ${mark}`);
+  const texts = counts.filter(([number]) => number).map(([number, mark]) => `${number} ${mark}`);
   const note = group.querySelector(".note");
-  if (note) note.textContent = told.join("  ");
-  // Its line goes above its siblings'.
+  if (note) note.textContent = texts.join("  ");
+  // Draw the line to a running node above the lines to its siblings.
   if (node.status === "running" && group.nextElementSibling) group.parentNode.append(group);
 }
 
-function follow() {
+function scrollToRunning() {
   const now = performance.now();
-  if (!find("follow").checked || now - followed < FOLLOW_EVERY) return;
+  if (!find("follow").checked || now - lastScroll < SCROLL_PERIOD) return;
   const running = [...groups.values()].filter((g) => g.classList.contains("skill") && g.classList.contains("running"));
   const target = running[0];
   if (!target) return;
-  followed = now;
+  lastScroll = now;
   const frame = document.querySelector("#tree .scroll");
   const box = target.querySelector(".box").getBoundingClientRect();
   const view = frame.getBoundingClientRect();
   const inside = box.left >= view.left && box.right <= view.right && box.top >= view.top && box.bottom <= view.bottom;
   if (inside) return;
-  // At once: a picture this large glides at the cost of the run.
+  // At once: a showCamera this large glides at the cost of the run.
   frame.scrollTo({
     left: frame.scrollLeft + box.left - view.left - 0.62 * view.width,
     top: frame.scrollTop + box.top - view.top - 0.4 * view.height,
   });
 }
 
-function table() {
+function showItems() {
   const rows = Object.values(state.items).filter((item) => item.state !== "phantom");
   find("items").querySelector("tbody").replaceChildren(...rows.map((item) => {
     const row = document.createElement("tr");
@@ -127,38 +127,38 @@ function table() {
   }));
 }
 
-function picture() {
+function showCamera() {
   const look = state.look;
   if (!look) return;
-  const shown = element("svg", { viewBox: `0 0 ${look.width} ${look.height}`, class: "look" });
-  shown.append(element("image", { href: look.source, width: look.width, height: look.height }));
-  const chosen = nearest(look);
-  look.found.forEach((box, number) => shown.append(...boxed(box, number === chosen)));
-  document.querySelector("#look .picture").replaceChildren(shown);
+  const shown = makeElement("svg", { viewBox: `0 0 ${look.width} ${look.height}`, class: "look" });
+  shown.append(makeElement("image", { href: look.source, width: look.width, height: look.height }));
+  const chosen = findChosen(look);
+  look.found.forEach((box, number) => shown.append(...drawBox(box, number === chosen)));
+  document.querySelector("#look .showCamera").replaceChildren(shown);
   find("frame").textContent = `${look.camera}, frame ${look.frame} at ${look.stamp.toFixed(2)} s, by ${look.detector}`;
 }
 
-function boxed(box, chosen) {
+function drawBox(box, chosen) {
   const [left, top, right, bottom] = box.box;
   if (!classes.includes(box.label)) classes.push(box.label);
   const colour = COLOURS[classes.indexOf(box.label) % COLOURS.length];
-  const drawn = element("rect", { x: left, y: top, width: right - left, height: bottom - top, class: chosen ? "chosen" : "" });
+  const drawn = makeElement("rect", { x: left, y: top, width: right - left, height: bottom - top, class: chosen ? "chosen" : "" });
   drawn.style.stroke = colour;
-  const label = element("text", { x: left, y: top - 4 });
+  const label = makeElement("text", { x: left, y: top - 4 });
   label.textContent = `${chosen ? state.decision.item : box.label} ${box.confidence.toFixed(2)}`;
   label.style.fill = colour;
   return [drawn, label];
 }
 
-function nearest(look) {
+function findChosen(look) {
   const item = state.decision && state.items[state.decision.item];
   if (!item || !item.position || item.state === "placed") return -1;
-  const away = (box) => (box.position ? Math.hypot(box.position[0] - item.position[0], box.position[1] - item.position[1]) : Infinity);
-  const best = look.found.reduce((a, box, number) => (a < 0 || away(box) < away(look.found[a]) ? number : a), -1);
-  return best >= 0 && away(look.found[best]) < 0.03 ? best : -1;
+  const distance = (box) => (box.position ? Math.hypot(box.position[0] - item.position[0], box.position[1] - item.position[1]) : Infinity);
+  const best = look.found.reduce((a, box, number) => (a < 0 || distance(box) < distance(look.found[a]) ? number : a), -1);
+  return best >= 0 && distance(look.found[best]) < 0.03 ? best : -1;
 }
 
-function element(tag, attributes) {
+function makeElement(tag, attributes) {
   const made = document.createElementNS(SVG, tag);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
   return made;
@@ -172,11 +172,11 @@ function ask(choices) {
   for (const word of words) {
     const button = panel.appendChild(document.createElement("button"));
     button.textContent = word;
-    button.onclick = () => wish({ do: "request", word });
+    button.onclick = () => send({ do: "request", word });
   }
 }
 
-function outcome(result) {
+function showResult(result) {
   const kinds = { SUCCESS: "success", FAILURE: "failure", FAULT: "failure" };
   headline(kinds[result.status] ?? "invalid", result.status);
   const panel = find("outcome");

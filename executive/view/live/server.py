@@ -1,4 +1,4 @@
-"""Server of the live page: who may come, what it serves, and what it takes."""
+"""Server of the live page: access control, files, messages to browsers and commands from browsers."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from importlib.resources import files
 from aiohttp import WSMsgType, web
 
 from executive.view.live.board import Board
-from executive.view.live.messages import Wish
+from executive.view.live.messages import PageCommand
 from executive.view.live.tunnel import Tunnel
 
-PERIOD = 1 / 8
+MESSAGE_PERIOD = 1 / 8
 """Time between two messages to the browsers [s]."""
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 HEADERS = {
-    # The token is in the address: it must not leave with a link, nor stay in a cache.
+    # The token is in the address: links and caches must not reveal it.
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -31,9 +31,9 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
 }
 SHUTDOWN_TIMEOUT = 0.5
-"""Longest wait for the browsers to take in the last news [s]."""
-WISHES = ("pause", "resume", "step", "stop", "spare")
-MAX_MESSAGE = 4096
+"""Longest wait for the browsers to receive the last message [s]."""
+COMMANDS = ("pause", "resume", "step", "stop", "spare")
+MAX_MESSAGE_SIZE = 4096
 """Largest message of a browser [bytes]."""
 _FILES = {
     "": ("live/page.html", "text/html"),
@@ -46,35 +46,35 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Serves the page to whoever knows its token and comes from the page itself.
+    """Serves requests that contain the token and do not come from other pages.
 
     Args:
         board: State of the page.
         tunnel: Leads to the scene.
-        wish: Takes what a person wants of the run, and how many watch.
+        command: Takes what a person wants of the run, and how many watch.
         token: First part of every address.
         port: The server's.
     """
 
     def __init__(
-        self, board: Board, tunnel: Tunnel, wish: Callable[[Wish], None], token: str, port: int
+        self, board: Board, tunnel: Tunnel, command: Callable[[PageCommand], None], token: str, port: int
     ) -> None:
         self._board = board
-        self._wish = wish
+        self._send_command = command
         self._token = token
-        # By no other name: what answers to `localhost` may be another server, at [::1].
+        # Not `localhost`: this name may lead to another server, at [::1].
         self._host = f"127.0.0.1:{port}"
         self._watchers: dict[web.WebSocketResponse, bool] = {}
-        self.app = web.Application(middlewares=[self._guarded])
-        self.app.router.add_get("/{token}/live", self._live)
+        self.app = web.Application(middlewares=[self._check_access])
+        self.app.router.add_get("/{token}/live", self._serve_socket)
         self.app.router.add_get("/{token}/scene", tunnel.socket)
         self.app.router.add_get("/{token}/scene/{file:.*}", tunnel.page)
-        self.app.router.add_get("/{token}/{file:.*}", self._file)
+        self.app.router.add_get("/{token}/{file:.*}", self._serve_file)
 
     @web.middleware
-    async def _guarded(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Stand before every handler: refuse every request that is not of the page itself."""
-        if problem := refusal(request, self._token, self._host):
+    async def _check_access(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Refuse a request without the token or from another page; a middleware of all handlers."""
+        if problem := find_refusal(request, self._token, self._host):
             raise web.HTTPForbidden(text=f"{problem}\n", headers=HEADERS)
         response = await handler(request)
         if not response.prepared:
@@ -82,89 +82,89 @@ class Server:
                 response.headers.setdefault(key, value)
         return response
 
-    async def tell(self) -> None:
-        """Tell the watchers what is new."""
-        news = self._board.news()
-        if news and self._watchers:
-            text = json.dumps(news)
+    async def send_changes(self) -> None:
+        """Send the changes of the page to all watchers."""
+        changes = self._board.take_changes()
+        if changes and self._watchers:
+            text = json.dumps(changes)
             for watcher in list(self._watchers):
                 with contextlib.suppress(ConnectionError):
                     await watcher.send_str(text)
 
-    async def keep_telling(self) -> None:
-        """Tell the watchers what is new, for ever."""
+    async def send_periodically(self) -> None:
+        """Send the changes of the page once per `MESSAGE_PERIOD`, without end."""
         while True:
-            await asyncio.sleep(PERIOD)
-            await self.tell()
+            await asyncio.sleep(MESSAGE_PERIOD)
+            await self.send_changes()
 
     async def end(self) -> None:
-        """Say the last news and good-bye."""
-        await self.tell()
+        """Say the last changes and good-bye."""
+        await self.send_changes()
         closing = [asyncio.create_task(watcher.close()) for watcher in self._watchers]
         if closing:
             await asyncio.wait(closing, timeout=SHUTDOWN_TIMEOUT)
 
-    async def _file(self, request: web.Request) -> web.Response:
+    async def _serve_file(self, request: web.Request) -> web.Response:
         name = request.match_info["file"]
         if name not in _FILES:
-            raise web.HTTPNotFound(text="there is no such thing here\n")
+            raise web.HTTPNotFound(text="there is no such file\n")
         file, kind = _FILES[name]
         text = files("executive.view").joinpath(file).read_text(encoding="utf-8")
         return web.Response(text=text, content_type=kind, headers={"Content-Security-Policy": POLICY})
 
-    async def _live(self, request: web.Request) -> web.WebSocketResponse:
-        """Show a watcher everything, then the news; take what they want."""
-        socket = web.WebSocketResponse(max_msg_size=MAX_MESSAGE, heartbeat=10)
+    async def _serve_socket(self, request: web.Request) -> web.WebSocketResponse:
+        """Show a watcher everything, then the changes; take what they want."""
+        socket = web.WebSocketResponse(max_msg_size=MAX_MESSAGE_SIZE, heartbeat=10)
         await socket.prepare(request)
-        await socket.send_str(json.dumps(self._board.everything))
+        await socket.send_str(json.dumps(self._board.state))
         self._watchers[socket] = False
-        self._tell_watched()
+        self._report_watchers()
         try:
             async for message in socket:
-                wish = understood(message.data) if message.type is WSMsgType.TEXT else None
-                if wish is not None and wish.do == "spare":
+                command = parse_command(message.data) if message.type is WSMsgType.TEXT else None
+                if command is not None and command.do == "spare":
                     self._watchers[socket] = True
-                    self._tell_watched()
-                elif wish is not None:
-                    self._wish(wish)
+                    self._report_watchers()
+                elif command is not None:
+                    self._send_command(command)
         finally:
             del self._watchers[socket]
-            self._tell_watched()
+            self._report_watchers()
         return socket
 
-    def _tell_watched(self) -> None:
-        """Tell the run how many watch, and whether it should be sparing with one of them."""
+    def _report_watchers(self) -> None:
+        """Report the number of watchers to the run, and whether a browser renders on the CPU."""
         sparing = any(self._watchers.values())
-        self._wish(Wish("watched", watchers=len(self._watchers), is_sparing=sparing))
+        self._send_command(PageCommand("watched", watchers=len(self._watchers), is_sparing=sparing))
 
 
-def refusal(request: web.Request, token: str, host: str) -> str:
-    """Return why a request is refused by the server with this token at this host, or ""."""
-    # A name that leads here is not enough: a foreign site may let its own name lead to this machine.
+def find_refusal(request: web.Request, token: str, host: str) -> str:
+    """Return the reason to refuse a request to the server with this token and host, or ""."""
+    # Another site may point its own host name to this machine: only the address is accepted.
     if request.headers.get("Host") != host:
-        return "this page goes by the address of this machine only"
+        return "the page must be opened by the address of this machine"
     given, _, _ = request.path.removeprefix("/").partition("/")
     if not secrets.compare_digest(given.encode(errors="replace"), token.encode()):
         return "the address lacks the token of this run; take it from the terminal that the run is in"
     origin = request.headers.get("Origin")
     if origin is not None and origin != f"http://{host}":
-        return "another page may neither see nor command this run"
-    # Browsers say so for every socket that a page opens.
+        return "another page may neither read nor control this run"
+    # Browsers send the origin of every socket that a page opens.
     if origin is None and request.headers.get("Upgrade", "").lower() == "websocket":
-        return "a connection must say which page it is of"
+        return "a connection must name the origin of its page"
     return ""
 
 
-def understood(text: str) -> Wish | None:
-    """Return the wish in a message of a browser, or None if the message is invalid."""
+def parse_command(text: str) -> PageCommand | None:
+    """Return the command in a message from a browser, or None if the message is invalid."""
     try:
-        wish = json.loads(text)
+        command = json.loads(text)
     except ValueError:
         return None
-    if not isinstance(wish, dict):
+    if not isinstance(command, dict):
         return None
-    if wish.get("do") in WISHES:
-        return Wish(wish["do"])
-    if wish.get("do") == "request" and isinstance(wish.get("word"), str):
-        return Wish("request", wish["word"])
+    if command.get("do") in COMMANDS:
+        return PageCommand(command["do"])
+    if command.get("do") == "request" and isinstance(command.get("word"), str):
+        return PageCommand("request", command["word"])
     return None

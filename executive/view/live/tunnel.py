@@ -1,4 +1,4 @@
-"""Way through the page's own door to the server of the scene, which is started when somebody first looks."""
+"""Proxy from the page's server to the server of the scene, which starts with the first request."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' data: blob:; "
     "connect-src 'self' data: blob:; frame-ancestors 'self'"
 )
-"""The scene's page is written by others: whatever it wants, it fetches nothing from elsewhere."""
-MAX_MESSAGE = 64 * 1024 * 1024
+"""Content security policy: the page of viser must not load anything from other servers."""
+MAX_MESSAGE_SIZE = 64 * 1024 * 1024
 """Largest message of the scene [bytes]: meshes are large."""
 
-Side = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
+Connection = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 
 class Tunnel:
-    """Keeps what there is to be seen until there is a scene, and hands requests on to the scene.
+    """Keeps shapes and poses until the scene exists, and forwards requests to the scene.
 
     Args:
-        path: The Unix socket that the scene listens on.
+        path: Unix socket of the scene.
     """
 
     def __init__(self, path: Path) -> None:
@@ -41,17 +41,17 @@ class Tunnel:
         self._building = asyncio.Lock()
 
     def show(self, shapes: Sequence[Shape]) -> None:
-        """Take the shapes of the scene; it does not begin without them."""
+        """Set the shapes of the scene, which can start afterwards."""
         self._shapes.set_result(shapes)
 
     def move(self, bodies: Mapping[str, Sequence[float]]) -> None:
-        """Put bodies where they are: position [m] and quaternion (w, x, y, z)."""
+        """Set the poses of bodies: position [m] and quaternion (w, x, y, z)."""
         self._bodies = bodies
         if self._scene is not None:
             self._scene.move(bodies)
 
     async def page(self, request: web.Request) -> web.Response:
-        """Return a file of the scene's server."""
+        """Forward the request of a file to the scene."""
         async with await self.session() as session:
             answer = await session.get(f"http://scene/{request.match_info['file']}")
             return web.Response(
@@ -62,40 +62,43 @@ class Tunnel:
             )
 
     async def socket(self, request: web.Request) -> web.WebSocketResponse:
-        """Hand messages on in both directions until one side ends."""
-        wanted = request.headers.get("Sec-WebSocket-Protocol", "")
-        protocols = [word.strip() for word in wanted.split(",") if word.strip()]
-        here = web.WebSocketResponse(protocols=protocols, max_msg_size=MAX_MESSAGE)
-        await here.prepare(request)
+        """Forward messages in both directions until one connection ends."""
+        header = request.headers.get("Sec-WebSocket-Protocol", "")
+        protocols = [word.strip() for word in header.split(",") if word.strip()]
+        browser = web.WebSocketResponse(protocols=protocols, max_msg_size=MAX_MESSAGE_SIZE)
+        await browser.prepare(request)
         async with (
             await self.session() as session,
-            session.ws_connect("http://scene/", protocols=protocols, max_msg_size=MAX_MESSAGE) as there,
+            session.ws_connect("http://scene/", protocols=protocols, max_msg_size=MAX_MESSAGE_SIZE) as scene,
         ):
-            ways = [asyncio.create_task(_carry(here, there)), asyncio.create_task(_carry(there, here))]
-            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
-            for way in ways:
-                way.cancel()
-        await here.close()
-        return here
+            tasks = [
+                asyncio.create_task(_forward(browser, scene)),
+                asyncio.create_task(_forward(scene, browser)),
+            ]
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in tasks:
+                task.cancel()
+        await browser.close()
+        return browser
 
     async def session(self) -> aiohttp.ClientSession:
-        """Return a session with the scene's server, once it is known what to show."""
+        """Return a session with the scene's server; wait for the shapes; start the server if necessary."""
         shapes = await asyncio.shield(self._shapes)
         async with self._building:
             if self._scene is None:
-                # Half a second of imports and a second of meshes, during which others are served.
-                self._scene = await asyncio.to_thread(_built, self._path, shapes)
+                # The start takes 1.5 s (imports and meshes); in a thread it does not block other requests.
+                self._scene = await asyncio.to_thread(_make_scene, self._path, shapes)
                 self._scene.move(self._bodies)
         return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(self._path)))
 
 
-def _built(path: Path, shapes: Sequence[Shape]) -> LiveScene:
+def _make_scene(path: Path, shapes: Sequence[Shape]) -> LiveScene:
     from executive.view.live.scene import LiveScene
 
     return LiveScene(path, shapes)
 
 
-async def _carry(source: Side, target: Side) -> None:
+async def _forward(source: Connection, target: Connection) -> None:
     async for message in source:
         if message.type is WSMsgType.BINARY:
             await target.send_bytes(message.data)

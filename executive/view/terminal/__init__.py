@@ -1,1 +1,1 @@
-"""A run on a terminal: the live screen, plain lines, keys, and the last words."""
+"""Views of a run on a terminal: live screen, plain lines, keys, and summary."""

@@ -39,19 +39,19 @@ class Lines:
 
     def __call__(self, timed: events.TimedEvent) -> None:
         """Write the line of an event, if it has one."""
-        if text := self._text(timed.event):
+        if text := self._describe(timed.event):
             self._stream.write(f"{timed.clock:9.2f} s  {text}\n")
             self._stream.flush()
         self.timeline(timed)
 
     def close(self) -> None:
-        """Leave the stream as it is: every line is out already."""
+        """Do nothing: every line is already flushed."""
 
     def note(self, sentence: str) -> None:
         """Write `sentence` on a line of its own."""
         self._stream.write(f"note: {sentence}\n")
 
-    def _text(self, event: events.Event) -> str:
+    def _describe(self, event: events.Event) -> str:
         match event:
             case events.RunStarted():
                 return f"{event.mission} starts, seed {event.seed}"
@@ -60,30 +60,30 @@ class Lines:
             case events.FaultInjected():
                 return f"injected fault: {event.name}"
             case events.NodeStarted() if event.skill:
-                return f"{self._named(event)} ..."
+                return f"{self._name_skill(event)} ..."
             case events.NodeEnded() if event.skill:
                 why = "".join(f": {text}" for text in (event.reason, event.message) if text)
-                return f"{self._named(event)} {ENDS[event.status]}{why}"
+                return f"{self._name_skill(event)} {ENDS[event.status]}{why}"
             case events.BranchChosen():
                 after = f", after {event.reason}" if event.reason else ""
                 return f"{self._names[event.node]}: {event.choice}{after}"
             case events.RequestGiven():
                 return f"request: {event.wanted}"
             case events.ItemChanged():
-                return self._change(event)
+                return self._describe_change(event)
         return ""
 
-    def _named(self, event: events.NodeStarted | events.NodeEnded) -> str:
+    def _name_skill(self, event: events.NodeStarted | events.NodeEnded) -> str:
         return self._skills[event.node] + (f" [{event.item}]" if event.item else "")
 
-    def _change(self, now: events.ItemChanged) -> str:
-        """Return the line of an item; "" if only its position or its counts changed."""
+    def _describe_change(self, now: events.ItemChanged) -> str:
+        """Return the line of a changed item; "" if only its position or its counts changed."""
         known = self.timeline.items.by_name.get(now.item)
-        if known is not None and _shown(known.now) == _shown(now):
+        if known is not None and _visible_fields(known.now) == _visible_fields(now):
             return ""
         where = f" in {now.bin}" if now.state == "placed" and now.bin else ""
         return f"{now.item} {now.state}{where}" + (f": {now.why}" if now.why else "")
 
 
-def _shown(item: events.ItemChanged) -> tuple[str, ...]:
+def _visible_fields(item: events.ItemChanged) -> tuple[str, ...]:
     return item.label, item.state, item.bin, item.why

@@ -20,7 +20,7 @@ from executive.view.terminal.keys import HELP, HELP_PAUSED, Keys
 from executive.view.tree.outline import branches, opened
 
 REDRAWS_PER_SECOND = 10
-"""Frequency at which the view is drawn [1/s]."""
+"""Frequency of drawing [1/s]."""
 
 _MARKS = {
     "RUNNING": ("▶", "bold yellow"),
@@ -32,9 +32,9 @@ _STATES = {"placed": "green", "rejected": "red", "lost": "red", "held": "yellow"
 
 
 class Terminal:
-    """Redraws ten times a second, from a thread of its own.
+    """Live view that a thread redraws ten times per second.
 
-    The tick thread only notes what happened, so a slow terminal cannot slow the run down.
+    The tick thread only updates the timeline, so a slow terminal does not slow down the run.
 
     Args:
         console: The terminal.
@@ -57,23 +57,23 @@ class Terminal:
         )
 
     def open(self, run: Run) -> None:
-        """Draw the tree and begin to follow the run, and to hand on what keys want of it."""
+        """Draw the tree, and begin to read keys that control the run."""
         self._outline = outline(run.root)
         self._control = run.control
         if self._keyboard is not None:
             self._keys = Keys(self._keyboard, run.control)
-        self._show(True)
+        self._set_visible(True)
 
     def __call__(self, timed: TimedEvent) -> None:
-        """Show an event; step aside while the operator is asked something."""
+        """Show an event; hide the view while the operator answers a question."""
         if isinstance(timed.event, OperatorAsked | RequestGiven):
-            self._show(isinstance(timed.event, RequestGiven))
+            self._set_visible(isinstance(timed.event, RequestGiven))
         with self._lock:
             self.timeline(timed)
 
     def close(self) -> None:
-        """Take the view away; what remains to be said is the summary's."""
-        self._show(False)
+        """Hide the view; the summary is printed afterwards."""
+        self._set_visible(False)
 
     def note(self, sentence: str) -> None:
         """Write `sentence` on a line of its own."""
@@ -84,7 +84,7 @@ class Terminal:
         """Return the view of this moment."""
         with self._lock:
             page = Table.grid(padding=(0, 4))
-            page.add_row(self._tree(), self._items())
+            page.add_row(self._render_tree(), self._render_items())
             started = self.timeline.started
             title = "" if started is None else f"{started.mission}  seed {started.seed}"
             head = Text(f"{title}  {self.timeline.clock:.1f} s", style="bold")
@@ -93,16 +93,16 @@ class Terminal:
                 head.append(f"   {HELP_PAUSED if paused else HELP}", style="yellow" if paused else "dim")
             return Group(head, page)
 
-    def _show(self, wanted: bool) -> None:
-        """Take the terminal and its keyboard, or leave them to others who want to write and read there."""
+    def _set_visible(self, is_visible: bool) -> None:
+        """Show the view and read keys, or release terminal and keyboard for other input and output."""
         try:
-            (self._live.start if wanted else self._live.stop)()
+            (self._live.start if is_visible else self._live.stop)()
         finally:
             if self._keys is not None:
-                (self._keys.listen if wanted else self._keys.leave)()
+                (self._keys.listen if is_visible else self._keys.stop)()
 
-    def _tree(self) -> RenderableType:
-        """Return the running path and its surroundings: a whole mission is taller than a terminal."""
+    def _render_tree(self) -> RenderableType:
+        """Return the running nodes and their neighbours: a whole tree is taller than a terminal."""
         shown = opened(self._outline, {running.node for running in self.timeline.running()})
         lines = Text()
         for node, branch in zip(shown, branches(shown), strict=True):
@@ -114,7 +114,7 @@ class Terminal:
             lines.append(f"  {note}\n", style="dim")
         return lines
 
-    def _items(self) -> RenderableType:
+    def _render_items(self) -> RenderableType:
         table = Table(box=None, header_style="dim", padding=(0, 1))
         for column in ("item", "class", "state", "bin"):
             table.add_column(column)

@@ -40,7 +40,7 @@ def repeat_command(
 
 def verdict(status: str, reason: str, node: str, message: str) -> str:
     """Return the end of a run in one line."""
-    # The reason of a fault or a halt is the status once more.
+    # The reason of a fault or a halt repeats the status.
     reason = f" {reason}" if reason and reason.upper() != status else ""
     where = f" at {node}" if node else ""
     why = f": {message}" if message else ""
@@ -86,7 +86,7 @@ def place_on_table(item: ItemChanged) -> str:
 def items_by_end(items: Iterable[ItemChanged]) -> dict[str, list[str]]:
     """Return the items by bin, and those that are in no bin by state with place and reason.
 
-    Phantoms are counted only, because nobody could fetch them.
+    Phantoms are only counted, because they are no objects.
     """
     ends: dict[str, list[str]] = defaultdict(list)
     phantoms = 0
@@ -99,5 +99,5 @@ def items_by_end(items: Iterable[ItemChanged]) -> dict[str, list[str]]:
             place_and_reason = ": ".join(filter(None, (place_on_table(item), item.why)))
             ends[item.state].append(f"{item.item} ({place_and_reason})" if place_and_reason else item.item)
     if phantoms:
-        ends["phantom"].append(f"{phantoms} seen, and then no more")
+        ends["phantom"].append(f"{phantoms} seen by mistake")
     return dict(ends)

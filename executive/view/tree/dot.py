@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from executive.mission.outline import OutlineNode, children
 from executive.tree.node import ControlNode
-from executive.view.text import writable
+from executive.view.text import replace_invalid
 from executive.view.tree.card import card
 
 
@@ -48,7 +48,7 @@ def _node(node: OutlineNode) -> str:
 
 def _quoted(text: str) -> str:
     """Return a text as a quoted string, in which Graphviz knows backslashes and the entities of HTML."""
-    text = writable(text).replace("&", "&amp;")
+    text = replace_invalid(text).replace("&", "&amp;")
     for plain, escaped in (("\\", "\\\\"), ('"', '\\"'), ("\n", "\\n")):
         text = text.replace(plain, escaped)
     return f'"{text}"'

@@ -56,29 +56,29 @@ def test_a_cell_of_several_runs_tells_how_many_were_ok_and_the_worst_of_the_othe
 
 def test_what_went_wrong_and_what_was_never_entered_is_told_with_its_place() -> None:
     assert fault_text(FIGURES).splitlines()[8:] == [
-        "  as undisturbed: 2; fewer objects sorted: 1; ended as a failure: 1; a bug came up: 0; "
-        "no occasion: 1; wrong: 1",
+        "  as undisturbed: 2; fewer objects sorted: 1; failed: 1; ended by a fault: 0; "
+        "fault did not occur: 1; wrong: 1",
         "  failures: Release.stuck 1",
-        "  not as it has to be: 1",
+        "  runs with a problem: 1",
         "    fault 6: object taken, late: from 8.00 s on",
         "      FAILURE Release.stuck at tree/Release: it hangs",
         "      wrong: the arm is not at rest",
-        "  failed for another reason than was brought about:",
+        "  failed for another reason than the injected one:",
         "    it says Release.stuck: fault 6",
-        "  ways on after a failure: 1 of 2 entered",
+        "  branches after a failure: 1 of 2 entered",
         "    never entered: sort.yaml:14: recover",
     ]
 
 
 def test_pairs_have_no_matrix_a_campaign_cut_short_says_so_and_one_run_is_a_few_lines() -> None:
-    told = ["fault 1+5: tree/Grasp missed, first: nothing seals", "  it found no occasion", "  SUCCESS"]
+    told = ["fault 1+5: tree/Grasp missed, first: nothing seals", "  the fault did not occur", "  SUCCESS"]
     assert trial_text(NOWHERE).splitlines() == told
     lines = fault_text(replace(FIGURES, pairs=True, complete=False, trials=(NOWHERE,))).splitlines()
     assert lines[:3] == [
         "sort (fake), seed 3: 1 runs with pairs of faults; undisturbed it takes 11.5 s",
-        "  ended by the user; there was more to try",
-        "  as undisturbed: 0; fewer objects sorted: 0; ended as a failure: 0; a bug came up: 0; "
-        "no occasion: 1; wrong: 0",
+        "  ended by the user before the last run",
+        "  as undisturbed: 0; fewer objects sorted: 0; failed: 0; ended by a fault: 0; "
+        "fault did not occur: 1; wrong: 0",
     ]
 
 

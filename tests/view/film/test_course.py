@@ -9,7 +9,7 @@ from events import at, item_changed
 from small_tree import NODES, ended, started
 
 from executive.events import Event, FaultRaised, RunHalted, RunResumed, TargetSelected
-from executive.view.film.course import TROUBLE_TIME, FilmCourse
+from executive.view.film.course import FAILURE_TIME, FilmCourse
 
 EVENTS = [
     started(0, "tree"),
@@ -41,12 +41,12 @@ def course() -> FilmCourse:
 
 def test_what_happens_in_a_step_is_seen_in_it_and_not_before(course: FilmCourse) -> None:
     course.go_to(2, 2 / 240)
-    assert (statuses(course), course.doing) == ({"tree": "RUNNING"}, "")
+    assert (statuses(course), course.current_action) == ({"tree": "RUNNING"}, "")
     assert list(course.timeline.items.by_name) == ["cube-1"]
     assert course.picture is None
     course.go_to(3, 3 / 240)
     assert statuses(course)["tree/Grasp"] == "RUNNING"
-    assert course.doing == "Grasp cube-1"
+    assert course.current_action == "Grasp cube-1"
     assert course.timeline.current("tree/Grasp").note == "cube-1"
     assert course.picture == Path("frames/000003_cube-1.jpg")
 
@@ -63,29 +63,29 @@ def test_what_happens_in_a_step_is_seen_in_it_and_not_before(course: FilmCourse)
 def test_a_round_is_over_where_its_root_begins_again_or_succeeds(events, opened, known) -> None:
     course = FilmCourse(events, NODES, [])
     course.go_to(960, 4.0)
-    assert (course.open, statuses(course)) == (opened, known)
+    assert (course.open_paths, statuses(course)) == (opened, known)
 
 
 def test_a_failure_with_an_item_is_told_for_a_while(course: FilmCourse) -> None:
     course.go_to(240, 1.0)
-    assert course.trouble == "Grasp.missed: no seal"
+    assert course.failure == "Grasp.missed: no seal"
     course.go_to(300, 1.25)
     assert course.picture == Path("frames/000250_cube-1_missed.jpg")
-    assert course.trouble
-    course.go_to(700, 1.0 + TROUBLE_TIME + 0.01)
-    assert course.trouble == ""
+    assert course.failure
+    course.go_to(700, 1.0 + FAILURE_TIME + 0.01)
+    assert course.failure == ""
 
 
 def test_of_a_tree_that_ended_what_ended_last_stays_open(course: FilmCourse) -> None:
     course.go_to(900, 3.75)
-    assert course.doing == "Transit cube-1 to red_bin"
-    assert course.open == {"tree", "tree/Transit"}
+    assert course.current_action == "Transit cube-1 to red_bin"
+    assert course.open_paths == {"tree", "tree/Transit"}
     course.go_to(960, 4.0)
-    assert course.open == {"tree", "tree/Transit"}
+    assert course.open_paths == {"tree", "tree/Transit"}
     assert statuses(course)["tree"] == "FAILURE"
     assert course.timeline.current("tree/Transit").note == "blocked"
     # It was about no item: the tree says it, and nothing else has to.
-    assert course.trouble == ""
+    assert course.failure == ""
 
 
 @pytest.mark.parametrize(
@@ -95,4 +95,4 @@ def test_of_a_tree_that_ended_what_ended_last_stays_open(course: FilmCourse) -> 
 def test_what_befalls_a_whole_run_is_told(event: Event, told: str) -> None:
     course = FilmCourse([at(1, event, 0.0)], NODES, [])
     course.go_to(1, 0.0)
-    assert course.trouble == told
+    assert course.failure == told

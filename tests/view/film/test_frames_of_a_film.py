@@ -13,10 +13,17 @@ from small_tree import NODES, ended, node, started
 
 from executive.record.result import ItemCounts, Result
 from executive.view.film.course import FilmCourse
-from executive.view.film.film import shown_steps
+from executive.view.film.film import select_steps
 from executive.view.film.ink import BACK, FAILURE, FAINT, RUNNING, SUCCESS, clipped, font, put_mark, wrapped
-from executive.view.film.page import draw_ending, draw_page, ending_of
-from executive.view.film.panel import MOST, draw_branch, draw_items, fitted, height, kept
+from executive.view.film.page import describe_result, draw_ending, draw_page
+from executive.view.film.panel import (
+    MAX_ITEM_ROWS,
+    draw_branch,
+    draw_items,
+    height,
+    select_items,
+    select_nodes,
+)
 
 
 def course_of(*entries) -> FilmCourse:
@@ -32,7 +39,7 @@ def test_what_never_ran_gives_way_first_then_what_rests() -> None:
     course = course_of(
         started(0, "t"), started(0, "t/A"), ended(0, "t/A"), started(1, "t/do"), started(1, "t/do/B"),
     )  # fmt: skip
-    names = [[one.path for one in fitted(nodes, course, rows)] for rows in (9, 4, 3)]
+    names = [[one.path for one in select_nodes(nodes, course, rows)] for rows in (9, 4, 3)]
     assert names == [
         ["t", "t/A", "t/do", "t/do/B", "t/C"], ["t", "t/A", "t/do", "t/do/B"], ["t", "t/do", "t/do/B"]
     ]  # fmt: skip
@@ -51,13 +58,13 @@ def test_nothing_is_drawn_outside_of_its_box() -> None:
 
 
 def test_settled_items_give_way_to_those_still_to_do() -> None:
-    rows = [item_changed(f"cube-{n}", "placed" if n % 2 else "seen") for n in range(MOST + 3)]
-    names = [row.item for row in kept(rows)]
-    assert len(names) == MOST
+    rows = [item_changed(f"cube-{n}", "placed" if n % 2 else "seen") for n in range(MAX_ITEM_ROWS + 3)]
+    names = [row.item for row in select_items(rows)]
+    assert len(names) == MAX_ITEM_ROWS
     assert not {"cube-1", "cube-3", "cube-5"} & set(names)
     assert names == sorted(names, key=lambda name: int(name[5:]))
-    assert kept(rows[:3]) == rows[:3]
-    assert (height(3), height(MOST), height(MOST + 20)) == (80, 200, 200)
+    assert select_items(rows[:3]) == rows[:3]
+    assert (height(3), height(MAX_ITEM_ROWS), height(MAX_ITEM_ROWS + 20)) == (80, 200, 200)
 
 
 def test_lines_are_as_wide_as_they_may_be() -> None:
@@ -105,7 +112,7 @@ STORY = SimpleNamespace(verdict="Grasp failed: no seal")
     ],
 )
 def test_an_end_is_told_by_the_story_else_the_message_and_the_items(result, ending) -> None:
-    assert ending_of(result) == ending
+    assert describe_result(result) == ending
 
 
 def test_the_end_stands_on_the_picture_and_leaves_the_page_as_it_was() -> None:
@@ -126,7 +133,7 @@ def test_the_end_stands_on_the_picture_and_leaves_the_page_as_it_was() -> None:
     [(48, 9.6, [0, 10, 19, 29, 38, 48]), (50, 19.2, [0, 19, 38, 50]), (0, 48.0, [0])],
 )
 def test_steps_are_shown_at_even_times_up_to_the_last(steps, each, shown) -> None:
-    assert shown_steps(steps, each) == shown
+    assert select_steps(steps, each) == shown
 
 
 def test_a_page_shows_picture_camera_caption_and_how_far_the_run_is(tmp_path) -> None:

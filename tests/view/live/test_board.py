@@ -22,7 +22,7 @@ from events import (
 from executive.events import Event, OperatorAsked, RequestGiven, RunResumed, TargetSelected
 from executive.geometry import Pose
 from executive.view.live.board import Board
-from executive.view.live.messages import CameraImage, Change, places_of
+from executive.view.live.messages import CameraImage, Change, encode_poses
 
 
 @pytest.mark.parametrize(
@@ -40,20 +40,20 @@ from executive.view.live.messages import CameraImage, Change, places_of
 )  # fmt: skip
 def test_the_news_of_an_event_is_its_change_of_the_page(event: Event, news: dict) -> None:
     board = Board()
-    board.take(at(0, event))
-    assert board.news() == {"clock": 0.0, **news}
+    board.apply(at(0, event))
+    assert board.take_changes() == {"clock": 0.0, **news}
 
 
 def test_every_end_of_a_node_is_counted() -> None:
     board = Board()
     for status in ("SUCCESS", "SUCCESS", "INVALID"):
-        board.take(at(1, skill_started("tree/Grasp")))
-        board.take(at(2, skill_ended("tree/Grasp", status)))
-    board.take(at(3, skill_started("tree/Grasp", "cube-1")))
-    board.news()
+        board.apply(at(1, skill_started("tree/Grasp")))
+        board.apply(at(2, skill_ended("tree/Grasp", status)))
+    board.apply(at(3, skill_started("tree/Grasp", "cube-1")))
+    board.take_changes()
     failure = {"reason": "missed", "message": "no seal", "item": "cube-1"}
-    board.take(at(360, skill_ended("tree/Grasp", "FAILURE", **failure)))
-    assert board.news() == {
+    board.apply(at(360, skill_ended("tree/Grasp", "FAILURE", **failure)))
+    assert board.take_changes() == {
         "clock": 1.5,
         "nodes": {
             "tree/Grasp": {
@@ -66,7 +66,7 @@ def test_every_end_of_a_node_is_counted() -> None:
 
 def test_poses_are_places_and_quaternions_that_begin_with_w() -> None:
     pose = Pose.of((1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 0.0))
-    assert places_of({"tool": pose}) == {"tool": (1, 2, 3, 0, 0, 0, 1)}
+    assert encode_poses({"tool": pose}) == {"tool": (1, 2, 3, 0, 0, 0, 1)}
 
 
 def test_who_comes_late_is_shown_everything_and_then_only_news() -> None:
@@ -75,13 +75,13 @@ def test_who_comes_late_is_shown_everything_and_then_only_news() -> None:
         Change(tree="<svg/>"), at(120, skill_started("a")), at(240, skill_started("b")),
         at(240, item_changed("cube-1", "held")),
     ):  # fmt: skip
-        board.take(message)
-    assert board.news()["tree"] == "<svg/>"
-    board.take(at(360, skill_ended("b", "FAILURE")))
-    fresh = board.news()
+        board.apply(message)
+    assert board.take_changes()["tree"] == "<svg/>"
+    board.apply(at(360, skill_ended("b", "FAILURE")))
+    fresh = board.take_changes()
     assert (list(fresh), list(fresh["nodes"])) == (["clock", "nodes"], ["b"])
-    assert board.news() == {}
-    shown = board.everything
+    assert board.take_changes() == {}
+    shown = board.state
     assert {name: node["status"] for name, node in shown.pop("nodes").items()} == {
         "a": "running", "b": "failure",
     }  # fmt: skip
@@ -96,8 +96,8 @@ def test_an_image_is_shown_with_what_the_arm_hides_darker() -> None:
     frame = SimpleNamespace(image=image, visible=visible, id=3, camera="wrist", stamp=0.5)
     box = detected("cube", confidence=0.5, box=[1, 2, 3, 4], position=[0.5, 0.0, 0.02])
     board = Board()
-    board.take(CameraImage(frame, frame_searched(box)))
-    look = dict(board.everything["look"])
+    board.apply(CameraImage(frame, frame_searched(box)))
+    look = dict(board.state["look"])
     data = base64.b64decode(look.pop("source").removeprefix("data:image/jpeg;base64,"))
     assert look == {
         "frame": 3, "camera": "wrist", "detector": "embedded", "stamp": 0.5, "width": 64, "height": 48,

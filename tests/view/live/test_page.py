@@ -26,7 +26,7 @@ from executive.plugins import discover
 from executive.record.result import Result
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
-from executive.view.live.page import MAX_QUEUED_NEWS, LivePage
+from executive.view.live.page import MAX_QUEUED_MESSAGES, LivePage
 from tests.record.conftest import MISSION
 
 RESULT = Result(mission="sort", seed=3, status="SUCCESS", reason="", message="", node="", run="runs/x")
@@ -173,7 +173,7 @@ def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     for tick in range(200):
         page(at(tick, FrameTaken(frame)))
         page(at(tick, frame_searched()))
-    assert page._queue.qsize() <= MAX_QUEUED_NEWS
+    assert page._queue.qsize() <= MAX_QUEUED_MESSAGES
     page.finish(RESULT)
     assert page._server.returncode == -signal.SIGKILL
 

@@ -19,14 +19,14 @@ from executive.cell.visuals import Shape
 from executive.geometry import Pose
 from executive.view.live import scene
 from executive.view.live.board import Board
-from executive.view.live.messages import Change, Wish
-from executive.view.live.server import HEADERS, POLICY, Server, refusal, understood
+from executive.view.live.messages import Change, PageCommand
+from executive.view.live.server import HEADERS, POLICY, Server, find_refusal, parse_command
 from executive.view.live.tunnel import Tunnel
 
 TOKEN = "a-token"
 HOST = "127.0.0.1:8123"
 NO_TOKEN = "the address lacks the token of this run; take it from the terminal that the run is in"
-OTHER_PAGE = "another page may neither see nor command this run"
+OTHER_PAGE = "another page may neither read nor control this run"
 
 
 PATHS = ("/", "", "*", "/another/", "/a-toke/", "/a-token2/", "//a-token/", "/A-TOKEN/", "/live", "/%ff/")
@@ -48,15 +48,17 @@ NAMES = ("evil.example", "localhost:8123", "127.0.0.1", f"{HOST}.evil")
         (f"/{TOKEN}/", {"Origin": f"http://{HOST}", "Upgrade": "websocket"}, ""),
         *((path, {}, NO_TOKEN) for path in PATHS),
         *((f"/{TOKEN}/", {"Origin": origin}, OTHER_PAGE) for origin in ORIGINS),
-        (f"/{TOKEN}/", {"Upgrade": "WebSocket"}, "a connection must say which page it is of"),
+        (f"/{TOKEN}/", {"Upgrade": "WebSocket"}, "a connection must name the origin of its page"),
         *(
-            (f"/{TOKEN}/", {"Host": name}, "this page goes by the address of this machine only")
+            (f"/{TOKEN}/", {"Host": name}, "the page must be opened by the address of this machine")
             for name in NAMES
         ),
     ],
 )
 def test_only_the_page_itself_is_let_in_and_only_with_the_token(path: str, headers: dict, said: str) -> None:
-    assert refusal(make_mocked_request("GET", path, headers={"Host": HOST} | headers), TOKEN, HOST) == said
+    assert (
+        find_refusal(make_mocked_request("GET", path, headers={"Host": HOST} | headers), TOKEN, HOST) == said
+    )
 
 
 @dataclass
@@ -67,14 +69,14 @@ class Site:
     session: aiohttp.ClientSession
     address: str
     board: Board
-    wishes: list[Wish]
+    wishes: list[PageCommand]
 
 
 def serve(do: Callable[[Site], Awaitable[None]]) -> None:
     """Serve a page while something is done with it."""
 
     async def work() -> None:
-        wishes: list[Wish] = []
+        wishes: list[PageCommand] = []
         listener = socket.create_server(("127.0.0.1", 0))
         port, board = listener.getsockname()[1], Board()
         server = Server(board, Tunnel(Path("nowhere")), wishes.append, TOKEN, port)
@@ -104,7 +106,7 @@ def test_serves_the_page_to_the_page_and_nothing_else() -> None:
             assert headers.items() >= (HEADERS | {"Content-Security-Policy": POLICY}).items()
         for path in ("page.py", "../guard.py", "%2e%2e/guard.py", "scene.py"):
             status, text, _ = await get(site, f"/{TOKEN}/{path}")
-            assert (status, text) in [(404, "there is no such thing here\n"), (403, text)]
+            assert (status, text) in [(404, "there is no such file\n"), (403, text)]
         for path in ("/", "/live", "/scene", "/wrong/", "/wrong/live", "/wrong/scene/"):
             status, text, headers = await get(site, path)
             assert (status, text) == (403, f"{NO_TOKEN}\n")
@@ -124,28 +126,32 @@ def test_serves_the_page_to_the_page_and_nothing_else() -> None:
 
 def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
     async def look(site: Site) -> None:
-        site.board.take(at(0, run_started(mission="sort", seed=3)))
+        site.board.apply(at(0, run_started(mission="sort", seed=3)))
         origin = {"Origin": site.address}
         async with site.session.ws_connect(f"{site.address}/{TOKEN}/live", headers=origin) as socket:
             assert (await socket.receive_json())["run"] == {"mission": "sort", "seed": 3}
-            assert site.wishes == [Wish("watched", watchers=1)]
-            site.board.news()
-            site.board.take(Change(paused=True))
-            await site.server.tell()
+            assert site.wishes == [PageCommand("watched", watchers=1)]
+            site.board.take_changes()
+            site.board.apply(Change(paused=True))
+            await site.server.send_changes()
             assert await socket.receive_json() == {"paused": True}
             wishes = ('{"do": "spare"}', '{"do": "pause"}', "rubbish", '{"do": "request", "word": "cube"}')
             for said in (*wishes, '{"do": "fly"}', '{"do": "stop"}'):
                 await socket.send_str(said)
-            while site.wishes[-1] != Wish("stop"):
+            while site.wishes[-1] != PageCommand("stop"):
                 await asyncio.sleep(0)
-            site.board.take(Change(note="over"))
+            site.board.apply(Change(note="over"))
             await site.server.end()
             assert await socket.receive_json() == {"note": "over"}
             assert (await socket.receive()).type is aiohttp.WSMsgType.CLOSE
-        while site.wishes[-1] != Wish("watched"):
+        while site.wishes[-1] != PageCommand("watched"):
             await asyncio.sleep(0)
-        assert site.wishes[1] == Wish("watched", watchers=1, is_sparing=True)
-        assert site.wishes[2:-1] == [Wish("pause"), Wish("request", "cube"), Wish("stop")]
+        assert site.wishes[1] == PageCommand("watched", watchers=1, is_sparing=True)
+        assert site.wishes[2:-1] == [
+            PageCommand("pause"),
+            PageCommand("request", "cube"),
+            PageCommand("stop"),
+        ]
 
     serve(look)
 
@@ -155,11 +161,11 @@ def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
     [
         ("", None), ("[]", None), ("null", None), ('"pause"', None), ("{", None), ('{"do": null}', None),
         ('{"do": "watched", "by": 7}', None), ('{"do": ["pause"]}', None), ('{"do": "request"}', None),
-        ('{"do": "request", "word": 3}', None), ('{"do": "stop", "word": "x"}', Wish("stop")),
+        ('{"do": "request", "word": 3}', None), ('{"do": "stop", "word": "x"}', PageCommand("stop")),
     ],
 )  # fmt: skip
 def test_wishes_that_nobody_can_have_are_dropped(text: str, wish: object) -> None:
-    assert understood(text) == wish
+    assert parse_command(text) == wish
 
 
 BOX = Shape("", "box", (0.1, 0.1, 0.1), Pose.identity(), (1.0, 0.0, 0.0))

@@ -48,7 +48,7 @@ def keyboard() -> Iterator[Keyboard]:
     keys = Keys(file, control)
     keys.listen()
     yield Keyboard(master, file, control, keys)
-    keys.leave()
+    keys.stop()
     os.close(master)
     os.close(file)
 
@@ -71,8 +71,8 @@ def test_the_keyboard_is_given_back_as_it_was(keyboard: Keyboard) -> None:
     assert not keyboard.reads_lines
     # Ctrl-C is a signal all the while.
     assert termios.tcgetattr(keyboard.file)[tty.LFLAG] & termios.ISIG
-    keyboard.keys.leave()
+    keyboard.keys.stop()
     assert keyboard.reads_lines
-    keyboard.keys.leave()
+    keyboard.keys.stop()
     keyboard.keys.listen()
     keyboard.press("p", True)

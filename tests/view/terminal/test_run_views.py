@@ -147,7 +147,7 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
 
 
 def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypatch):
-    keys = SimpleNamespace(listen=lambda: None, leave=lambda: None)
+    keys = SimpleNamespace(listen=lambda: None, stop=lambda: None)
     monkeypatch.setattr("executive.view.terminal.screen.Keys", lambda file, control: keys)
     view, control = Terminal(Console(file=io.StringIO(), force_terminal=True), keyboard=0), RunControl()
     view.open(SimpleNamespace(root=TREE, control=control))

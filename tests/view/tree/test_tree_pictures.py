@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 from executive.mission.outline import Connection, OutlineNode
 from executive.tree.node import ControlNode
 from executive.tree.registry import control_nodes
-from executive.view.text import writable
+from executive.view.text import replace_invalid
 from executive.view.tree.card import card
 from executive.view.tree.dot import dot
 from executive.view.tree.svg import Note, identifier, svg
@@ -131,9 +131,9 @@ def test_the_picture_needs_nothing_else_and_its_colours_come_from_the_style_shee
 def test_text_from_a_mission_cannot_leave_its_place_in_the_svg():
     node = skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, slot=NASTY, subtrees=(NASTY,))
     picture = parsed([control("tree", 0, "sequence"), replace(node, depth=1)], NASTY)
-    group = groups(picture)[f"tree/{writable(NASTY)}"]
-    assert picture.findtext(f"{SVG}title") == writable(NASTY)
-    assert texts(group, "slot") == [writable(NASTY)]
+    group = groups(picture)[f"tree/{replace_invalid(NASTY)}"]
+    assert picture.findtext(f"{SVG}title") == replace_invalid(NASTY)
+    assert texts(group, "slot") == [replace_invalid(NASTY)]
     assert NASTY[:24] in tooltip(group)
     svg([node], NASTY).encode()
 
