@@ -1,1 +1,1 @@
-"""Many runs: sweeps over seeds."""
+"""Series of runs: sweeps over seeds, fault campaigns, and the evaluation of detectors."""

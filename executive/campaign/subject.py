@@ -42,10 +42,10 @@ class Subject:
 
 
 def load_subject(mission: str, overrides: Mapping[str, str], oracle: bool, seed: int) -> Subject:
-    """Return a mission and its cell; with `oracle` a simulated cell that takes detections from the truth.
+    """Return a mission and its cell; with `oracle` a simulated cell with true detections.
 
     Raises:
-        InputError: The mission is missing or wrong, or an oracle is asked for and the cell is not simulated.
+        InputError: The mission is missing or wrong, or `oracle` is set and the cell is not simulated.
     """
     skills = discover()
     loaded = load_mission(mission, skills, overrides, cell_kind)
@@ -54,7 +54,7 @@ def load_subject(mission: str, overrides: Mapping[str, str], oracle: bool, seed:
         return Subject(loaded, skills, None, kind, seed)
     if kind != "sim":
         raise InputError(
-            f"--oracle is for simulated cells, that of {loaded.mission.name} is of kind {kind}; leave it out"
+            f"--oracle is for simulated cells, but {loaded.mission.name} has a cell of kind {kind}; omit it"
         )
     from executive.testing.oracle import oracle_cell
 

@@ -1,4 +1,4 @@
-"""One mission, many seeds: each run in a process and a run directory of its own."""
+"""Sweep over seeds of one mission, with a process and a run directory for each run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from executive.campaign.pool import do_all
+from executive.campaign.pool import run_jobs
 from executive.errors import ExecutiveError
 from executive.record.result import Audit, Result
 
@@ -18,11 +18,11 @@ class Job:
     """One run of a mission.
 
     Attributes:
-        mission: File or shipped name.
+        mission: Mission file, or name of a shipped mission.
         seed: Random seed.
-        overrides: Params of the mission and keys of the cell with other values, as given with `--set`.
+        overrides: Values of params of the mission and keys of the cell, as given with `--set`.
         runs: Folder of the run directories.
-        frames: True if the run saves the pictures behind its decisions.
+        frames: True to save the images that decisions are based on.
         scene: Scene file, or None.
     """
 
@@ -42,24 +42,24 @@ def sweep(
     halting: Callable[[], None] | None = None,
     work: Callable[[Job], Result] | None = None,
 ) -> list[Result]:
-    """Do all jobs and return the results in the order of the jobs.
+    """Execute all jobs and return the results in the order of the jobs.
 
-    A run that breaks its process is a result too, with status `FAULT`. After Ctrl-C or SIGTERM no further
-    run begins, running ones halt or end, and the results so far are returned.
+    A run that ends its process has the status `FAULT`. After Ctrl-C or SIGTERM no further run starts, running
+    runs halt, and the results so far are returned.
 
     Args:
         jobs: The runs.
         workers: Number of processes.
         progress: Called with the number of finished runs and of all runs.
-        halting: Called as soon as the user wants to halt.
-        work: Does one job, in a process of its own; None: `run_job`.
+        halting: Called after the first signal.
+        work: Executes one job, in a process of its own; None: `run_job`.
     """
-    results = do_all(jobs, work or run_job, _broken, workers=workers, progress=progress, halting=halting)
+    results = run_jobs(jobs, work or run_job, _fail_job, workers=workers, progress=progress, halting=halting)
     return [result for result in results if result is not None]
 
 
 def run_job(job: Job) -> Result:
-    """Do one run, leave its record and its report, and return its result object."""
+    """Execute one run, write its record and its report, and return its result."""
     from executive.mission.load import load_mission
     from executive.plugins import discover
     from executive.record.recorded_run import RecordOptions, record_run
@@ -70,24 +70,24 @@ def run_job(job: Job) -> Result:
     loaded = load_mission(job.mission, skills, job.overrides)
     options = RunOptions(job.seed, scene=job.scene)
     result = record_run(loaded, skills, options, job.runs, RecordOptions(frames=job.frames))
-    # A run without a report counts as well as any other.
+    # A failure to write the report does not change the result.
     leave_report(result.run)
     return result
 
 
-def summarize(results: Sequence[Result], asked: int) -> dict[str, Any]:
-    """Return the figures of a sweep: objects sorted right, disagreements, times, and every failure.
+def summarize(results: Sequence[Result], requested: int) -> dict[str, Any]:
+    """Return the figures of a sweep: correctly sorted objects, disagreements, times and failures.
 
-    Runs that were halted count as cut off, and in nothing else. `asked` is how many runs were wanted.
+    Halted runs count only as missing from the number of `requested` runs.
     """
     results = [result for result in results if result.status != "HALTED"]
     audits = [result.audit for result in results if result.audit is not None]
     right = sum(audit.right for audit in audits)
     total = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
-    low, high = wilson(right, total)
+    low, high = wilson_interval(right, total)
     return {
-        "asked": asked,
-        "cut_off": len(results) < asked,
+        "asked": requested,
+        "cut_off": len(results) < requested,
         "runs": len(results),
         "succeeded": sum(result.status == "SUCCESS" for result in results),
         "objects": {
@@ -101,7 +101,7 @@ def summarize(results: Sequence[Result], asked: int) -> dict[str, Any]:
             for result in results
             if (audit := result.audit) is not None and not audit.agrees
         ],
-        "robot_time_s": spread([result.robot_time_s for result in results]),
+        "robot_time_s": summarize_values([result.robot_time_s for result in results]),
         "robot_time_per_object_s": (
             round(sum(result.robot_time_s for result in results) / right, 3) if right else None
         ),
@@ -109,7 +109,7 @@ def summarize(results: Sequence[Result], asked: int) -> dict[str, Any]:
             key: round(sum(getattr(result.planning, key) for result in results), 3)
             for key in ("motions", "ahead", "waited_s")
         },
-        "wall_time_s": spread([result.wall_time_s for result in results]),
+        "wall_time_s": summarize_values([result.wall_time_s for result in results]),
         "failures": [
             {key: getattr(result, key) for key in ("seed", "status", "reason", "message", "node", "run")}
             for result in results
@@ -118,17 +118,17 @@ def summarize(results: Sequence[Result], asked: int) -> dict[str, Any]:
     }
 
 
-def wilson(successes: int, total: int) -> tuple[float, float]:
-    """Return the 95 % Wilson score interval of a proportion; (0, 1) if nothing was counted."""
+def wilson_interval(successes: int, total: int) -> tuple[float, float]:
+    """Return the 95 % Wilson score interval of a proportion; (0, 1) if the total is 0."""
     if total == 0:
         return 0.0, 1.0
-    from scipy.stats import binomtest  # half a second, which no worker of a sweep needs to spend
+    from scipy.stats import binomtest  # The import takes 0.5 s, which the workers must not spend.
 
     interval = binomtest(successes, total).proportion_ci(method="wilson")
     return float(interval.low), float(interval.high)
 
 
-def spread(values: Sequence[float]) -> dict[str, float]:
+def summarize_values(values: Sequence[float]) -> dict[str, float]:
     """Return `least, median, mean, most` of `values`; all are 0 without values."""
     if not values:
         return dict.fromkeys(("least", "median", "mean", "most"), 0.0)
@@ -140,8 +140,8 @@ def spread(values: Sequence[float]) -> dict[str, float]:
     }
 
 
-def _broken(job: Job, error: BaseException) -> Result:
-    """Return the result of a run that left none."""
+def _fail_job(job: Job, error: BaseException) -> Result:
+    """Return the result of a run that ended with an exception or ended its process."""
     return Result(
         mission=job.mission,
         status="FAULT",

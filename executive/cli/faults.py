@@ -56,7 +56,7 @@ def command(
         raise click.UsageError("--pairs, --fault and --list exclude each other")
     with stdout_kept_clean():
         from executive.campaign.faults.campaign import Campaign
-        from executive.campaign.faults.trial import record
+        from executive.campaign.faults.trial import record_trial
         from executive.campaign.subject import load_subject
         from executive.cli.progress import bar, print_halting
         from executive.view.figures.fault import as_plain, fault_text, trial_as_plain, trial_text
@@ -69,11 +69,11 @@ def command(
                 plain = [{"fault": number, "told": str(one)} for number, one in enumerate(campaign.faults, 1)]
                 text, code = "\n".join(f"{fault['fault']:4} {fault['told']}" for fault in plain), 0
             elif numbers is not None:
-                trial, path = record(subject, campaign.rehearsal, campaign.these(numbers), runs)
+                trial, path = record_trial(subject, campaign.rehearsal, campaign.select(numbers), runs)
                 plain = {**trial_as_plain(trial), "run": str(path)}
                 text, code = f"{trial_text(trial)}\n{path}", int(bool(trial.problems))
             else:
-                figures = campaign.pairs(pairs) if pairs else campaign.singles()
+                figures = campaign.try_pairs(pairs) if pairs else campaign.try_singles()
                 plain, text = as_plain(figures), fault_text(figures)
                 code = int(bool(figures.failed)) if figures.complete else 130
     print_json(plain) if as_json else click.echo(text)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from executive.campaign.pool import do_all
+from executive.campaign.pool import run_jobs
 from executive.cell.config import CellConfig
 from executive.cell.detection import Answer
 from executive.cell.frame import Frame
@@ -136,7 +136,7 @@ def measure(
         Job(mission, seed, misnaming, runs, wall_time_limit) for seed in range(first_seed, first_seed + seeds)
     ]
     with bar("misclassifying server") as progress:
-        results = do_all(
+        results = run_jobs(
             jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=print_halting
         )
     done = [run for run in results if run is not None and run.status != "HALTED"]

@@ -13,7 +13,7 @@ from pathlib import Path
 import click
 import yaml
 
-from executive.campaign.pool import do_all
+from executive.campaign.pool import run_jobs
 from executive.cell.config import CellConfig
 from executive.cells.sim.scene_file import load_scene
 from executive.cli.options import runs_option, workers_option
@@ -95,7 +95,7 @@ def measure(
             count = declared_runs if case.group == DECLARED else runs_per_scene
             jobs += [Job(case, seed, scene, runs, wall_time_limit) for seed in range(first, first + count)]
         with bar("outside the envelope") as progress:
-            results = do_all(
+            results = run_jobs(
                 jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=print_halting
             )
     done = [result for result in results if result is not None and result.run.status != HALTED]

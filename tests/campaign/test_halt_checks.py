@@ -40,9 +40,9 @@ def test_an_arm_that_moves_is_told(fake: FakeCell) -> None:
         ([("a", "RUNNING"), ("b", "RUNNING"), ("b", "SUCCESS"), ("b", "RUNNING"), ("b", "INVALID"),
           ("a", "INVALID")], []),
         ([("a", "RUNNING"), ("b", "RUNNING"), ("b", "INVALID")],
-         ["the journal says no end of a, which began at tick 0"]),
+         ["the journal has no end of a, which started at tick 0"]),
         ([("a", "RUNNING"), ("a", "RUNNING"), ("a", "INVALID")],
-         ["the journal lets a begin at tick 1 while it runs"]),
+         ["in the journal a starts at tick 1, but it is running already"]),
     ],
 )  # fmt: skip
 def test_every_node_of_a_journal_begins_once_and_ends(
@@ -57,7 +57,9 @@ def test_every_node_of_a_journal_begins_once_and_ends(
 def test_a_journal_without_one_end_at_its_end_is_told(journal: list[TimedEvent]) -> None:
     (problem,) = check_journal(journal, HALTED)
     ends = sum(isinstance(timed.event, RunEnded) for timed in journal)
-    assert problem == f"the journal has {ends} ends in its {len(journal)} entries; only the last may be one"
+    assert (
+        problem == f"the journal has {ends} ends in its {len(journal)} entries; only the last may be an end"
+    )
 
 
 def test_a_journal_that_ends_otherwise_than_the_run_is_told() -> None:
@@ -70,9 +72,9 @@ def test_a_journal_that_ends_otherwise_than_the_run_is_told() -> None:
     [
         (True, "cube_1", []),
         (False, "", []),
-        (True, "", ['the tool holds an object, and the run says ""']),
-        (True, "something", ['the tool holds an object, and the run says "something"']),
-        (False, "cube_1", ['the tool holds nothing, and the run says "cube_1"']),
+        (True, "", ['the tool holds an object, but the run names ""']),
+        (True, "something", ['the tool holds an object, but the run names "something"']),
+        (False, "cube_1", ['the tool holds nothing, but the run names "cube_1"']),
     ],
 )
 def test_what_the_tool_holds_must_be_told_by_name(holding: bool, statuses: str, problem: list[str]) -> None:

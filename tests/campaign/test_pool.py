@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from executive.campaign.pool import do_all
+from executive.campaign.pool import run_jobs
 from executive.run.run_control import RunControl
 from executive.run.signals import SIGNALS, stopped_by_signals
 
@@ -28,9 +28,11 @@ def why(number: int, error: BaseException) -> str:
 
 def test_every_job_is_done_and_the_results_are_in_their_order() -> None:
     told: list[tuple[int, int]] = []
-    results = do_all([4, 3, 2, 2], half, why, workers=2, progress=lambda done, all: told.append((done, all)))
+    results = run_jobs(
+        [4, 3, 2, 2], half, why, workers=2, progress=lambda done, all: told.append((done, all))
+    )
     assert (results, told) == ([2.0, "3: 3 is odd", 1.0, 1.0], [(1, 4), (2, 4), (3, 4), (4, 4)])
-    assert do_all([], half, why, workers=2) == []
+    assert run_jobs([], half, why, workers=2) == []
 
 
 def halt(how: signal.Signals) -> str:
@@ -57,7 +59,7 @@ def heard() -> Iterator[None]:
 @pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_who_halts_this_process_alone_halts_the_runs_under_way(how: signal.Signals) -> None:
     told: list[str] = []
-    results = do_all([how] * 3, halt, why, workers=1, halting=lambda: told.append("halting"))
+    results = run_jobs([how] * 3, halt, why, workers=1, halting=lambda: told.append("halting"))
     assert (results, told) == (["halted in good order", None, None], ["halting"])
 
 
@@ -72,7 +74,7 @@ def deaf(how: signal.Signals) -> str:
 @pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_second_wish_ends_the_jobs_under_way_at_once(how: signal.Signals) -> None:
     with pytest.raises(KeyboardInterrupt):
-        do_all([how] * 3, deaf, why, workers=1, halting=lambda: os.kill(os.getpid(), how))
+        run_jobs([how] * 3, deaf, why, workers=1, halting=lambda: os.kill(os.getpid(), how))
     assert multiprocessing.active_children() == []
 
 
@@ -85,4 +87,4 @@ def die_with_it(how: signal.Signals) -> str:
 
 @pytest.mark.usefixtures("heard")
 def test_a_job_whose_process_was_ended_with_this_one_has_no_result() -> None:
-    assert do_all([signal.SIGTERM] * 2, die_with_it, why, workers=1) == [None, None]
+    assert run_jobs([signal.SIGTERM] * 2, die_with_it, why, workers=1) == [None, None]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.campaign.sweep import Job, run_job, spread, summarize, sweep, wilson
+from executive.campaign.sweep import Job, run_job, summarize, summarize_values, sweep, wilson_interval
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts, Result
 from executive.record.timeline.timeline import PlanningTotals
@@ -120,7 +120,7 @@ def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch):
 
 def test_the_summary_counts_objects_and_lists_what_went_wrong():
     wrong = result(2, right=3, audit=Audit(agrees=False, right=2, wrong_bin=1))
-    figures = summarize([result(0), result(1, "FAILURE", right=3, left=1), wrong], asked=3)
+    figures = summarize([result(0), result(1, "FAILURE", right=3, left=1), wrong], requested=3)
     assert (figures["asked"], figures["cut_off"]) == (3, False)
     assert (figures["runs"], figures["succeeded"]) == (3, 2)
     assert (figures["objects"]["right"], figures["objects"]["total"]) == (9, 11)
@@ -133,11 +133,11 @@ def test_the_summary_counts_objects_and_lists_what_went_wrong():
 
 def test_runs_that_were_halted_or_never_began_make_it_cut_off_and_count_in_nothing_else():
     whole, halted = result(0), result(1, "HALTED", right=1, left=3)
-    figures = summarize([whole, halted], asked=6)
+    figures = summarize([whole, halted], requested=6)
     assert (figures["asked"], figures["cut_off"]) == (6, True)
-    assert summarize([whole], asked=1) == {**figures, "asked": 1, "cut_off": False}
+    assert summarize([whole], requested=1) == {**figures, "asked": 1, "cut_off": False}
     # Without an audit no object counts.
-    figures = summarize([result(0, audit=None)], asked=1)
+    figures = summarize([result(0, audit=None)], requested=1)
     assert (figures["objects"]["total"], figures["disagreements"]) == (0, [])
     assert figures["robot_time_per_object_s"] is None
 
@@ -148,8 +148,8 @@ def test_runs_that_were_halted_or_never_began_make_it_cut_off_and_count_in_nothi
     [(81, 263, 0.2553, 0.3662), (0, 20, 0.0, 0.1611), (0, 0, 0.0, 1.0)],
 )
 def test_the_interval_is_the_published_one(successes, total, low, high):
-    assert wilson(successes, total) == pytest.approx((low, high), abs=5e-5)
+    assert wilson_interval(successes, total) == pytest.approx((low, high), abs=5e-5)
 
 
 def test_the_spread_of_nothing_is_zero():
-    assert spread([]) == {"least": 0.0, "median": 0.0, "mean": 0.0, "most": 0.0}
+    assert summarize_values([]) == {"least": 0.0, "median": 0.0, "mean": 0.0, "most": 0.0}

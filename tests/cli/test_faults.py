@@ -33,11 +33,11 @@ def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
             told.asked.append((subject.name, subject.cell, subject.seed, workers))
             self._name = subject.name
 
-        def singles(self):
+        def try_singles(self):
             told.asked.append("singles")
             return self._figures(pairs=False)
 
-        def pairs(self, count):
+        def try_pairs(self, count):
             told.asked.append(("pairs", count))
             return self._figures(pairs=True)
 
@@ -83,7 +83,7 @@ def test_one_fault_is_repeated_and_recorded(tmp_path: Path):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--fault", "0"), "sort_overhead has no fault 0; they have the numbers 1 to "),
+        (("--fault", "0"), "sort_overhead has no fault 0; the numbers are 1 to "),
         (("--fault", "twelve"), '"twelve" is no fault; write it as 12, or 3+12 for two at once'),
         (("--fault", "1", "--list"), "--pairs, --fault and --list exclude each other"),
         (("--pairs", "0"), "0 is not in the range x>=1"),

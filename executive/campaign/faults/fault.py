@@ -84,33 +84,33 @@ class PlannedFault:
         return f"{self.about} {self.what}, {self.when}: {self.means}"
 
 
-def broken_skills(
+def make_substitutes(
     skill_faults: Iterable[SkillFault], skills: Mapping[str, type[Skill]]
 ) -> dict[str, type[Skill]]:
     """Return the substitute of each misbehaving skill; `skills` are the skills of the nodes by path."""
-    found: dict[str, type[Skill]] = {}
-    for skill_fault in skill_faults:
-        skill = found.get(skill_fault.node, skills[skill_fault.node])
-        error = InjectedError("a bug that the campaign put in")
-        if skill_fault.how == "fails":
-            broken = _failing(skill, skill_fault.reason)
-        elif skill_fault.how == "raises":
-            broken = make_raising(skill, error, after=skill_fault.after)
+    substitutes: dict[str, type[Skill]] = {}
+    for fault in skill_faults:
+        skill = substitutes.get(fault.node, skills[fault.node])
+        error = InjectedError("a bug that the campaign injected")
+        if fault.how == "fails":
+            broken = _make_failing(skill, fault.reason)
+        elif fault.how == "raises":
+            broken = make_raising(skill, error, after=fault.after)
         else:
             broken = make_raising_when_halted(skill, error)
-        found[skill_fault.node] = make_substitute(skill, "Broken", broken.run, skill_fault.starts or None)
-    return found
+        substitutes[fault.node] = make_substitute(skill, "Broken", broken.run, fault.starts or None)
+    return substitutes
 
 
-def _failing(skill: type[Skill], reason: str) -> type[Skill]:
-    """Return the skill that fails at its start; if this leaves the tool empty, its object has fallen.
+def _make_failing(skill: type[Skill], reason: str) -> type[Skill]:
+    """Return a skill that fails at its start, and drops its object if the failure leaves the tool empty.
 
-    If the tool sticks besides, the object cannot fall: then the skill does its work.
+    If the tool sticks, the object cannot fall, and the skill does its work.
     """
-    empties = skill.tool_left.get(reason) is EMPTY
+    is_dropping = skill.tool_left.get(reason) is EMPTY
 
-    def body(self: Skill, cell: Cell) -> Steps:
-        if empties:
+    def run(self: Skill, cell: Cell) -> Steps:
+        if is_dropping:
             cell.tool.open()
             if cell.tool.holding:
                 yield from skill.run(self, cell) or ()
@@ -119,4 +119,4 @@ def _failing(skill: type[Skill], reason: str) -> type[Skill]:
                 record_drop(cell, item)
         raise self.failed(reason, INJECTED_FAILURE)
 
-    return make_substitute(skill, "Failing", body)
+    return make_substitute(skill, "Failing", run)

@@ -11,21 +11,22 @@ from executive.campaign.subject import Subject
 from executive.cell.config import TableConfig
 from executive.cell.objects import Target
 from executive.mission.model import nodes
-from executive.skill import HOLDING, Direction, Skill
+from executive.skill import HOLDING, Skill
 from executive.testing import faults as effects
+from executive.testing.conformance.stage import list_inputs
 from executive.testing.faults.effect import Effect
 from executive.testing.faults.script import ScheduledFault, after, between, during
 
 SHORT, LONG = 0.5, 5.0
-"""Time for which a detector is slow, hangs or is dead [s]; the longer one is the deadline of requests."""
-QUARTERS: tuple[tuple[When, float], ...] = (("first", 0.25), ("middle", 0.5), ("late", 0.75))
-"""Shares of an undisturbed run, or of a motion, at which something happens to objects."""
+"""Durations of detector faults [s]; the longer one is the deadline of requests."""
+QUARTER_SHARES: tuple[tuple[When, float], ...] = (("first", 0.25), ("middle", 0.5), ("late", 0.75))
+"""Shares of a run without a fault, or of a motion, at which faults of objects occur."""
 LASTING = tuple(range(1, 21))
-"""Activations in which a fault happens that no real cause would repeat for ever."""
-CARRIES: tuple[tuple[When, float], ...] = (
+"""Numbers of the activations with a lasting fault that no real cause would repeat for ever."""
+TRANSPORT_SHARES: tuple[tuple[When, float], ...] = (
     ("first", 0.1), ("first", 0.3), ("middle", 0.5), ("late", 0.7), ("late", 0.9),
 )  # fmt: skip
-"""Shares of a carry at which the tool lets go."""
+"""Shares of a transport at which the seal breaks."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +46,13 @@ class Cause:
     needs: str = ""
     lasts: bool = True
 
-    def can(self, skill: type[Skill]) -> bool:
+    def is_affecting(self, skill: type[Skill]) -> bool:
         """Return True if the fault affects a skill."""
-        does = {"": True, "moves": skill.moves, "senses": skill.senses}
-        return does.get(self.needs, self.needs in skill.uses)
+        properties = {"": True, "moves": skill.moves, "senses": skill.senses}
+        return properties.get(self.needs, self.needs in skill.uses)
 
 
-def causes(table: TableConfig) -> Mapping[str, Cause]:
+def list_causes(table: TableConfig) -> Mapping[str, Cause]:
     """Return the known causes of failures by the name of the reason."""
     aside = effects.object_bumped(table.x, table.y)
     return {
@@ -72,18 +73,18 @@ def causes(table: TableConfig) -> Mapping[str, Cause]:
 
 
 def list_faults(subject: Subject, rehearsal: Rehearsal) -> tuple[PlannedFault, ...]:
-    """Return every single fault of a mission; the number of a fault is its place, from 1.
+    """Return all single faults of a mission; the number of a fault is its position, from 1.
 
-    In the order of the tree, each reason of each node and the errors of its code; then faults of detectors,
-    objects and tool.
+    The faults are the reasons of each node and the errors of its code, in the order of the tree, and then the
+    faults of detectors, objects and tool.
     """
     listing = _Listing(subject, rehearsal)
     faults = [
-        *(fault for node in listing.nodes for fault in listing.failures(node)),
-        *(fault for node in listing.nodes for fault in listing.errors(node)),
-        *listing.detector(),
-        *listing.objects(),
-        *listing.tool(),
+        *(fault for node in listing.nodes for fault in listing.list_failures(node)),
+        *(fault for node in listing.nodes for fault in listing.list_errors(node)),
+        *listing.list_detector_faults(),
+        *listing.list_object_faults(),
+        *listing.list_tool_faults(),
     ]
     # A fault that replaces another one follows it.
     return tuple(
@@ -98,10 +99,10 @@ class _Listing:
     def __init__(self, subject: Subject, rehearsal: Rehearsal) -> None:
         self._skills, self._rehearsal = subject.skills, rehearsal
         self._table = subject.loaded.cell_config.table
-        self._causes = causes(self._table)
+        self._causes = list_causes(self._table)
         self.nodes = skill_nodes(subject)
 
-    def failures(self, node: nodes.SkillNode) -> Iterator[PlannedFault]:
+    def list_failures(self, node: nodes.SkillNode) -> Iterator[PlannedFault]:
         """Yield for every reason of a node a fault of the cell, if one exists, and a failure of the skill."""
         skill = self._skills[node.skill]
         count = len(self._rehearsal.activations.get(node.path, ()))
@@ -111,103 +112,103 @@ class _Listing:
         for reason in skill.reasons:
             cause = self._causes.get(reason)
             for when, nth in starts:
-                base = self._fault(node, reason, when, reason=True)
+                base = self._plan(node, reason, when, reason=True)
                 skill_fault = SkillFault(node.path, "fails", reason, nth or LASTING)
                 failure = replace(base, means="the skill says so", skill_faults=(skill_fault,))
-                if cause is not None and cause.can(skill):
+                if cause is not None and cause.is_affecting(skill):
                     cell_fault = during(node.path, cause.effect, nth=nth or (() if cause.lasts else LASTING))
                     yield replace(base, means=cause.means, cell_faults=(cell_fault,))
                     failure = replace(failure, instead_of=-1)
                 yield failure
 
-    def errors(self, node: nodes.SkillNode) -> Iterator[PlannedFault]:
+    def list_errors(self, node: nodes.SkillNode) -> Iterator[PlannedFault]:
         """Yield errors that the code of a skill raises: at its start, later, and when it is halted."""
         ticks = self._rehearsal.activations.get(node.path, ())
         start, longest = max(enumerate(ticks, 1), key=lambda one: one[1], default=(1, 0))
         half = longest // 2
         first = SkillFault(node.path, "raises", starts=(1,))
-        yield self._fault(node, "raises", "first", means="its code raises 0 ticks on", skill_faults=(first,))
+        yield self._plan(node, "raises", "first", means="its code raises 0 ticks on", skill_faults=(first,))
         if longest >= 2:
             later, means = replace(first, starts=(start,), after=half), f"its code raises {half} ticks on"
-            yield self._fault(node, "raises", "middle", means=means, skill_faults=(later,))
+            yield self._plan(node, "raises", "middle", means=means, skill_faults=(later,))
         if longest >= 2 or not ticks:
             halted = SkillFault(node.path, "raises when halted", starts=(start,), after=half)
             means = f"its code raises when it is halted {half} ticks on"
-            yield self._fault(node, "halted", "middle", means=means, skill_faults=(halted,))
+            yield self._plan(node, "halted", "middle", means=means, skill_faults=(halted,))
 
-    def detector(self) -> Iterator[PlannedFault]:
-        """Yield detectors that are slow, hang, are unsure or dead, from the start and from half-way on."""
+    def list_detector_faults(self) -> Iterator[PlannedFault]:
+        """Yield slow, hanging, unsure and dead detectors, from the start and from half of the run on."""
         starts: tuple[tuple[When, float], ...] = (("first", 0.0), ("middle", self._rehearsal.robot_time / 2))
         dead, unsure = effects.detector_dead(), effects.detector_unsure()
         for when, start in starts:
             found = [(f"slow by {by:g} s", after(start, effects.detector_slow(by))) for by in (SHORT, LONG)]
-            for time in (SHORT, LONG):
-                for word, effect in (("hangs", effects.detector_hangs()), ("unsure", unsure), ("dead", dead)):
-                    found.append((f"{word} for {time:g} s", between(start, start + time, effect)))
+            for duration in (SHORT, LONG):
+                for name, effect in (("hangs", effects.detector_hangs()), ("unsure", unsure), ("dead", dead)):
+                    found.append((f"{name} for {duration:g} s", between(start, start + duration, effect)))
             found.append(("hangs for ever", after(start, effects.detector_given_up(LONG))))
             found += [("dead for ever", after(start, dead)), ("unsure for ever", after(start, unsure))]
             for what, cell_fault in found:
                 leads_to = "unsure" if what.startswith("unsure") else "unavailable"
-                yield replace(_other("detector", what, when, cell_fault), leads_to=leads_to)
+                yield replace(_plan_global("detector", what, when, cell_fault), leads_to=leads_to)
 
-    def objects(self) -> Iterator[PlannedFault]:
-        """Yield objects taken away and bumped aside, on the table and while the arm approaches them."""
+    def list_object_faults(self) -> Iterator[PlannedFault]:
+        """Yield removals and bumps of objects on the table and during an approach."""
         x, y = self._table.x, self._table.y
-        for when, share in QUARTERS:
+        for when, share in QUARTER_SHARES:
             start = share * self._rehearsal.robot_time
-            yield _other("object", "taken", when, after(start, effects.object_removed("nearest")))
-            yield _other("object", "bumped", when, after(start, effects.object_bumped(x, y, "nearest")))
+            yield _plan_global("object", "taken", when, after(start, effects.object_removed("nearest")))
+            yield _plan_global("object", "bumped", when, after(start, effects.object_bumped(x, y, "nearest")))
         for node in self.nodes:
-            if not _goes_to_target(self._skills[node.skill]) or not self._runs(node):
+            if not _is_moving_to_target(self._skills[node.skill]) or not self._has_run(node):
                 continue
             nth = 1 + len(self._rehearsal.activations[node.path]) // 2
-            for when, share in QUARTERS:
+            for when, share in QUARTER_SHARES:
                 taken = effects.object_removed("node", share)
                 bumped = effects.object_bumped(x, y, "node", share)
                 for what, effect in (("target taken", taken), ("target bumped", bumped)):
                     cell_fault = during(node.path, effect, nth=nth)
-                    yield self._fault(node, what, when, means=f"at {share:g}", cell_faults=(cell_fault,))
+                    yield self._plan(node, what, when, means=f"at {share:g}", cell_faults=(cell_fault,))
 
-    def tool(self) -> Iterator[PlannedFault]:
-        """Yield seals that break during a carry, and seals that fail."""
+    def list_tool_faults(self) -> Iterator[PlannedFault]:
+        """Yield seals that break during a transport, and seals that fail."""
         for node in self.nodes:
             skill = self._skills[node.skill]
-            if not (skill.moves and skill.tool_state[0] is HOLDING and self._runs(node)):
+            if not (skill.moves and skill.tool_state[0] is HOLDING and self._has_run(node)):
                 continue
-            for when, share in CARRIES:
+            for when, share in TRANSPORT_SHARES:
                 cell_fault = during(node.path, effects.seal_breaks(share), nth=1)
-                yield self._fault(node, "lets go", when, means=f"at {share:g}", cell_faults=(cell_fault,))
+                yield self._plan(node, "lets go", when, means=f"at {share:g}", cell_faults=(cell_fault,))
             over, what = during(node.path, effects.seal_breaks_over_wrong_bin()), "lets go over another bin"
-            yield self._fault(node, what, "lasting", means="every time", cell_faults=(over,))
+            yield self._plan(node, what, "lasting", means="every time", cell_faults=(over,))
         half = self._rehearsal.robot_time / 2
-        for time in (SHORT, LONG):
-            fails = between(half, half + time, effects.seal_fails())
-            yield _other("tool", f"no seal for {time:g} s", "middle", fails)
+        for duration in (SHORT, LONG):
+            fails = between(half, half + duration, effects.seal_fails())
+            yield _plan_global("tool", f"no seal for {duration:g} s", "middle", fails)
         for number in (1, 2):
             refuses = after(0.0, effects.object_refuses(number))
-            yield _other("tool", f"no seal on object {number}", "lasting", refuses)
+            yield _plan_global("tool", f"no seal on object {number}", "lasting", refuses)
 
-    def _fault(self, node: nodes.SkillNode, what: str, when: When, **more: object) -> PlannedFault:
+    def _plan(self, node: nodes.SkillNode, what: str, when: When, **more: object) -> PlannedFault:
         place = f"{node.mark.source.path}:{node.mark.line}"
         fault = PlannedFault(
-            node.path, node.label or node.skill, place, what, when, "", behind=not self._runs(node)
+            node.path, node.label or node.skill, place, what, when, "", behind=not self._has_run(node)
         )
         return replace(fault, **more)  # type: ignore[arg-type]
 
-    def _runs(self, node: nodes.SkillNode) -> bool:
+    def _has_run(self, node: nodes.SkillNode) -> bool:
         return node.path in self._rehearsal.activations
 
 
 def skill_nodes(subject: Subject) -> list[nodes.SkillNode]:
-    """Return the nodes of a mission's tree that run a skill, in the order of the tree."""
+    """Return the skill nodes of a mission, in the order of the tree."""
     return [node for node in subject.loaded.tree.walk() if isinstance(node, nodes.SkillNode)]
 
 
-def _other(about: str, what: str, when: When, cell_fault: ScheduledFault) -> PlannedFault:
+def _plan_global(part: str, what: str, when: When, cell_fault: ScheduledFault) -> PlannedFault:
+    """Return a fault of a part of the cell, which belongs to no node."""
     start = getattr(cell_fault.time, "start", 0.0)
-    return PlannedFault(about, about, "", what, when, f"from {start:.2f} s on", cell_faults=(cell_fault,))
+    return PlannedFault(part, part, "", what, when, f"from {start:.2f} s on", cell_faults=(cell_fault,))
 
 
-def _goes_to_target(skill: type[Skill]) -> bool:
-    inputs = [port for port in skill.ports.values() if port.direction is Direction.IN]
-    return skill.moves and any(port.type is Target for port in inputs)
+def _is_moving_to_target(skill: type[Skill]) -> bool:
+    return skill.moves and any(port.type is Target for port in list_inputs(skill))

@@ -1,4 +1,4 @@
-"""How a mission goes when nothing goes wrong: what faults are aimed by."""
+"""Rehearsal of a campaign: a run without a fault, from which the times of faults are derived."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 
-from executive.campaign.faults.judgement import counts_text
+from executive.campaign.faults.judgement import format_counts
 from executive.campaign.subject import Subject
 from executive.errors import InputError
 from executive.events import NodeEnded, NodeStarted, TimedEvent
@@ -17,12 +17,12 @@ from executive.run.assembly import RunOptions, assemble
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """An undisturbed run.
+    """A run without a fault.
 
     Attributes:
-        robot_time: How long it took on its clock [s].
-        placed: Objects that it brought into bins.
-        activations: Control steps of every activation of each node that ran, by path.
+        robot_time: Duration on the run's clock [s].
+        placed: Number of objects placed in bins.
+        activations: Number of control steps of each activation, by path of the node.
     """
 
     robot_time: float
@@ -39,32 +39,32 @@ class Activations:
     """Observer of the activations of nodes.
 
     Attributes:
-        counts: Number of activations of every node that ran, by path.
-        began: Tick at which every running node was started.
-        lasted: Control steps of every activation that is over, by path.
+        counts: Number of activations, by path of the node.
+        starts: Tick of the start of each running node, by path.
+        durations: Number of control steps of each finished activation, by path.
     """
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
-        self.began: dict[str, int] = {}
-        self.lasted: dict[str, list[int]] = defaultdict(list)
+        self.starts: dict[str, int] = {}
+        self.durations: dict[str, list[int]] = defaultdict(list)
 
     def __call__(self, timed: TimedEvent) -> None:
-        """Note an event."""
+        """Count the start or the end of a node."""
         match timed.event:
             case NodeStarted(node):
                 self.counts[node] += 1
-                self.began[node] = timed.tick
-            case NodeEnded(node) if node in self.began:
-                self.lasted[node].append(timed.tick - self.began.pop(node))
+                self.starts[node] = timed.tick
+            case NodeEnded(node) if node in self.starts:
+                self.durations[node].append(timed.tick - self.starts.pop(node))
 
 
 def rehearse(subject: Subject) -> Rehearsal:
-    """Run a mission undisturbed and return how it went.
+    """Run a mission without a fault.
 
     Raises:
-        InputError: It does not succeed, or its books are wrong.
-        KeyboardInterrupt: The user ended it.
+        InputError: The mission does not succeed, or ledger and audit disagree.
+        KeyboardInterrupt: The user halted the run.
     """
     activations = Activations()
     options = RunOptions(subject.seed, subject.requests, kind=subject.kind)
@@ -74,17 +74,17 @@ def rehearse(subject: Subject) -> Rehearsal:
         if outcome.status == "HALTED":
             raise KeyboardInterrupt
         items, audit = run.items(), run.audit()
-    undisturbed = f"undisturbed, {subject.name} with seed {subject.seed}"
+    description = f"without a fault, {subject.name} with seed {subject.seed}"
     if outcome.status != "SUCCESS":
         raise InputError(
-            f"{undisturbed} ends as {outcome.status} {outcome.reason}: {outcome.message}; "
-            "faults are judged by what they change in a run that succeeds: choose another seed"
+            f"{description} ends as {outcome.status} {outcome.reason}: {outcome.message}; "
+            "a campaign needs a run that succeeds: choose another seed"
         )
     if audit is not None and (audit["unseen"] or not agrees(items, audit, outcome.empty)):
         raise InputError(
-            f"{undisturbed} leaves books that are not the world: the ledger says {counts_text(items)}; "
-            f"the audit {counts_text(audit)}; choose another seed, or a mission that looks at the "
+            f"{description} ends with a wrong ledger: the ledger says {format_counts(items)}; "
+            f"the audit {format_counts(audit)}; choose another seed, or a mission that looks at the "
             "whole table"
         )
-    found = {node: tuple(ticks) for node, ticks in activations.lasted.items()}
+    found = {node: tuple(ticks) for node, ticks in activations.durations.items()}
     return Rehearsal(outcome.robot_time, items["placed"], found)

@@ -1,4 +1,4 @@
-"""One run in which something goes wrong on purpose, watched and judged."""
+"""Trial of a campaign: one run with injected faults, and its checks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from executive.campaign.faults.fault import (
     INJECTED_FAILURE,
     InjectedError,
     PlannedFault,
-    broken_skills,
+    make_substitutes,
 )
 from executive.campaign.faults.listing import skill_nodes
 from executive.campaign.faults.rehearsal import Activations, Rehearsal
@@ -32,42 +32,42 @@ from executive.view.figures.fault import Trial
 from executive.view.report.page import leave_report
 
 Numbered = Mapping[int, PlannedFault]
-"""Faults by their numbers in the list, in the order of their description."""
+"""Faults by their numbers; the last fault is the tested one."""
 
 
 def try_out(subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> Trial:
-    """Run a mission with these faults and return what came of it."""
-    trying = _Trying(subject, rehearsal, faults)
-    with closing(trying.run):
-        return trying.judged(trying.run.execute())
+    """Run a mission with these faults and return the trial."""
+    trial_run = _TrialRun(subject, rehearsal, faults)
+    with closing(trial_run.run):
+        return trial_run.judge(trial_run.run.execute())
 
 
-def record(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path) -> tuple[Trial, Path]:
-    """Do as `try_out`, and leave a run directory below `runs`; return it, too.
+def record_trial(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path) -> tuple[Trial, Path]:
+    """Run a mission with these faults; return the trial and its run directory below `runs`.
 
     Raises:
-        InputError: It cannot be made.
+        InputError: The run directory cannot be created.
         ExecutiveError: The result cannot be written.
     """
-    began, loaded = time.perf_counter(), subject.loaded
-    trying = _Trying(subject, rehearsal, faults)
-    with closing(trying.run):
-        directory = make_run_directory(trying.run, loaded, trying.options, runs)
-        recording = Recording(trying.run, loaded, subject.skills, directory, Recorder(directory), ())
-        result = recording.execute(subject.seed, began)
+    start, loaded = time.perf_counter(), subject.loaded
+    trial_run = _TrialRun(subject, rehearsal, faults)
+    with closing(trial_run.run):
+        directory = make_run_directory(trial_run.run, loaded, trial_run.options, runs)
+        recording = Recording(trial_run.run, loaded, subject.skills, directory, Recorder(directory), ())
+        result = recording.execute(subject.seed, start)
         leave_report(result.run)
-        return trying.judged(trying.outcome), directory.path
+        return trial_run.judge(trial_run.outcome), directory.path
 
 
 def empty_trial(faults: Numbered) -> Trial:
-    """Return the trial of a run of which nothing is known yet."""
+    """Return the trial of a run before its end."""
     last = list(faults.values())[-1]
     descriptions = tuple(map(str, faults.values()))
     return Trial(tuple(faults), descriptions, last.name, last.place, last.what, last.when)
 
 
-class _Trying:
-    """A run and all that is seen of it."""
+class _TrialRun:
+    """A run with faults, its events and its checks."""
 
     def __init__(self, subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> None:
         self._subject, self._rehearsal, self._faults = subject, rehearsal, faults
@@ -81,9 +81,9 @@ class _Trying:
             subject.seed,
             subject.requests,
             kind=with_faults(self._kind, cell_faults, timeout=rehearsal.timeout),
-            substitutes=broken_skills(self._skill_faults, own),
+            substitutes=make_substitutes(self._skill_faults, own),
         )
-        self.run = assemble(subject.loaded, subject.skills, self.options, [self._see, self._activations])
+        self.run = assemble(subject.loaded, subject.skills, self.options, [self._note, self._activations])
         workcell = self.run.workcell
         assert isinstance(workcell, FaultyCell)
         self.run.observe(workcell.hear)
@@ -91,20 +91,20 @@ class _Trying:
     @property
     def outcome(self) -> RunEnded:
         """Recorded end of the run."""
-        return next(one.event for one in reversed(self._events) if isinstance(one.event, RunEnded))
+        return next(timed.event for timed in reversed(self._events) if isinstance(timed.event, RunEnded))
 
-    def judged(self, outcome: RunEnded) -> Trial:
-        """Return what came of the run, which is over."""
+    def judge(self, outcome: RunEnded) -> Trial:
+        """Check the run after its end and return the trial."""
         run = self.run
         items, audit = run.items(), run.audit()
-        taken = judgement.count_of(self._events, "object_removed")
-        raised = any(self._raised(fault) for fault in self._faults.values() if fault.ends_run)
+        taken = judgement.count_faults(self._events, "object_removed")
+        raised = any(self._has_raised(fault) for fault in self._faults.values() if fault.ends_run)
         faults = tuple(self._faults.values())
         problems = [
             *judgement.check_end(outcome, faults, self._subject.loaded.endings, raised),
             *judgement.check_tree(run.root),
             *check_journal(self._events, outcome),
-            *judgement.check_books(outcome, items, audit, taken, self._hidden()),
+            *judgement.check_ledger(outcome, items, audit, taken, self._count_hidden()),
             *judgement.check_success(outcome, audit, self._events),
             *judgement.check_losses(audit, self._events),
             *check_tool(outcome, run.workcell),
@@ -112,8 +112,8 @@ class _Trying:
         ]
         return replace(
             empty_trial(self._faults),
-            happened=all(map(self._happened, faults)),
-            raised=self._raised(faults[-1]),
+            happened=all(map(self._has_happened, faults)),
+            raised=self._has_raised(faults[-1]),
             cut=outcome.status == "HALTED" and not self._stopped,
             status=outcome.status,
             reason=outcome.reason,
@@ -125,46 +125,45 @@ class _Trying:
             robot_time=outcome.robot_time,
             entered=frozenset(self._activations.counts),
             problems=tuple(problems),
-            remark=judgement.remark(outcome, faults),
+            remark=judgement.describe_other_reason(outcome, faults),
         )
 
     def _kind(self, *args: Any, **options: Any) -> Workcell:
         kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
         return CellWrapper(kind(*args, **options), after=self._stop_if_due)
 
-    def _see(self, timed: TimedEvent) -> None:
+    def _note(self, timed: TimedEvent) -> None:
         if not isinstance(timed.event, InputRead):
             self._events.append(timed)
 
     def _stop_if_due(self) -> None:
-        """Stop the run when a skill is to be halted."""
+        """Stop the run if a skill must be halted now."""
         for skill_fault in self._skill_faults:
-            began = self._activations.began.get(skill_fault.node)
-            is_meant = self._activations.counts[skill_fault.node] in skill_fault.starts
-            is_due = began is not None and self.run.tick >= began + skill_fault.after
-            if skill_fault.how == "raises when halted" and is_meant and is_due:
+            start = self._activations.starts.get(skill_fault.node)
+            is_intended = self._activations.counts[skill_fault.node] in skill_fault.starts
+            is_due = start is not None and self.run.tick >= start + skill_fault.after
+            if skill_fault.how == "raises when halted" and is_intended and is_due:
                 self._stopped = True
                 self.run.control.stop()
 
-    def _hidden(self) -> judgement.Hidden:
+    def _count_hidden(self) -> judgement.HiddenCounts:
         workcell = self.run.workcell
         assert isinstance(workcell, FaultyCell)
-        return judgement.out_of_sight(workcell.world.objects, workcell.cell.bins.values(), self._events)
+        return judgement.count_hidden(workcell.world.objects, workcell.cell.bins.values(), self._events)
 
-    def _happened(self, fault: PlannedFault) -> bool:
+    def _has_happened(self, fault: PlannedFault) -> bool:
         """Return True if a fault was injected."""
         names = {cell_fault.effect.name for cell_fault in fault.cell_faults}
-        if any(isinstance(one.event, FaultInjected) and one.event.name in names for one in self._events):
-            return True
-        return bool(fault.skill_faults) and self._raised(fault)
+        injected = {timed.event.name for timed in self._events if isinstance(timed.event, FaultInjected)}
+        return not names.isdisjoint(injected) or (bool(fault.skill_faults) and self._has_raised(fault))
 
-    def _raised(self, fault: PlannedFault) -> bool:
-        """Return True if the node of a fault ended as the fault wants it; True for a fault without a node."""
-        ends = [one.event for one in self._events if isinstance(one.event, NodeEnded)]
-        mine = [end for end in ends if end.node == fault.about]
+    def _has_raised(self, fault: PlannedFault) -> bool:
+        """Return True if the node of a fault ended as intended; True for a fault without a node."""
+        ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
+        node_ends = [end for end in ends if end.node == fault.about]
         if fault.ends_run:
-            return any(end.status == "INVALID" and InjectedError.__name__ in end.message for end in mine)
-        failures = [end for end in mine if (end.status, end.reason) == ("FAILURE", fault.what)]
+            return any(end.status == "INVALID" and InjectedError.__name__ in end.message for end in node_ends)
+        failures = [end for end in node_ends if (end.status, end.reason) == ("FAILURE", fault.what)]
         messages = [end.message for end in failures]
         return not fault.reason or any(
             not fault.skill_faults or message == INJECTED_FAILURE for message in messages

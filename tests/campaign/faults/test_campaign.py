@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from executive.campaign.faults.campaign import Campaign, branches
+from executive.campaign.faults.campaign import Campaign, find_branches
 from executive.campaign.subject import Subject
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
@@ -56,8 +56,8 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Subject:
 @pytest.fixture(scope="module")
 def figures(small: Subject) -> FaultFigures:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("executive.campaign.faults.campaign.do_all", one_after_the_other)
-        return Campaign(small).singles()
+        patch.setattr("executive.campaign.faults.campaign.run_jobs", one_after_the_other)
+        return Campaign(small).try_singles()
 
 
 def one_after_the_other(
@@ -95,7 +95,7 @@ def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: F
 def test_a_way_that_no_run_took_is_told_with_its_place(figures: FaultFigures, small: Subject) -> None:
     without = [trial for trial in figures.trials if "Grasp missed" not in " ".join(trial.descriptions)]
     without = [trial for trial in without if not trial.what.startswith("no seal")]
-    assert [branch.what for branch in branches(small.loaded.tree, without) if not branch.entered] == [
+    assert [branch.what for branch in find_branches(small.loaded.tree, without) if not branch.entered] == [
         "catch on Grasp.missed"
     ]
 
@@ -104,9 +104,9 @@ def test_a_way_that_no_run_took_is_told_with_its_place(figures: FaultFigures, sm
 def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_of_workers(
     small: Subject, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    two = Campaign(small, workers=2).pairs(3)
-    monkeypatch.setattr("executive.campaign.faults.campaign.do_all", one_after_the_other)
-    one, other = Campaign(small).pairs(3), Campaign(replace(small, seed=3)).pairs(3)
+    two = Campaign(small, workers=2).try_pairs(3)
+    monkeypatch.setattr("executive.campaign.faults.campaign.run_jobs", one_after_the_other)
+    one, other = Campaign(small).try_pairs(3), Campaign(replace(small, seed=3)).try_pairs(3)
     assert (one, [len(trial.numbers) for trial in one.trials]) == (two, [2] * 3)
     assert [trial.label for trial in one.trials] != [trial.label for trial in other.trials]
 
@@ -129,16 +129,15 @@ def interrupt(*progress: int) -> None:
 def test_after_ctrl_c_the_trials_so_far_are_told(small: Subject) -> None:
     told: list[str] = []
     campaign = Campaign(small, workers=1, progress=interrupt, halting=lambda: told.append("halting"))
-    figures = campaign.singles()
+    figures = campaign.try_singles()
     assert (len(figures.trials), figures.complete, told) == (1, False, ["halting"])
 
 
 def test_a_number_that_there_is_not_is_told_with_those_that_there_are(campaign: Campaign) -> None:
     with pytest.raises(InputError) as caught:
-        campaign.these((1, 9999))
+        campaign.select((1, 9999))
     assert str(caught.value) == (
-        f"sort_overhead has no fault 9999; they have the numbers 1 to {len(campaign.faults)}, "
-        "and --list shows them"
+        f"sort_overhead has no fault 9999; the numbers are 1 to {len(campaign.faults)}, and --list shows them"
     )
 
 
@@ -152,7 +151,7 @@ class Empty(FakeCell):
 def test_a_mission_that_does_not_succeed_by_itself_or_with_wrong_books_is_not_tried(
     small: Subject, tmp_path: Path
 ) -> None:
-    with pytest.raises(InputError, match=r"undisturbed, small with seed 0 ends as FAULT .* another seed"):
+    with pytest.raises(InputError, match=r"without a fault, small with seed 0 ends as FAULT .* another seed"):
         Campaign(replace(small, kind=Empty))
     file = tmp_path / "blind.yaml"
     shutil.copytree(small.loaded.path.parent / "cells", tmp_path / "cells")
@@ -160,5 +159,5 @@ def test_a_mission_that_does_not_succeed_by_itself_or_with_wrong_books_is_not_tr
         "mission: blind\ndescription: d\ncell: cells/fruit.yaml\n"
         "routes: {apple: premium_crate}\ntree: MoveToScan\n"
     )
-    with pytest.raises(InputError, match=r"undisturbed, blind .* or a mission that looks at the whole table"):
+    with pytest.raises(InputError, match=r"without a fault, blind .* or a mission that looks at the whole"):
         Campaign(replace(small, loaded=load_mission(file, discover())))

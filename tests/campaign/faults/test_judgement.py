@@ -10,13 +10,13 @@ from events import at, frame_searched, item_changed
 
 from executive.campaign.faults.fault import PlannedFault, SkillFault
 from executive.campaign.faults.judgement import (
-    Hidden,
-    check_books,
+    HiddenCounts,
     check_end,
+    check_ledger,
     check_losses,
     check_success,
-    out_of_sight,
-    remark,
+    count_hidden,
+    describe_other_reason,
 )
 from executive.cell.frame import FrameTaken
 from executive.cells.fake.cell import FakeCell
@@ -41,7 +41,7 @@ def outcome(status: str, reason: str = "", message: str = "", node: str = "") ->
 
 
 def books(*args: Any) -> list[str]:
-    return list(check_books(*args))
+    return list(check_ledger(*args))
 
 
 def end(out: RunEnded, fault: PlannedFault, *, raised: bool = False) -> list[str]:
@@ -54,9 +54,9 @@ def test_a_bug_has_to_end_the_run_and_to_be_found_at_its_node() -> None:
     assert end(fault, BUG, raised=True) == end(halted, BUG, raised=True) == []
     elsewhere = outcome("FAULT", "fault", "Wait: InjectedError: a bug", "tree/Wait")
     assert end(elsewhere, BUG, raised=True) == [
-        "the bug was in tree/Grasp, and the run names tree/Wait: Wait: InjectedError: a bug"
+        "the bug was in tree/Grasp, but the run names tree/Wait: Wait: InjectedError: a bug"
     ]
-    assert end(outcome("SUCCESS"), BUG, raised=True) == ["a bug came up, and the run ended as SUCCESS "]
+    assert end(outcome("SUCCESS"), BUG, raised=True) == ["a bug was raised, but the run ended as SUCCESS "]
 
 
 def test_no_other_fault_may_end_a_run() -> None:
@@ -69,7 +69,7 @@ def test_a_failure_has_to_be_one_that_the_checker_knows_of() -> None:
     assert end(outcome("FAILURE", "Grasp.missed", "", "tree/Grasp"), MISS) == []
     assert end(outcome("FAILURE", "lost"), MISS) == []
     assert end(outcome("FAILURE", "Wait.missed", "", "tree/Wait"), MISS) == [
-        "it ended with Wait.missed at tree/Wait, which the checker says cannot end it"
+        "it ended with Wait.missed at tree/Wait, which the mission checker excludes"
     ]
 
 
@@ -126,34 +126,38 @@ def test_only_what_the_fault_reached_for_may_be_out_of_reach() -> None:
     taken = at(1, FaultInjected("object_removed", "", "", "", []))
     slow = at(1, FaultInjected("detector_slow", "", "", "", []))
     assert list(check_losses(gone, [taken])) == list(check_losses(None, [])) == []
-    assert list(check_losses(gone, [slow])) == ["1 objects are out of reach, and the fault reached for 0"]
+    assert list(check_losses(gone, [slow])) == ["1 objects are out of reach, but the faults displaced 0"]
 
 
 def test_a_failure_for_another_reason_is_remarked() -> None:
-    assert remark(outcome("FAILURE", "Grasp.missed"), [MISS]) == ""
-    assert remark(outcome("FAILURE", "lost"), [MISS]) == remark(outcome("SUCCESS"), [MISS]) == ""
-    said = remark(outcome("FAILURE", "Transit.dropped"), [MISS])
-    assert said == "it says Transit.dropped, and missed was brought about"
+    assert describe_other_reason(outcome("FAILURE", "Grasp.missed"), [MISS]) == ""
+    assert (
+        describe_other_reason(outcome("FAILURE", "lost"), [MISS])
+        == describe_other_reason(outcome("SUCCESS"), [MISS])
+        == ""
+    )
+    said = describe_other_reason(outcome("FAILURE", "Transit.dropped"), [MISS])
+    assert said == "failed because of Transit.dropped, not of missed"
     dead = PlannedFault("detector", "detector", "", "dead for ever", "first", "", leads_to="unavailable")
-    assert remark(outcome("FAILURE", "Detect.unavailable"), [MISS, dead]) == ""
-    assert remark(outcome("FAILURE", "SelectTarget.unseen"), [dead]) == (
-        "it says SelectTarget.unseen, and unavailable was brought about"
+    assert describe_other_reason(outcome("FAILURE", "Detect.unavailable"), [MISS, dead]) == ""
+    assert describe_other_reason(outcome("FAILURE", "SelectTarget.unseen"), [dead]) == (
+        "failed because of SelectTarget.unseen, not of unavailable"
     )
 
 
 @pytest.mark.parametrize(
     ("changes", "hidden", "problems"),
     [
-        ({}, Hidden(1, 0), 0),
-        ({"right": 3, "left": 0}, Hidden(0, 1), 0),
-        ({}, Hidden(0, 0), 1),
-        ({}, Hidden(0, 1), 1),
+        ({}, HiddenCounts(1, 0), 0),
+        ({"right": 3, "left": 0}, HiddenCounts(0, 1), 0),
+        ({}, HiddenCounts(0, 0), 1),
+        ({}, HiddenCounts(0, 1), 1),
         # Only one of two is hidden.
-        ({"right": 1, "left": 2}, Hidden(1, 0), 1),
+        ({"right": 1, "left": 2}, HiddenCounts(1, 0), 1),
     ],
 )
 def test_what_fell_where_no_look_shows_it_is_out_of_reach_wherever_it_lies(
-    changes: dict[str, int], hidden: Hidden, problems: int
+    changes: dict[str, int], hidden: HiddenCounts, problems: int
 ) -> None:
     lost = {**ITEMS, "rejected": 0, "lost": 1}
     assert len(books(outcome("FAILURE", "lost"), lost, {**AUDIT, **changes}, 0, hidden)) == problems
@@ -167,6 +171,8 @@ def test_an_object_is_out_of_sight_if_no_look_since_the_last_fall_shows_its_plac
     look = at(20, FrameTaken(camera.capture()))
     before = at(5, look.event)
     things = [seen, beside, inside]
-    assert out_of_sight(things, bins, [fall, look]) == Hidden(1, 0)
-    assert out_of_sight(things, bins, [before, fall]) == Hidden(2, 1), "what was seen before it fell is old"
-    assert out_of_sight(things, bins, [look]) == Hidden(0, 0), "nothing fell"
+    assert count_hidden(things, bins, [fall, look]) == HiddenCounts(1, 0)
+    assert count_hidden(things, bins, [before, fall]) == HiddenCounts(2, 1), (
+        "what was seen before it fell is old"
+    )
+    assert count_hidden(things, bins, [look]) == HiddenCounts(0, 0), "nothing fell"

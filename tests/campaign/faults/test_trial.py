@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from executive.campaign.faults.campaign import Campaign
-from executive.campaign.faults.fault import SkillFault, broken_skills
-from executive.campaign.faults.trial import record, try_out
+from executive.campaign.faults.fault import SkillFault, make_substitutes
+from executive.campaign.faults.trial import record_trial, try_out
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, ItemChanged, NodeEnded, RunEnded
 from executive.plugins import discover
@@ -29,7 +29,7 @@ def number_of(campaign: Campaign, name: str, what: str, when: str = "first", *, 
 
 
 def tried(campaign: Campaign, *numbers: int) -> Trial:
-    return try_out(campaign.subject, campaign.rehearsal, campaign.these(numbers))
+    return try_out(campaign.subject, campaign.rehearsal, campaign.select(numbers))
 
 
 SLOW = pytest.mark.slow
@@ -73,7 +73,7 @@ def test_a_bug_ends_the_run_as_a_fault_of_its_node(
     trial = tried(campaign, number)
     assert (trial.status, trial.happened, trial.problems) == ("FAULT", True, ())
     assert "InjectedError" in trial.message
-    assert campaign.fault(number).about in (trial.node, trial.message.partition(": ")[0])
+    assert campaign.faults[number - 1].about in (trial.node, trial.message.partition(": ")[0])
 
 
 def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campaign) -> None:
@@ -82,7 +82,7 @@ def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campai
     assert (alone.verdict, alone.status) == ("-", "SUCCESS")
     both = tried(campaign, number_of(campaign, "Transit", "unreachable"), behind)
     assert (both.verdict, both.raised, both.problems) == ("ok", True, ())
-    assert campaign.fault(behind).about in both.entered
+    assert campaign.faults[behind - 1].about in both.entered
     assert both.label.endswith(f"+{behind}")
 
 
@@ -100,7 +100,7 @@ def test_what_cannot_happen_there_found_no_occasion(campaign: Campaign) -> None:
 
 def test_a_run_that_never_ends_is_ended_and_found(campaign: Campaign) -> None:
     number = number_of(campaign, "SelectTarget", "unseen", "lasting")
-    fault = campaign.fault(number)
+    fault = campaign.faults[number - 1]
     ever = replace(fault, skill_faults=(replace(fault.skill_faults[0], starts=()),))
     short = replace(campaign.rehearsal, robot_time=-5.0)
     trial = try_out(campaign.subject, short, {number: ever})
@@ -131,7 +131,7 @@ class Restless(FakeCell):
 def test_what_is_not_as_it_has_to_be_is_found(campaign: Campaign, kind: type[FakeCell], problem: str) -> None:
     subject = replace(campaign.subject, kind=kind)
     number = number_of(campaign, "Grasp", "missed")
-    trial = try_out(subject, campaign.rehearsal, campaign.these((number,)))
+    trial = try_out(subject, campaign.rehearsal, campaign.select((number,)))
     assert trial.verdict == "!!"
     assert trial.problems[0].startswith(problem)
 
@@ -139,7 +139,7 @@ def test_what_is_not_as_it_has_to_be_is_found(campaign: Campaign, kind: type[Fak
 @pytest.mark.slow
 def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> None:
     numbers = (number_of(campaign, "Grasp", "missed"),)
-    trial, path = record(campaign.subject, campaign.rehearsal, campaign.these(numbers), tmp_path)
+    trial, path = record_trial(campaign.subject, campaign.rehearsal, campaign.select(numbers), tmp_path)
     assert trial == tried(campaign, *numbers)
     kinds = [type(timed.event) for timed in read_journal(path / "journal.jsonl")]
     assert (kinds.count(FaultInjected), kinds[-1]) == (1, RunEnded)
@@ -152,7 +152,9 @@ def test_a_skill_that_says_in_its_second_start_that_it_dropped_something_has_let
         "tree/2:repeat/do/carry_and_watch/try/retry/do/deliver_and_watch/parallel/deliver/1:retry/do/Transit"
     )
     skill_faults = [SkillFault(path, "fails", "dropped", (2,))]
-    result = run_mission("sort_overhead", substitutes=broken_skills(skill_faults, {path: skills["Transit"]}))
+    result = run_mission(
+        "sort_overhead", substitutes=make_substitutes(skill_faults, {path: skills["Transit"]})
+    )
     events = [timed.event for timed in result.events]
     assert "dropped" in {event.state for event in events if isinstance(event, ItemChanged)}
     ends = [event for event in events if isinstance(event, NodeEnded) and event.node == path]
