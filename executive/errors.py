@@ -8,39 +8,40 @@ from contextlib import contextmanager
 
 MAX_QUOTED = 200
 """Maximum length of a quotation or word in a message [characters]."""
-_CONTROL = re.compile(
+_CONTROL_CHARACTER = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff]"
 )
 """Control characters except tab and line feed, invisible Unicode format characters and line separators, and
 lone surrogates."""
-_PIECE = re.compile(r'"[^"\n]*"|\S+')
+_QUOTATION_OR_WORD = re.compile(r'"[^"\n]*"|\S+')
 """A quotation or a word."""
 
 
 class ExecutiveError(Exception):
-    """Base of every error this project raises on purpose; `exit_code` is what the command ends with.
+    """Base of the errors of this project.
 
     Args:
-        message: What happened; of long quotations it keeps the beginning.
+        message: Description of the error; long quotations are shortened.
     """
 
     exit_code = 3
+    """Exit code of a command that ends with the error."""
 
     def __init__(self, message: str = "") -> None:
         super().__init__(shorten_quotations(message))
 
 
 class InputError(ExecutiveError):
-    """Something the user gave is wrong; the text says where, what and what instead."""
+    """An input of the user is wrong; the text states the place, the problem and the solution."""
 
     exit_code = 2
 
 
 class Fault(ExecutiveError):
-    """A bug or a broken device: never retried, ends the run with the arm at rest.
+    """A bug or a broken device: ends the run with the arm at rest, without retries.
 
     Attributes:
-        node: Path of the tree node in which it happened, or "" outside the tree.
+        node: Path of the tree node that raised the fault, or "" outside the tree.
     """
 
     def __init__(self, message: str, node: str = "") -> None:
@@ -49,27 +50,27 @@ class Fault(ExecutiveError):
 
 
 class RecordLost(Fault):
-    """The disk does not take the record, or somebody deleted it: the run stops, unexplained otherwise."""
+    """The record of the run cannot be written or was deleted: the run stops, because nothing explains it."""
 
 
 class Unreachable(ExecutiveError):
-    """No joint configuration inside the limits brings the tool to a goal; the text says how far off it is."""
+    """No joint configuration inside the limits reaches a goal; the text states the excess."""
 
 
 class Blocked(ExecutiveError):
-    """A motion exists but would come too close to something; the text names the body and the distance."""
+    """Every motion would come too close to an obstacle; the text names the obstacle and the distance."""
 
 
 class Unavailable(ExecutiveError):
-    """A detector gave no usable answer; the text says why."""
+    """A detector gave no usable answer; the text states the reason."""
 
 
 class Crowded(Unavailable):
-    """A detector found more boxes than there can be objects."""
+    """A detector found more boxes than objects are possible."""
 
 
 class DeadlinePassed(Unavailable):
-    """A detector's time for an answer was over before it came."""
+    """A detector did not answer before its deadline."""
 
 
 class NoDepth(ExecutiveError):
@@ -77,44 +78,43 @@ class NoDepth(ExecutiveError):
 
 
 class Stopped(BaseException):
-    """Somebody wanted the run to end while the operator was being asked, and there will be no answer.
+    """The run was stopped while it waited for the operator, so that there will be no answer.
 
-    No `except Exception` of a skill catches it: the run is halted, and nothing failed.
+    A halt is no failure: therefore `except Exception` in a skill does not catch this exception.
     """
 
 
-def reason_of(error: OSError) -> str:
-    """Return why the operating system refused something, in lower case as within a sentence."""
+def describe_os_error(error: OSError) -> str:
+    """Return the text of an error of the operating system, in lower case."""
     return (error.strerror or str(error)).lower()
 
 
 @contextmanager
-def explained(kind: type[ExecutiveError], what: str, then: str = "") -> Iterator[None]:
-    """Raise what the operating system refuses as an error of a kind.
+def explain_os_errors(kind: type[ExecutiveError], problem: str, advice: str = "") -> Iterator[None]:
+    """Convert errors of the operating system to errors of a kind.
 
     Args:
-        kind: The kind.
-        what: What could not be done.
-        then: What follows from that, or what to do; "" for nothing.
+        kind: Class of the raised errors.
+        problem: Description of the action that failed.
+        advice: Consequence of the failure or advice, or "".
     """
     try:
         yield
     except OSError as error:
-        raise kind(f"{what}: {reason_of(error)}" + (f"; {then}" if then else "")) from error
+        raise kind(f"{problem}: {describe_os_error(error)}" + (f"; {advice}" if advice else "")) from error
 
 
 def escape_control_characters(text: str) -> str:
     r"""Return `text` with control characters written as in JSON, for instance `\u001b`."""
-    return _CONTROL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+    return _CONTROL_CHARACTER.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def shorten_quotations(text: str) -> str:
-    """Return `text` with every quotation and word cut to `MAX_QUOTED` characters."""
-    return _PIECE.sub(lambda match: _shorten(match[0]), text)
+    """Return `text` with every quotation and word shortened to `MAX_QUOTED` characters."""
 
+    def shorten(match: re.Match[str]) -> str:
+        piece = match[0]
+        end = '…"' if piece.startswith('"') and piece.endswith('"') else "…"
+        return piece if len(piece) <= MAX_QUOTED else piece[: MAX_QUOTED - len(end)] + end
 
-def _shorten(piece: str) -> str:
-    if len(piece) <= MAX_QUOTED:
-        return piece
-    end = '…"' if piece[0] == piece[-1] == '"' else "…"
-    return piece[: MAX_QUOTED - len(end)] + end
+    return _QUOTATION_OR_WORD.sub(shorten, text)

@@ -1,7 +1,7 @@
-"""Rigid poses and the few constructions on them that everything else shares.
+"""Rigid transforms, rotations and quaternions.
 
-Names follow the monogram notation: `X_WC` is the pose of frame C in frame W, so that
-`p_W = X_WC.apply(p_C)` and `X_WB = X_WA @ X_AB`. Quaternions are always `(x, y, z, w)`.
+Names follow the monogram notation: `X_WC` is the pose of frame C in frame W, with `p_W = X_WC.apply(p_C)` and
+`X_WB = X_WA @ X_AB`. Quaternions are `(x, y, z, w)`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 GRAVITY = 9.81
-"""[m/s²]"""
+"""Gravitational acceleration [m/s²]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,23 +31,23 @@ class Pose:
 
     @staticmethod
     def identity() -> Pose:
-        """Return the transform that changes nothing."""
+        """Return the identity transform."""
         return Pose(np.eye(3), np.zeros(3))
 
     @staticmethod
     def of(position: ArrayLike, quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Pose:
-        """Return the pose at `position` `(3,)` [m] turned by a unit `quaternion` `(x, y, z, w)`."""
+        """Return the pose with a position `(3,)` [m] and a unit quaternion `(x, y, z, w)`."""
         return Pose(rotation_from_quaternion(quaternion), np.asarray(position, dtype=float))
 
     def __matmul__(self, other: Pose) -> Pose:
         return Pose(self.rotation @ other.rotation, self.rotation @ other.position + self.position)
 
     def inverse(self) -> Pose:
-        """Return the transform that undoes this one."""
+        """Return the inverse transform."""
         return Pose(self.rotation.T, -self.rotation.T @ self.position)
 
     def apply(self, points: ArrayLike) -> Array:
-        """Return `points` `(3,)` or `(N, 3)` [m], given in the inner frame, in the outer one."""
+        """Return points `(3,)` or `(N, 3)` [m], transformed from frame C to frame W for a pose `X_WC`."""
         return np.asarray(points, dtype=float) @ self.rotation.T + self.position
 
     @property
@@ -57,14 +57,14 @@ class Pose:
 
     @property
     def rotation_vector(self) -> Array:
-        """The rotation as its axis `(3,)` times its angle [rad], the angle at most pi: OpenCV's rvec."""
-        # Loading scipy.spatial takes a third of a second, and few runs need it.
+        """The rotation vector `(3,)`, axis times angle [rad], the angle at most pi: OpenCV's rvec."""
+        # The import of scipy.spatial takes 0.3 s, and few runs need a rotation vector.
         from scipy.spatial.transform import Rotation
 
         return np.asarray(Rotation.from_matrix(self.rotation).as_rotvec())
 
     def rounded(self, digits: int = 6) -> list[float]:
-        """Return position and quaternion, rounded, as a plain list of seven numbers for records."""
+        """Return position and quaternion as a list of seven rounded numbers."""
         return [round(float(value), digits) for value in (*self.position, *self.quaternion)]
 
 
@@ -83,7 +83,7 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
 def quaternion_from_rotation(rotation: Array) -> Array:
     """Return the unit quaternion `(x, y, z, w)`, `w >= 0`, of a rotation matrix `(3, 3)`.
 
-    Shepperd's method: divides by the largest of the four components, so it is stable everywhere.
+    Shepperd's method divides by the largest of the four components and is always numerically stable.
     """
     r = rotation
     squares = np.array([r[0, 0], r[1, 1], r[2, 2], r[0, 0] + r[1, 1] + r[2, 2]])
@@ -110,7 +110,7 @@ def about_z(angle: float) -> Array:
 def tool_down(position: ArrayLike, yaw: float = 0.0) -> Pose:
     """Return the tool pose `X_WT` at `position` `(3,)` [m] whose z axis points straight down.
 
-    At `yaw` 0 [rad] the tool's y axis is the world's and its x axis points backwards, the
-    orientation an iiwa reaches with its natural elbow and joint 7 near zero.
+    At `yaw` 0 [rad], the y axis of the tool is the y axis of the world, and the x axis points backwards: an
+    iiwa has this orientation with the elbow up and joint 7 near zero.
     """
     return Pose(about_z(yaw) @ np.diag([-1.0, 1.0, -1.0]), np.asarray(position, dtype=float))

@@ -16,46 +16,46 @@ R = TypeVar("R")
 
 
 class Workers(ProcessPoolExecutor):
-    """A pool of fresh processes; left by an exception, it ends what they are at.
+    """A pool of spawned processes that ends with its parent process.
 
-    They ignore Ctrl-C, which a terminal sends to them as well as to their parent: what is to become of their
-    work the parent decides. If it is killed, they end, too.
+    The processes ignore Ctrl-C, which a terminal sends to all of them: the parent process decides about their
+    work. An exception in the `with` block kills the processes.
 
     Args:
-        count: How many there are at most.
+        count: Maximum number of processes.
     """
 
     def __init__(self, count: int) -> None:
-        # A fork would share the simulator's and the inference library's threads and locks.
-        super().__init__(count, mp_context=multiprocessing.get_context("spawn"), initializer=_begin)
+        # A fork would copy threads and locks of the simulator and the inference library.
+        spawn = multiprocessing.get_context("spawn")
+        super().__init__(count, mp_context=spawn, initializer=_initialize_worker)
 
     def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
-        """Have `fn` called in one of the processes, which may be started for it."""
-        # It inherits what is blocked: no Ctrl-C can reach it before it is ready to ignore one.
-        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        """Call `fn` in one of the processes, which may be started for the call."""
+        # A new process inherits the signal mask: Ctrl-C stays blocked until the process ignores it.
+        previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
             return super().submit(fn, *args, **kwargs)
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+            signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> bool | None:
-        """Wait for the work that was submitted; after an exception, end it instead."""
+        """Wait for all submitted calls; after an exception, kill the processes instead."""
         if kind is not None:
             kill_workers()
         return super().__exit__(kind, error, trace)
 
 
 def kill_workers() -> None:
-    """End every child that `multiprocessing` started, whatever it is at; its pool is then broken."""
+    """Kill all processes that `multiprocessing` started; their pools are broken afterwards."""
     for process in multiprocessing.active_children():
-        # SIGTERM would let a run under way halt in good order, and the order of its queue would be lost.
+        # After SIGTERM, a run would halt regularly, and the process would lose the order of its queue.
         process.kill()
 
 
-def _begin() -> None:
-    """Make this process a worker."""
+def _initialize_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     threading.Thread(target=_end_with_parent, name="end with parent", daemon=True).start()
@@ -64,19 +64,19 @@ def _begin() -> None:
 def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     assert parent is not None
-    # A pipe to the parent tells, on every system and from whichever of its threads the worker came.
+    # `join` waits on a pipe to the parent, independently of the thread that started the worker.
     parent.join()
     os._exit(1)
 
 
-def program(module: str, *words: str) -> list[str]:
+def build_command(module: str, *arguments: str) -> list[str]:
     """Return the command that runs a module with the interpreter of this process.
 
-    `python -m` would look into the working directory first: a file of a library's name beside somebody's
-    mission would be run in its place.
+    Unlike `python -m`, the command does not search the working directory, where a file of the user may have
+    the name of a library.
     """
-    start = (
+    script = (
         "import sys; sys.path[:] = filter(None, sys.path); "
         "module = sys.argv.pop(1); import runpy; runpy.run_module(module, None, '__main__')"
     )
-    return [sys.executable, "-c", start, module, *words]
+    return [sys.executable, "-c", script, module, *arguments]

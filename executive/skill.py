@@ -1,10 +1,9 @@
-"""What a skill is: typed ports and params, declared reasons, and one generator.
+"""Base class of skills: typed ports and params, declared reasons of failure, and a generator.
 
-A skill reads top to bottom. `run` is a generator: every `yield` hands back the tick (RUNNING),
-returning is SUCCESS, raising `self.failed(reason, sentence)` is FAILURE, and `finally` runs on every
-end, pre-emption included; a `run` that never waits may be a plain function. The declarations are made
-once, in the class body, and feed the mission checker, the JSON Schema, the documentation and the runtime
-alike.
+The generator `run` yields once per control step (RUNNING). Its return is SUCCESS, and raising
+`self.failure(reason, message)` is FAILURE. `finally` clauses run at every end, also after a halt. A `run`
+without waits may be a plain function. The mission checker, the JSON Schema, the documentation and the tree
+use the declarations in the class body.
 """
 
 from __future__ import annotations
@@ -23,17 +22,17 @@ T = TypeVar("T")
 
 
 class Direction(Enum):
-    """Which way a port's value flows."""
+    """Direction of a port."""
 
     IN = "in"
     OUT = "out"
 
 
 In = Annotated[T, Direction.IN]
-"""An input: read from the variable it is wired to when the skill starts."""
+"""An input: the skill reads its variable when the skill starts."""
 
 Out = Annotated[T, Direction.OUT]
-"""An output: written to the variable it is wired to when the skill succeeds."""
+"""An output: the skill writes its variable when the skill succeeds."""
 
 Seconds = Annotated[float, "s"]
 Metres = Annotated[float, "m"]
@@ -41,7 +40,7 @@ MetresPerSecond = Annotated[float, "m/s"]
 
 
 class ToolState(Enum):
-    """What a skill needs of the tool, or leaves it as."""
+    """Required or resulting state of the tool."""
 
     ANY = "any"
     EMPTY = "empty"
@@ -59,11 +58,11 @@ class Param:
         name: Key in the mission file.
         type: Python type of the value.
         unit: SI unit, or "".
-        default: Value used where the mission says nothing; `...` where it must say something.
-        ge, le: Bounds, inclusive, or None.
-        choices: Allowed values, or None for any.
-        refers: What the value names (`bin`, `detector`, `pose`, `class`), or "" for a plain value.
-        doc: One sentence.
+        default: Value if the mission sets none; `...` if the mission must set one.
+        ge, le: Inclusive bounds, or None.
+        choices: Allowed values, or None for any value.
+        refers: Kind of thing that the value names (`bin`, `detector`, `pose`, `class`), or "".
+        doc: Description of the param.
     """
 
     name: str
@@ -77,8 +76,8 @@ class Param:
     doc: str
 
     @property
-    def required(self) -> bool:
-        """True where the mission must give a value."""
+    def is_required(self) -> bool:
+        """True if the mission must set a value."""
         return self.default is ...
 
 
@@ -87,12 +86,12 @@ class Port:
     """A typed input or output of a skill.
 
     Attributes:
-        name: Attribute of the skill, and the variable it is wired to unless the mission says otherwise.
+        name: Attribute of the skill, and default name of the variable of the port.
         type: Python type of the value.
         direction: IN or OUT.
-        default: Value of an unwired input; `...` where it must be wired to a written variable.
-        refers: What a text names (`item`, `bin`, `class`), or "" for a plain value.
-        doc: One sentence.
+        default: Value of an input without a variable; `...` if the input needs a written variable.
+        refers: Kind of thing that the value names (`item`, `bin`, `class`), or "".
+        doc: Description of the port.
     """
 
     name: str
@@ -103,8 +102,8 @@ class Port:
     doc: str
 
     @property
-    def required(self) -> bool:
-        """True for an input that needs a value."""
+    def is_required(self) -> bool:
+        """True for an input without a default."""
         return self.direction is Direction.IN and self.default is ...
 
 
@@ -117,18 +116,18 @@ def param(
     refers: str = "",
     doc: str = "",
 ) -> Any:
-    """Declare a param of a skill; see `Param` for what the arguments mean."""
-    # Name, type and unit are known when the class is complete.
+    """Declare a param of a skill; see `Param` for the arguments."""
+    # `Skill.__init_subclass__` sets name, type and unit.
     return Param("", None, "", default, ge, le, choices, refers, doc)
 
 
 def port(*, default: Any = ..., refers: str = "", doc: str = "") -> Any:
-    """Give an input port a default for when it is not wired, or a port what it names and its sentence."""
+    """Declare a port of a skill; see `Port` for the arguments."""
     return param(default, refers=refers, doc=doc)
 
 
 class SkillFailed(Exception):
-    """A declared failure: a reason from the skill's list and a sentence with numbers."""
+    """A declared failure: a reason from the skill's list, and a sentence with measured values."""
 
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)
@@ -137,19 +136,19 @@ class SkillFailed(Exception):
 
 
 class Skill:
-    """Base of every skill; subclasses declare, and write `run`.
+    """Base of all skills; subclasses declare params and ports, and implement `run`.
 
     Attributes:
-        params: The declared params by name.
-        ports: The declared ports by name.
-        reasons: Why it may fail; a closed list.
-        uses: What no sibling may use at the same time: `arm`, `tool`, `camera`.
-        senses: True if it takes in something new: an image, a person's wish.
-        moves: True if it moves the arm.
-        tool_state: What the tool must hold before (ANY: no matter), and holds after success (ANY: as before).
-        tool_left: What it holds after a failure, by reason, or after a `halt`, where that is not what it
-            held before; ANY where it may be either.
-        waits: Param whose time [s] passes before every success; "" for none.
+        params: Declared params by name.
+        ports: Declared ports by name.
+        reasons: Possible reasons of failure.
+        uses: Devices that no parallel skill may use: `arm`, `tool`, `camera`.
+        senses: True if the skill gets new information: an image, or a request of the operator.
+        moves: True if the skill moves the arm.
+        tool_state: Required state of the tool (ANY: none), and state after success (ANY: unchanged).
+        tool_left: State of the tool after a failure, by reason, and after a `halt`, if the skill changes the
+            state; ANY if the state is unknown.
+        waits: Name of the param whose duration [s] passes before every success, or "".
     """
 
     params: ClassVar[Mapping[str, Param]] = {}
@@ -175,33 +174,33 @@ class Skill:
             hint = hints[name]
             if get_origin(hint) is ClassVar:
                 continue
-            base, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+            base, *metadata = get_args(hint) if get_origin(hint) is Annotated else (hint,)
             declared = cls.__dict__.get(name)
-            direction = next((mark for mark in marks if isinstance(mark, Direction)), None)
+            direction = next((value for value in metadata if isinstance(value, Direction)), None)
             if direction is not None:
-                given = declared if isinstance(declared, Param) else port()
-                ports[name] = Port(name, base, direction, given.default, given.refers, given.doc)
+                options = declared if isinstance(declared, Param) else port()
+                ports[name] = Port(name, base, direction, options.default, options.refers, options.doc)
             elif isinstance(declared, Param):
-                unit = next((mark for mark in marks if isinstance(mark, str)), "")
+                unit = next((value for value in metadata if isinstance(value, str)), "")
                 params[name] = replace(declared, name=name, type=base, unit=unit)
             else:
                 raise TypeError(
-                    f"{cls.__qualname__}.{name}: a skill's attribute is an In[...], Out[...] or param(...)"
+                    f"{cls.__qualname__}.{name}: attributes of a skill are In[...], Out[...] or param(...)"
                 )
             if isinstance(declared, Param):
                 delattr(cls, name)
         cls.params, cls.ports = params, ports
 
     def __init__(self, **values: Any) -> None:
-        """Set params and inputs by name; what is not given takes its default."""
+        """Set params and inputs by name; others get their defaults."""
         inputs = {name: port for name, port in self.ports.items() if port.direction is Direction.IN}
         known: dict[str, Param | Port] = {**self.params, **inputs}
-        for name in values:
-            if name not in known:
-                raise InputError(
-                    f'{type(self).__name__} has no param or input "{name}"; '
-                    f"it has: {', '.join(known) or 'none'}"
-                )
+        unknown = next((name for name in values if name not in known), None)
+        if unknown is not None:
+            raise InputError(
+                f'{type(self).__name__} has no param or input "{unknown}"; '
+                f"it has: {', '.join(known) or 'none'}"
+            )
         for name, declared in known.items():
             value = values.get(name, declared.default)
             if value is ...:
@@ -209,23 +208,25 @@ class Skill:
             setattr(self, name, value)
 
     def run(self, cell: Cell) -> Iterator[None] | None:
-        """Do the work; see the module's docstring for what yielding, returning and raising mean."""
+        """Execute the skill; see the module docstring for the meaning of yield, return and raise."""
         raise NotImplementedError
 
     @classmethod
-    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
-        """Return the least time in which this skill can succeed [s]; by default the one that it `waits`.
+    def min_time(cls, min_times: LeastTimes, values: Mapping[str, Any]) -> float:
+        """Return the minimum time in which the skill can succeed [s]; by default the duration of `waits`.
 
-        `given` are the params, and the inputs whose value stands in the mission.
+        Args:
+            min_times: Minimum times of actions in the cell.
+            values: Params, and inputs whose values are constants of the mission.
         """
-        del least
-        return float(given.get(cls.waits, 0.0))
+        del min_times
+        return float(values.get(cls.waits, 0.0))
 
-    def failed(self, reason: str, message: str) -> SkillFailed:
-        """Return the failure to raise.
+    def failure(self, reason: str, message: str) -> SkillFailed:
+        """Return the exception for a failure with a declared reason.
 
         Raises:
-            Fault: `reason` is not in the declared list.
+            Fault: The skill does not declare `reason`.
         """
         if reason not in self.reasons:
             raise Fault(
@@ -236,7 +237,7 @@ class Skill:
 
 
 def _require_annotations(skill: type[Skill]) -> None:
-    """Return if everything that a class body declares by `param` or `port` says of what type it is.
+    """Raise an error if a `param` or `port` in the class body has no annotation of its type.
 
     Raises:
         TypeError: A declaration has no annotation.
@@ -246,7 +247,7 @@ def _require_annotations(skill: type[Skill]) -> None:
             plain = isinstance(declared.default, bool | int | float | str)
             kind = type(declared.default).__name__ if plain else "int"
             raise TypeError(
-                f"{skill.__qualname__}.{name} has no annotation, so nobody knows its type; "
+                f"{skill.__qualname__}.{name} has no annotation with its type; "
                 f'write, for instance, "{name}: {kind} = param(...)" for a param, '
                 f'"{name}: In[...] = port(...)" for an input, "{name}: Out[...] = port(...)" for an output'
             )

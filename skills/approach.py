@@ -49,17 +49,17 @@ class Approach(Skill):
     tool_state: ClassVar = (EMPTY, EMPTY)
 
     @classmethod
-    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
+    def min_time(cls, min_times: LeastTimes, values: Mapping[str, Any]) -> float:
         """Return the duration of the guarded descent [s]; the arm may already be above the target."""
-        del given
-        return least.descent
+        del values
+        return min_times.descent
 
     def run(self, cell: Cell) -> Steps:
         """Move to the target and descend until the cup touches something."""
         item, tool = self.target.item, cell.tool
         if not cell.ledger.is_fresh(self.target):
             seen = f"{item} was seen at {self.target.stamp:.2f} s"
-            raise self.failed("stale", f"{seen}, and the robot may have moved it since; look again")
+            raise self.failure("stale", f"{seen}, and the robot may have moved it since; look again")
 
         def ask() -> tuple[Goal, Task]:
             return approach(cell, self.target, self.overtravel, self.offset)
@@ -73,19 +73,19 @@ class Approach(Skill):
         if not tool.touching:
             cell.ledger.record_miss(item, found_table=_proves_absence(goal, self.target, kind))
             felt = f"no contact down to {height * 1000:.0f} mm"
-            raise self.failed("no_contact", f"{felt}, {item} was {expected}")
+            raise self.failure("no_contact", f"{felt}, {item} was {expected}")
         if height > highest + EARLY_CONTACT_MARGIN:
             cell.ledger.invalidate_positions()
             met = f"the tool met something at {height * 1000:.0f} mm"
-            raise self.failed("blocked", f"{met}, on its way to {item}, which was {expected}")
+            raise self.failure("blocked", f"{met}, on its way to {item}, which was {expected}")
         contradiction = describe_wrong_height(self.target.label, height, cell.classes)
         is_near_top = height >= lowest_contact(kind, middle, self.overtravel)
         missed_top = is_near_top and may_miss_top(self.target.label, height, cell.classes)
         if not cell.ledger.record_touch(item, contradiction, may_miss_top=missed_top):
-            raise self.failed("contradicted", f"{item} may be no {self.target.label}: {contradiction}")
+            raise self.failure("contradicted", f"{item} may be no {self.target.label}: {contradiction}")
         if contradiction and not is_near_top:
             cell.ledger.record_miss(item)
-            raise self.failed("no_contact", f"the top of {item} was {expected}; {contradiction}")
+            raise self.failure("no_contact", f"the top of {item} was {expected}; {contradiction}")
 
 
 def _proves_absence(goal: Goal, target: Target, kind: ObjectClass) -> bool:

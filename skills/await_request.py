@@ -19,7 +19,7 @@ class AwaitRequest(Skill):
         """Ask once."""
         answer = cell.operator.ask(tuple(cell.routes))
         if answer is None:
-            raise self.failed("quit", "the operator asked for nothing more")
+            raise self.failure("quit", "the operator asked for nothing more")
         if answer == "rescan":
-            raise self.failed("rescan", "the operator asked for a fresh look")
+            raise self.failure("rescan", "the operator asked for a fresh look")
         self.wanted = answer

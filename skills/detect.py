@@ -38,29 +38,29 @@ class Detect(Skill):
     senses: ClassVar = True
 
     @classmethod
-    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
+    def min_time(cls, min_times: LeastTimes, values: Mapping[str, Any]) -> float:
         """Return the time until the detector's answer [s]."""
-        return least.answer(given["detector"])
+        return min_times.answer(values["detector"])
 
     def run(self, cell: Cell) -> Steps:
         """Take a frame, ask the detector, wait for its answer."""
         camera = cell.camera
         if self.hidden == "fail" and not camera.sees_table():
-            raise self.failed("hidden", f"the arm hides part of the workspace from camera {camera.name}")
+            raise self.failure("hidden", f"the arm hides part of the workspace from camera {camera.name}")
         detector = cell.detectors[self.detector or next(iter(cell.detectors))]
         frame = camera.capture()
         if displacement := camera.displacement(frame):
-            raise self.failed("camera_moved", displacement)
+            raise self.failure("camera_moved", displacement)
         request = detector.request(frame, self.view)
         while not request.ready:
             yield
         try:
             answer = request.result()
         except Crowded as error:
-            raise self.failed("crowded", str(error)) from error
+            raise self.failure("crowded", str(error)) from error
         except Unavailable as error:
-            raise self.failed("unavailable", str(error)) from error
+            raise self.failure("unavailable", str(error)) from error
         on_table = (one for one in answer.doubtful if not shows_bin_content(cell, one, frame))
         if not answer.found and self.doubtful == "fail" and (best := next(on_table, None)):
-            raise self.failed("unsure", answer.describe_doubt(best))
+            raise self.failure("unsure", answer.describe_doubt(best))
         self.detections = Detections(**vars(answer), frame=frame, view=self.view, area=camera.area(self.view))

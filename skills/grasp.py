@@ -36,6 +36,6 @@ class Grasp(Skill):
                 cell.tool.open()
         if not sealed:
             cell.ledger.record_miss(self.target.item)
-            raise self.failed("missed", f"no seal on {self.target.item} {self.settle:.2f} s after contact")
+            raise self.failure("missed", f"no seal on {self.target.item} {self.settle:.2f} s after contact")
         cell.ledger.record_grasp(self.target.item)
         self.held = self.target.item

@@ -32,5 +32,5 @@ class IsHolding(Skill):
         cell.tool.open()
         if believed is not None:
             cell.ledger.record_drop(believed)
-            raise self.failed("empty", f"the sensor feels no seal; {believed} was dropped")
-        raise self.failed("empty", "the sensor feels no seal")
+            raise self.failure("empty", f"the sensor feels no seal; {believed} was dropped")
+        raise self.failure("empty", "the sensor feels no seal")

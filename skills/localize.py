@@ -30,11 +30,11 @@ class Localize(Skill):
         """Localize every detection, then update the ledger."""
         frame = self.detections.frame
         if not cell.ledger.is_current(frame):
-            raise self.failed(
+            raise self.failure(
                 "stale", f"frame {frame.id} shows the table before change {cell.ledger.epoch}; look again"
             )
         try:
             observations = cell.localizer.localize(self.detections)
         except NoDepth as error:
-            raise self.failed("no_depth", str(error)) from error
+            raise self.failure("no_depth", str(error)) from error
         self.targets = list(cell.ledger.observe(self.detections, observations))

@@ -32,6 +32,6 @@ class Release(Skill):
         if cell.ledger.find_held_item() == item:
             yield from let_go(self, cell, item, self.settle, lambda: cell.ledger.record_placement(item, bin))
         elif cell.ledger.is_open(item):
-            raise self.failed("dropped", f"{item} is not in the tool any more")
+            raise self.failure("dropped", f"{item} is not in the tool any more")
         # Otherwise the item was released already, before a halt and a new start of this skill.
         self.placed = item

@@ -59,10 +59,10 @@ class SelectTarget(Skill):
         doubtful = [item for item in cell.ledger.find_uncertain_items() if self._is_sought(cell, item)]
         if doubtful:
             names = ", ".join(doubtful)
-            return self.failed("doubtful", f"not enough looks agree on {names} yet; look again")
+            return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
         sought = self.same or self.wanted or "object to sort"
         if self.same is None and cell.ledger.is_table_empty(self.wanted):
             left = f"no {sought} is left on the table but what was rejected"
             message = "; ".join(filter(None, (left, describe_unknown(cell.ledger.unknown))))
-            return self.failed("no_candidate", message)
-        return self.failed("unseen", f"no {sought} is in sight, and the table is not known to be empty")
+            return self.failure("no_candidate", message)
+        return self.failure("unseen", f"no {sought} is in sight, and the table is not known to be empty")

@@ -34,9 +34,9 @@ class Transit(Skill):
     tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
 
     @classmethod
-    def shortest(cls, least: LeastTimes, given: Mapping[str, Any]) -> float:
+    def min_time(cls, min_times: LeastTimes, values: Mapping[str, Any]) -> float:
         """Return the time of the shortest transit from the workspace to the bin, if it is known [s]."""
-        return least.carry(given.get("bin"))
+        return min_times.carry(values.get("bin"))
 
     def run(self, cell: Cell) -> Steps:
         """Plan the motion, then follow it while the seal holds."""

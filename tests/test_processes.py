@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 
-from executive.processes import program
+from executive.processes import build_command
 
 
 def test_a_file_in_the_working_directory_is_not_run_in_place_of_a_library(tmp_path) -> None:
@@ -13,7 +13,7 @@ def test_a_file_in_the_working_directory_is_not_run_in_place_of_a_library(tmp_pa
     (tmp_path / "executive").mkdir()
     (tmp_path / "executive" / "__init__.py").write_text("raise SystemExit('somebody else')\n")
     ended = subprocess.run(
-        program("executive.perception.detectors.roboflow"),
+        build_command("executive.perception.detectors.roboflow"),
         cwd=tmp_path,
         input=b"",
         capture_output=True,
@@ -23,5 +23,5 @@ def test_a_file_in_the_working_directory_is_not_run_in_place_of_a_library(tmp_pa
 
 
 def test_the_words_after_it_are_its_own(tmp_path) -> None:
-    shown = subprocess.run(program("json.tool", "--help"), capture_output=True, text=True, check=True)
+    shown = subprocess.run(build_command("json.tool", "--help"), capture_output=True, text=True, check=True)
     assert "validate and pretty-print" in shown.stdout

@@ -17,7 +17,7 @@ def test_what_is_declared_without_an_annotation_is_refused(declared: Any, kind: 
     with pytest.raises(TypeError) as raised:
         type("Knock", (Skill,), {"times": declared})
     assert str(raised.value) == (
-        "Knock.times has no annotation, so nobody knows its type; write, for instance, "
+        "Knock.times has no annotation with its type; write, for instance, "
         f'"times: {kind} = param(...)" for a param, "times: In[...] = port(...)" for an input, '
         '"times: Out[...] = port(...)" for an output'
     )

@@ -14,7 +14,7 @@ from executive.cell.layout import object_class
 from executive.cell.protocols import Localizer
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_count
-from executive.errors import InputError, explained
+from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import alternatives
 from executive.perception.detectors.registry import find_problems
 from executive.perception.envelope.fingerprint import take_fingerprint
@@ -263,6 +263,6 @@ def store_evaluation(
         frames=evaluation.frames,
     )
     instead = "name another file with --out, and copy it into the folder of your cell file"
-    with explained(InputError, f"the measurement {path} cannot be written", instead):
+    with explain_os_errors(InputError, f"the measurement {path} cannot be written", instead):
         write_atomically(path, format_measurements(read_measurements(path), measurement))
     return path

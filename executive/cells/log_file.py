@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from executive.errors import Fault, InputError, explained, reason_of
+from executive.errors import Fault, InputError, describe_os_error, explain_os_errors
 
 
 class LogFile:
@@ -22,7 +22,7 @@ class LogFile:
 
     def __init__(self, path: Path, content: str, length: int | None = None) -> None:
         self._path, self._content = path, content
-        with explained(InputError, f'cannot write "{path}"'):
+        with explain_os_errors(InputError, f'cannot write "{path}"'):
             self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
             if length is not None:
                 os.ftruncate(self._file, length)
@@ -46,7 +46,7 @@ class LogFile:
         except OSError as error:
             self.close()
             raise Fault(
-                f'{self._content} "{self._path}" cannot be written: {reason_of(error)}; '
+                f'{self._content} "{self._path}" cannot be written: {describe_os_error(error)}; '
                 "the run stops because it could not be resumed"
             ) from error
 

@@ -21,7 +21,7 @@ import click
 from executive.cli.options import json_option
 from executive.cli.streams import print_json, stdout_kept_clean
 from executive.errors import InputError
-from executive.processes import program
+from executive.processes import build_command
 
 MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
 """Oldest and newest Python for which every required package has wheels."""
@@ -172,7 +172,7 @@ def _make_result(is_ok: bool, subject: str, good: str, status: str, bad: str, fi
 
 def measure_frame_time(renderer: str) -> tuple[float, str]:
     """Draw with `tiny` or `egl` in a subprocess; return milliseconds per frame and an error message or ""."""
-    command_line = program("executive.cli.doctor", renderer)
+    command_line = build_command("executive.cli.doctor", renderer)
     try:
         completed = subprocess.run(
             command_line, capture_output=True, text=True, timeout=DRAW_TIMEOUT, check=False

@@ -95,7 +95,7 @@ def declared(name: str, skill: type[Skill]) -> Declaration:
 
 def _declaration_of(value: Param | Port) -> dict[str, Any]:
     """Return the declaration of a param or port by its attributes; the bounds are `min` and `max`."""
-    facts = {**vars(value), "type": _format_type(value.type), "required": value.required}
+    facts = {**vars(value), "type": _format_type(value.type), "required": value.is_required}
     facts["default"] = None if value.default is ... else value.default
     return {{"ge": "min", "le": "max"}.get(name, name): value for name, value in facts.items()}
 

@@ -44,9 +44,9 @@ def plan(
     try:
         return planning.result()
     except Unreachable as error:
-        raise skill.failed("unreachable", str(error)) from error
+        raise skill.failure("unreachable", str(error)) from error
     except Blocked as error:
-        raise skill.failed("blocked", str(error)) from error
+        raise skill.failure("blocked", str(error)) from error
 
 
 def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
@@ -68,7 +68,7 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
     yield from wait_for_rest(arm)
     if arm.met is not None:
         cell.ledger.invalidate_positions()
-        raise skill.failed("blocked", arm.met)
+        raise skill.failure("blocked", arm.met)
 
 
 def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str) -> Steps:
@@ -96,7 +96,7 @@ def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str) ->
     if record_drop(cell, item):
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
-        raise skill.failed(
+        raise skill.failure(
             "dropped",
             f"the seal on {item} broke on the way to {destination}, near ({x:.2f}, {y:.2f}, {z:.2f}) m",
         )
@@ -118,7 +118,7 @@ def let_go(skill: Skill, cell: Cell, item: Item, wait: float, record: Callable[[
         if not cell.tool.holding:
             record()
     if cell.tool.holding:
-        raise skill.failed("stuck", f"{item} hangs on the tool {wait:.2f} s after release")
+        raise skill.failure("stuck", f"{item} hangs on the tool {wait:.2f} s after release")
 
 
 def task_of_moving(cell: Cell) -> Task:

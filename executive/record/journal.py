@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pydantic_core import from_json
 
-from executive.errors import Fault, InputError, RecordLost, explained, reason_of
+from executive.errors import Fault, InputError, RecordLost, describe_os_error, explain_os_errors
 from executive.events import ItemChanged, RunEnded, RunStarted, TimedEvent, ToolCommanded
 from executive.record.journal_format import decode_all, encode
 
@@ -39,7 +39,7 @@ class Journal:
         self._path = path
         self._has_failed = False
         self._is_synced = True
-        with explained(InputError, f'cannot open the journal "{path}"'):
+        with explain_os_errors(InputError, f'cannot open the journal "{path}"'):
             file = os.open(path, os.O_RDWR | os.O_APPEND | (0 if resume else os.O_CREAT), 0o644)
             try:
                 _lock(file, path)
@@ -78,7 +78,7 @@ class Journal:
                 if os.fstat(self._file).st_size > self._length:
                     os.ftruncate(self._file, self._length)
             raise RecordLost(
-                f'the journal "{self._path}" cannot be written: {reason_of(error)}; '
+                f'the journal "{self._path}" cannot be written: {describe_os_error(error)}; '
                 "the run stops because it could not be explained afterwards"
             ) from error
 
@@ -93,7 +93,7 @@ class Journal:
         file, self._file = self._file, None
         advice = "believe what you see in the cell rather than the record"
         try:
-            with explained(Fault, f'the journal "{self._path}" may lack its last lines', advice):
+            with explain_os_errors(Fault, f'the journal "{self._path}" may lack its last lines', advice):
                 if not self._is_synced and not self._has_failed:
                     self._sync(file)
         finally:
@@ -135,7 +135,7 @@ def read_journal(path: Path) -> list[TimedEvent]:
     Raises:
         InputError: The file cannot be read, has another format, or has a line without an event.
     """
-    with explained(InputError, f'cannot read the journal "{path}"'):
+    with explain_os_errors(InputError, f'cannot read the journal "{path}"'):
         content = path.read_bytes()
     return decode_all(content[: _valid_length(content)].splitlines(), str(path))
 

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import to_json
 
 from executive.cell.config import CellConfig
-from executive.errors import InputError, explained
+from executive.errors import InputError, explain_os_errors
 from executive.events import RunStarted
 from executive.mission.outline import OutlineNode
 from executive.mission.parse.read_mission import GivenCell
@@ -69,7 +69,7 @@ def read_tree(path: Path) -> list[OutlineNode]:
         InputError: The file cannot be read or holds no outline.
     """
     hint = "every run leaves one beside its journal since version 0.1"
-    with explained(InputError, f'cannot read the tree "{path}"', hint):
+    with explain_os_errors(InputError, f'cannot read the tree "{path}"', hint):
         content = path.read_bytes()
     try:
         return _NODES.validate_json(content)

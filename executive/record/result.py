@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 
 from executive.cell.plain import plain
 from executive.cell.workcell import PLACES
-from executive.errors import ExecutiveError, explained
+from executive.errors import ExecutiveError, explain_os_errors
 from executive.events import RunResumed, TimedEvent
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis import Diagnosis
@@ -120,7 +120,7 @@ def write_result(path: Path, result: Result) -> None:
         ExecutiveError: The file cannot be written.
     """
     hint = "the journal beside it tells how the run ended, and so does what --json prints"
-    with explained(ExecutiveError, f'cannot write the result "{path}"', hint):
+    with explain_os_errors(ExecutiveError, f'cannot write the result "{path}"', hint):
         write_atomically(
             path, json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
         )

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 
 import yaml
 
-from executive.errors import InputError, reason_of
+from executive.errors import InputError, describe_os_error
 from executive.record.atomic_file import write_atomically
 
 LATEST = "latest"
@@ -129,7 +129,7 @@ def convert_os_errors(action: str, advice: str = _USE_OTHER_FOLDER) -> Iterator[
         yield
     except OSError as error:
         space = "free some space or " if error.errno in NO_SPACE_ERRORS else ""
-        raise InputError(f"cannot {action}: {reason_of(error)}; {space}{advice}") from error
+        raise InputError(f"cannot {action}: {describe_os_error(error)}; {space}{advice}") from error
 
 
 def find_run(name: str, runs: Path) -> Path:

@@ -38,7 +38,7 @@ def make_failing(
     def run(self: Skill, cell: Cell) -> Steps:
         del cell
         yield from ()
-        raise self.failed(reason, message)
+        raise self.failure(reason, message)
 
     return make_substitute(skill, "Failing", run, _first_starts(times))
 

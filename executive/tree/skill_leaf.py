@@ -133,7 +133,7 @@ class SkillLeaf(Behaviour):
         for port, variable in self.wiring.inputs.items():
             if variable in self._blackboard:
                 inputs[port] = self._blackboard[variable]
-            elif self.skill_type.ports[port].required:
+            elif self.skill_type.ports[port].is_required:
                 raise Fault(
                     f'the input "{port}" reads ${variable}, which no node has written yet; '
                     f"written so far: {', '.join(self._blackboard) or 'nothing'}"

@@ -63,7 +63,7 @@ class Chance(Skill):
         for _ in range(cell.dice.randrange(3)):
             yield
         if self.reasons and cell.dice.random() < 0.4:
-            raise self.failed(cell.dice.choice(self.reasons), "the dice say so")
+            raise self.failure(cell.dice.choice(self.reasons), "the dice say so")
         self.end(cell)
 
 
@@ -117,9 +117,9 @@ class Carry(Chance):
         chance = cell.dice.random()
         if chance < 0.2:
             cell.holding = False
-            raise self.failed("dropped", "the dice say so")
+            raise self.failure("dropped", "the dice say so")
         if chance < 0.4:
-            raise self.failed("blocked", "the dice say so")
+            raise self.failure("blocked", "the dice say so")
 
 
 class Put(Chance):

@@ -41,7 +41,7 @@ def editor() -> Iterator[Editor]:
 
 
 SKILLS = set(discover())
-WORDS = {name for name, skill in discover().items() if not any(p.required for p in skill.params.values())}
+WORDS = {name for name, skill in discover().items() if not any(p.is_required for p in skill.params.values())}
 """Skills that may stand for themselves."""
 
 REASONS = {"Detect.unsure", "Grasp.missed", "Transit.dropped"}

@@ -91,7 +91,7 @@ def test_an_undeclared_reason_is_told_at_the_line_of_its_skill() -> None:
     run = FailedRun(PICK, objects=CUBE)
 
     def seals() -> bool:
-        raise discover()["MoveToScan"]().failed("tired", "no more")
+        raise discover()["MoveToScan"]().failure("tired", "no more")
 
     run.fake.tool.is_sealing = seals
     story = run.tell()

@@ -34,7 +34,7 @@ class Worker(Skill):
     def run(self, cell: Any) -> Iterator[Any]:
         yield
         if self.way == "fail":
-            raise self.failed("bad", "3 mm off")
+            raise self.failure("bad", "3 mm off")
         if self.way == "break":
             raise ValueError("a bug")
         if self.way == "yield":
@@ -89,7 +89,7 @@ class Sly(Worker):
 
     def run(self, cell: Any) -> Iterator[None]:
         yield
-        raise Worker(given="").failed("bad", "")
+        raise Worker(given="").failure("bad", "")
 
 
 @pytest.mark.parametrize(

@@ -38,9 +38,9 @@ class Worker(Skill):
             self.made = f"{self.given} {self.extra}"
             yield
             if self.way == "fail":
-                raise self.failed("bad", "3 mm off")
+                raise self.failure("bad", "3 mm off")
             if self.way == "undeclared":
-                raise self.failed("worse", "")
+                raise self.failure("worse", "")
             if self.way == "break":
                 raise ValueError("a bug")
             if self.way == "forget":

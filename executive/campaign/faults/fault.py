@@ -117,6 +117,6 @@ def _make_failing(skill: type[Skill], reason: str) -> type[Skill]:
                 return
             if (item := cell.ledger.find_held_item()) is not None:
                 record_drop(cell, item)
-        raise self.failed(reason, INJECTED_FAILURE)
+        raise self.failure(reason, INJECTED_FAILURE)
 
     return make_substitute(skill, "Failing", run)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from executive.cells.log_file import LogFile
-from executive.errors import Fault, InputError, explained
+from executive.errors import Fault, InputError, explain_os_errors
 from executive.geometry import Array
 from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
@@ -164,7 +164,7 @@ def _damaged(path: Path, place: int) -> InputError:
 
 def _content(path: Path) -> bytes:
     without = "without it a simulated run can neither be taken up again nor filmed"
-    with explained(InputError, f'cannot read the log of the world "{path}"', without):
+    with explain_os_errors(InputError, f'cannot read the log of the world "{path}"', without):
         return path.read_bytes()
 
 

@@ -30,7 +30,7 @@ def _skill(case: Case, node: SkillNode) -> float:
     if skill is None or case.min_times is None:
         return 0.0
     declared: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
-    given = {name: param.default for name, param in skill.params.items() if not param.required}
+    given = {name: param.default for name, param in skill.params.items() if not param.is_required}
     for name, value in find_literals(node):
         try:
             given[name] = convert(value.value, declared[name].type)
@@ -42,7 +42,7 @@ def _skill(case: Case, node: SkillNode) -> float:
     carries = skill.tool_state[0] is HOLDING
     from_elsewhere = carries and (tools is None or any(tool.is_arm_moved for tool in tools))
     # How long a carry takes is known from where objects lie, not from wherever the arm went with its load.
-    return skill.shortest(_FromAnywhere(case.min_times) if from_elsewhere else case.min_times, given)
+    return skill.min_time(_FromAnywhere(case.min_times) if from_elsewhere else case.min_times, given)
 
 
 class _FromAnywhere:

@@ -94,7 +94,7 @@ def _reads(case: Case, branch: Node) -> Iterator[tuple[Node, str, str, Mark]]:
             yield node, word_of(node), reference.name, reference.mark
         for wire in case.find_wires(node, Direction.IN):
             # What is surely not written yet is told as unwritten.
-            if entry.written is None or wire.variable in entry.written or not wire.port.required:
+            if entry.written is None or wire.variable in entry.written or not wire.port.is_required:
                 yield node, str(wire), wire.variable, wire.mark
 
 

@@ -42,7 +42,7 @@ def check_settings(case: Case) -> Iterator[Finding]:
                 hint = case.constant_hint(setting.value)
                 yield error(setting.value.mark, "unknown-param", message, hint)
         for param in skill.params.values():
-            if param.required and param.name not in node.settings:
+            if param.is_required and param.name not in node.settings:
                 hint = param.doc and f"{param.name}: {param.doc}."
                 yield error(node.mark, "missing-param", f'{node.skill} needs the param "{param.name}"', hint)
 

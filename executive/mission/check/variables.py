@@ -131,7 +131,7 @@ def _reads(case: Case, tree: Node, all_inputs: bool = False) -> Iterator[Read]:
         for reference in find_read_variables(node):
             yield node, word_of(node), reference.name, reference.mark
         for wire in case.find_wires(node, Direction.IN):
-            if all_inputs or wire.port.required or wire.explicit:
+            if all_inputs or wire.port.is_required or wire.explicit:
                 yield node, str(wire), wire.variable, wire.mark
 
 

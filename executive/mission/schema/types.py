@@ -81,7 +81,7 @@ def or_reference(*written: Json) -> Json:
 
 def settings(name: str, skill: type[Skill]) -> Json:
     """Return what stands under the name of a skill: its params and ports."""
-    required = [param.name for param in skill.params.values() if param.required]
+    required = [param.name for param in skill.params.values() if param.is_required]
     params = {key: _param(param) for key, param in skill.params.items()}
     ports = {key: _port(port) for key, port in skill.ports.items()}
     shape = {
@@ -99,7 +99,7 @@ def words(skills: Mapping[str, type[Skill]]) -> list[Json]:
     return [
         {"const": name, "title": name, **_documentation(skill), **ALTERNATIVE}
         for name, skill in skills.items()
-        if not any(param.required for param in skill.params.values())
+        if not any(param.is_required for param in skill.params.values())
     ]
 
 
@@ -127,7 +127,7 @@ def _param(param: Param) -> Json:
     if param.choices is not None:
         # Where a param names something of the cell, its choices are further words.
         written["examples" if param.refers else "enum"] = list(param.choices)
-    if not param.required:
+    if not param.is_required:
         written["default"] = to_jsonable_python(param.default)
     return {"description": _sentence(param), **or_reference(written)}
 

@@ -155,7 +155,7 @@ def _place_of_exception(traceback: str) -> str:
     """Return the place at which the first exception was raised: `skills/grasp.py:45, in run`; "" if none."""
     cause, _, last_part = traceback.rpartition(_CAUSED)
     places = [place.group("file", "line", "function") for place in _PLACE.finditer(cause or last_part)]
-    if len(places) > 1 and places[-1][0].endswith(_SKILL) and places[-1][2] == Skill.failed.__name__:
+    if len(places) > 1 and places[-1][0].endswith(_SKILL) and places[-1][2] == Skill.failure.__name__:
         places.pop()  # The caller in the skill is more informative.
     if not places:
         return ""

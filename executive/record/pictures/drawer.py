@@ -6,7 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from pathlib import Path
 
-from executive.errors import ExecutiveError, explained
+from executive.errors import ExecutiveError, explain_os_errors
 from executive.record.atomic_file import atomic_replacement
 from executive.record.pictures.draw import draw
 from executive.record.pictures.scene import PictureScene
@@ -67,5 +67,8 @@ def save(path: Path, scene: PictureScene) -> None:
         raise ExecutiveError(f'cannot make the folder "{path.parent}": {error.strerror}') from error
     image = cv2.cvtColor(draw(scene), cv2.COLOR_RGB2BGR)
     _, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-    with explained(ExecutiveError, f'cannot write the picture "{path}"'), atomic_replacement(path) as part:
+    with (
+        explain_os_errors(ExecutiveError, f'cannot write the picture "{path}"'),
+        atomic_replacement(path) as part,
+    ):
         part.write_bytes(data.tobytes())

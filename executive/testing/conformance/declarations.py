@@ -40,7 +40,7 @@ def documented(runs: SkillRuns) -> Iterator[str]:
 def defaults_allowed(runs: SkillRuns) -> Iterator[str]:
     """Each default is a value that a mission may give: of the type, inside the bounds, among the choices."""
     for param in runs.skill.params.values():
-        if not param.required and (problem := _default_problem(param)):
+        if not param.is_required and (problem := _default_problem(param)):
             default = f"{runs.name}.{param.name} has the default {param.default!r}"
             yield f"{default}{problem}. Correct the default, or the limits."
 
@@ -119,9 +119,9 @@ def _default_problem(param: Param) -> str:
 
 
 def _find_reasons(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
-    """Yield each reason and call `self.failed("reason", ...)` in a function."""
+    """Yield each reason and call `self.failure("reason", ...)` in a function."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("self.failed", "skill.failed"):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("self.failure", "skill.failure"):
             reason = node.args[0] if node.args else None
             if isinstance(reason, ast.Constant) and isinstance(reason.value, str):
                 yield reason.value, node

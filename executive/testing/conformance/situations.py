@@ -63,7 +63,7 @@ def list_situations(skill: type[Skill], arrange: Arrange) -> Iterator[Situation]
     first = _START_STATES[state[0]][0]
     for holding in _START_STATES[state[0]]:
         yield Situation(_TOOL_TEXTS[holding], holding)
-    if any(not port.required for port in list_inputs(skill)):
+    if any(not port.is_required for port in list_inputs(skill)):
         yield Situation(f"{_TOOL_TEXTS[first]} and all inputs given", first, has_all_inputs=True)
     stage, values = prepare(skill, Situation("", first), arrange)
     for param in skill.params.values():
@@ -85,12 +85,12 @@ def prepare(skill: type[Skill], situation: Situation, arrange: Arrange) -> tuple
     declarations: list[Param | Port] = [*skill.params.values(), *list_inputs(skill)]
     missing = []
     for declared in declarations:
-        is_used = declared.required or (situation.has_all_inputs and isinstance(declared, Port))
+        is_used = declared.is_required or (situation.has_all_inputs and isinstance(declared, Port))
         if declared.name in values or not is_used:
             continue
         if (value := _generate(declared, stage)) is not None:
             values[declared.name] = value
-        elif declared.required:
+        elif declared.is_required:
             missing.append(declared)
     if missing:
         names = " and ".join(f'"{declared.name}" ({describe_type(declared.type)})' for declared in missing)

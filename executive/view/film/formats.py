@@ -12,7 +12,7 @@ import av
 import numpy as np
 from PIL import Image, ImageColor
 
-from executive.errors import InputError, explained
+from executive.errors import InputError, explain_os_errors
 from executive.record.atomic_file import atomic_replacement
 from executive.view.film.ink import FAILURE, RUNNING, SUCCESS
 
@@ -129,5 +129,8 @@ def file_for(path: Path, *, force: bool) -> Iterator[Path]:
     if path.exists() and not force:
         raise InputError(f'"{path}" exists; name another file with -o, or overwrite it with --force')
     instead = "name another place with -o"
-    with explained(InputError, f'cannot write the film "{path}"', instead), atomic_replacement(path) as part:
+    with (
+        explain_os_errors(InputError, f'cannot write the film "{path}"', instead),
+        atomic_replacement(path) as part,
+    ):
         yield part

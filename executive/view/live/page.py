@@ -21,7 +21,7 @@ from executive.cell.visuals import Visuals
 from executive.errors import InputError
 from executive.events import FrameSearched, InputRead, TimedEvent
 from executive.mission.outline import outline
-from executive.processes import program
+from executive.processes import build_command
 from executive.record.result import Result
 from executive.run.run import Run
 from executive.view.live.messages import (
@@ -74,7 +74,7 @@ class LivePage:
             port = listener.getsockname()[1]
             self.address = f"http://{LOOPBACK}:{port}/{token}/"
             self._server = subprocess.Popen(
-                program("executive.view.live", str(listener.fileno())),
+                build_command("executive.view.live", str(listener.fileno())),
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
                 pass_fds=[listener.fileno()],
                 # In a session of its own the server gets no Ctrl-C: it must still show the result of the run.

@@ -56,7 +56,7 @@ class Careful(Pause):
     def run(self, cell: Cell) -> Steps:
         """Keep steps and a failure until they are wanted; `follow` is a local name here."""
         steps, waiting, follow = cell.clock.sleep(0.01), self._rest(cell), list[int].append
-        failure = self.failed("tired", "after 1 step")
+        failure = self.failure("tired", "after 1 step")
         follow([], 1)
         yield from steps
         yield from waiting
@@ -87,7 +87,7 @@ class RaisesUndeclared(Pause):
     def run(self, cell: Cell) -> Steps:
         yield
         if not cell.bins:
-            raise self.failed("no_bins", "there are no bins")
+            raise self.failure("no_bins", "there are no bins")
 
 
 class TextForTuple(Pause):
@@ -110,14 +110,14 @@ class StepsNotTaken(Push):
         self._rest(cell)
         _wait(cell)
         self._tire()
-        self.failed("blocked", "after 1 step")
+        self.failure("blocked", "after 1 step")
         return follow(self, cell, motion)
 
     def _rest(self, cell: Cell) -> Steps:
         return cell.clock.sleep(1.0)
 
     def _tire(self) -> SkillFailed:
-        return self.failed("blocked", "after 1 step")
+        return self.failure("blocked", "after 1 step")
 
 
 def _wait(cell: Cell) -> Steps:
@@ -128,7 +128,7 @@ def _wait(cell: Cell) -> Steps:
 class AlwaysFails(Pause):
     def run(self, cell: Cell) -> Steps:
         yield
-        raise self.failed("tired", "after 1 step")
+        raise self.failure("tired", "after 1 step")
 
 
 class Shake(Skill):
@@ -194,7 +194,7 @@ class FailsWithoutSentence(Pause):
     def run(self, cell: Cell) -> Steps:
         yield
         if cell.tool.holding:
-            raise self.failed("tired", " ")
+            raise self.failure("tired", " ")
 
 
 class WrongOutputs(Pause):
@@ -242,7 +242,7 @@ class GraspsInSecret(GraspTarget):
         cell.tool.close()
         if not cell.tool.holding:
             cell.tool.open()
-            raise self.failed("missed", "no seal")
+            raise self.failure("missed", "no seal")
 
 
 class HoldsOnWhenHalted(GraspTarget):
@@ -251,7 +251,7 @@ class HoldsOnWhenHalted(GraspTarget):
         yield
         if not cell.tool.holding:
             cell.tool.open()
-            raise self.failed("missed", "no seal")
+            raise self.failure("missed", "no seal")
         cell.ledger.record_grasp(self.target.item)
 
 
@@ -262,7 +262,7 @@ class RunsOnWhenHalted(Push):
         while not cell.arm.at_rest:
             yield
         if cell.arm.met:
-            raise self.failed("blocked", cell.arm.met)
+            raise self.failure("blocked", cell.arm.met)
 
 
 class WaitsInFinally(Pause):

@@ -65,7 +65,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ]),
     ("calls_take_effect", faulty.StepsNotTaken, [
         unmade("follow"), unmade("follow"), unmade("cell.clock.sleep"), unmade("self._rest"), unmade("_wait"),
-        unraised("self._tire"), unraised("self.failed"), unmade("follow"), unmade("cell.clock.sleep"),
+        unraised("self._tire"), unraised("self.failure"), unmade("follow"), unmade("cell.clock.sleep"),
     ]),
     ("arranged", faulty.AlwaysFails, [
         f'AlwaysFails never succeeded; {EMPTY} it failed with "tired" (after 1 step). Arrange a stage on '

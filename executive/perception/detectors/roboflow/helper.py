@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import executive
 from executive.errors import Fault, Unavailable
 from executive.perception.detectors.roboflow.key import ApiKey
-from executive.processes import program
+from executive.processes import build_command
 
 PROGRAM = "executive.perception.detectors.roboflow"
 STARTUP_TIMEOUT = 30.0
@@ -56,7 +56,7 @@ class Helper:
     """
 
     def __init__(self, setup: Mapping[str, Any], key: ApiKey) -> None:
-        self._command = program(PROGRAM, json.dumps(setup))
+        self._command = build_command(PROGRAM, json.dumps(setup))
         self._key = key
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 It lives as long as the helper.
         self._guard = threading.Lock()

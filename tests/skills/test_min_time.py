@@ -48,16 +48,16 @@ SHORTEST: list[tuple[type[Skill], Mapping[str, Any], float]] = [
 
 def defaults(skill: type[Skill]) -> dict[str, Any]:
     """Return what is known of a skill that a mission says nothing about."""
-    return {name: param.default for name, param in skill.params.items() if not param.required}
+    return {name: param.default for name, param in skill.params.items() if not param.is_required}
 
 
 @pytest.mark.parametrize(("skill", "given", "seconds"), SHORTEST)
 def test_the_least_time_follows_from_cell_and_params(
     skill: type[Skill], given: Mapping[str, Any], seconds: float
 ) -> None:
-    assert skill.shortest(Least(), {**defaults(skill), **given}) == seconds
+    assert skill.min_time(Least(), {**defaults(skill), **given}) == seconds
 
 
 @pytest.mark.parametrize("skill", discover().values())
 def test_every_skill_can_be_asked_with_nothing_but_its_defaults(skill: type[Skill]) -> None:
-    assert skill.shortest(Least(), defaults(skill)) >= 0.0
+    assert skill.min_time(Least(), defaults(skill)) >= 0.0
