@@ -1,4 +1,4 @@
-"""Minimum times of the stages of a task that all kinds of cells compute alike."""
+"""Minimum times of the stages of a task, for all kinds of cells."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class CellLeastTimes:
 
     @property
     def descent(self) -> float:
-        """Minimum time of a guarded descent: it ends on the highest object, the lowest was expected [s]."""
+        """Minimum time of a guarded descent that expects the lowest and meets the highest object [s]."""
         motion = self._config.motion
         return max(0.0, motion.descent - self._max_saved_distance) / motion.descent_speed
 
@@ -33,7 +33,7 @@ class CellLeastTimes:
         return min(map(self._min_carry_time, names), default=0.0)
 
     def answer(self, detector: str) -> float:
-        """Return the latency of a detector, "" for the first one [s]; 0 for one that the cell lacks."""
+        """Return the latency of a detector, "" for the first detector [s]; 0 if the cell lacks it."""
         detectors = self._config.detectors
         config = detectors.get(detector or next(iter(detectors)))
         return config.latency if config else 0.0

@@ -1,4 +1,4 @@
-"""Minimum times in a simulated cell, from limits and inverse kinematics alone."""
+"""Minimum times in a simulated cell, from joint limits and inverse kinematics."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from executive.motion.arms import build_kinematics
 from executive.motion.limits import JointLimits, min_time
 
 ANGLE_SPACING = np.radians(20.0)
-"""Distance between the redundancy angles that are tried [rad]."""
+"""Step between sampled redundancy angles [rad]."""
 SAFETY_FACTOR = 0.8
 """Share of the minimum time found for a carry; other configurations and heights may take less time."""
 
 
 class SimLeastTimes(CellLeastTimes):
-    """Bounds that hold however a motion is planned; implements `executive.cell.protocols.LeastTimes`.
+    """Lower bounds of motion times for any planner; implements `executive.cell.protocols.LeastTimes`.
 
-    A carry begins at rest on an object and ends at rest over the bin: no joint makes its part of that sooner
-    than from rest to rest, whatever the way between. The least over all configurations counts; the last joint
-    need not turn, since any yaw will do.
+    A carry begins at rest on an object and ends at rest over the bin. On any path, each joint needs at least
+    the time of its rest-to-rest motion. The bound is the minimum over all configurations; the last joint need
+    not turn, because the yaw is arbitrary.
 
     Args:
         config: The cell file.
@@ -44,22 +44,22 @@ class SimLeastTimes(CellLeastTimes):
             low, high = np.transpose([self._config.table.x, self._config.table.y])
             places = np.clip(slots, low, high), np.broadcast_to(self._config.safe_place[:2], slots.shape)
             try:
-                self._carries[bin] = SAFETY_FACTOR * min(self._shortest(place, slots) for place in places)
+                self._carries[bin] = SAFETY_FACTOR * min(self._min_time(place, slots) for place in places)
             except Unreachable:
                 self._carries[bin] = 0.0
         return self._carries[bin]
 
-    def _shortest(self, places: Array, slots: Array) -> float:
-        """Return the time of the shortest of the ways from `places` `(N, 2)` to `slots` `(N, 2)` [m]."""
+    def _min_time(self, places: Array, slots: Array) -> float:
+        """Return the minimum time [s] for the nearest pair of `places` `(N, 2)` and `slots` `(N, 2)` [m]."""
         nearest = np.argmin(np.linalg.norm(places - slots, axis=1))
-        starts, ends = (self._postures(ways[nearest], self._highest) for ways in (places, slots))
+        starts, ends = (self._solve_postures(points[nearest], self._highest) for points in (places, slots))
         return float(min_time(ends - starts[:, None], self._limits).min())
 
-    def _postures(self, place: Array, height: float) -> Array:
+    def _solve_postures(self, place: Array, height: float) -> Array:
         """Return joint positions `(N, n)` [rad] with the tool at a place `(2,)` [m], the last joint at 0.
 
         Raises:
-            Unreachable: There are none.
+            Unreachable: No joint positions are within the limits.
         """
         pose = tool_down(np.array([*place, height]))
         found = self._kinematics.solve_all(pose, np.zeros(self._limits.joint_count), ANGLE_SPACING).qs

@@ -1,4 +1,4 @@
-"""The outline of a whole object in an image, whatever hides it: box, area and visible share."""
+"""Silhouette of an object in an image, occluded parts included: box, area and visible share."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from executive.cells.sim.models import Mesh
 from executive.geometry import Array
 
 FINE = 4
-"""Subdivisions of a pixel, each way, when an outline is rasterised."""
+"""Subdivisions of a pixel along each axis for the rasterization of a silhouette."""
 
 
 def outline_box(pixels: Array) -> Box:
@@ -21,24 +21,24 @@ def outline_box(pixels: Array) -> Box:
 
 
 def outline_area(mesh: Mesh, pixels: Array) -> float:
-    """Return the area [pixel²] of a mesh's silhouette, its vertices projected to `pixels` `(N, 2)`."""
+    """Return the area [pixel²] of the silhouette of a mesh whose projected vertices are `pixels` `(N, 2)`."""
     if mesh.convex:
         return float(cv2.contourArea(cv2.convexHull(pixels.astype(np.float32))))
     corner = np.floor(pixels.min(axis=0))
     size = np.ceil((pixels.max(axis=0) - corner + 1) * FINE).astype(int)
     canvas = np.zeros((size[1], size[0]), np.uint8)
     triangles = ((pixels - corner) * FINE)[mesh.triangles]
-    for triangle in _facing(triangles).round().astype(np.int32):
+    for triangle in _select_one_winding(triangles).round().astype(np.int32):
         cv2.fillConvexPoly(canvas, triangle, 1)
     return float(canvas.sum()) / FINE**2
 
 
 def visible_share(mesh: Mesh, pixels: Array, seen: NDArray[np.bool_]) -> float:
-    """Return the share (0 to 1) of a silhouette that the mask `seen` `(H, W)` shows."""
+    """Return the share (0 to 1) of a silhouette that is visible by the mask `seen` `(H, W)`."""
     return min(1.0, float(seen.sum()) / max(outline_area(mesh, pixels), 1.0))
 
 
-def _facing(triangles: Array) -> Array:
-    """Keep one winding of projected triangles `(M, 3, 2)`: half of a closed mesh covers it all."""
+def _select_one_winding(triangles: Array) -> Array:
+    """Return the projected triangles `(M, 3, 2)` of one winding: the silhouette of a closed mesh."""
     (ax, ay), (bx, by) = (triangles[:, 1] - triangles[:, 0]).T, (triangles[:, 2] - triangles[:, 0]).T
     return np.asarray(triangles[ax * by - ay * bx > 0])

@@ -1,4 +1,4 @@
-"""What the simulated arm hides from its camera, from joint positions and kinematics alone."""
+"""Occlusion of the scene by the simulated arm, from joint positions and kinematics."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from executive.perception.visibility import (
 )
 
 MAX_LOAD_OFFSET = 0.015
-"""How far beside the cup's axis the middle of what it holds may hang [m]."""
+"""Largest distance of the centre of a held object from the axis of the cup [m]."""
 
 
 class ArmShadow:
-    """Tells which pixels show the scene and whether the whole workspace is among them.
+    """Pixels that the arm does not occlude, and visibility of the whole workspace.
 
     Args:
         arm: The arm.
-        kinematics: Its kinematics.
+        kinematics: Kinematics of the arm.
         config: The cell file.
-        loaded: Tells whether the tool holds something, which then hides as much as the largest object.
+        loaded: Returns True if the tool holds an object; the object then occludes as much as the largest.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class ArmShadow:
         )
 
     def visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return `(H, W)` bool: True where the arm cannot be in front of the scene."""
+        """Return a mask `(H, W)` of the pixels that the arm cannot occlude."""
         q = self._arm.q
         flange, X_WT = self._kinematics.flange(q).position, self._kinematics.forward(q)
         joints = [np.zeros(3), *(frame.position for frame in self._kinematics.joint_frames(q)), flange]
@@ -63,6 +63,6 @@ class ArmShadow:
         return ~find_hidden_pixels(parts, matrix, X_WC, size)
 
     def sees_table(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
-        """Tell whether the whole workspace is in view and the arm not in front of it."""
+        """Return True if the whole workspace is in view and the arm does not occlude it."""
         table = find_outline_pixels(self._corners, matrix, X_WC, size)
         return table is not None and bool(np.all(self.visible(matrix, X_WC, size)[table]))

@@ -1,4 +1,4 @@
-"""Where to look at a cell from, so that everything that matters is in the picture."""
+"""Viewpoint from which arm, workspace and bins of a cell fill an image."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose
 
 AZIMUTH, ELEVATION = math.radians(-37), math.radians(29)
-"""From where, seen from the cell: in front of the arm, to its right, and above."""
+"""Direction from the cell to the camera [rad]: in front of the arm, to its right, and above."""
 FIELD_OF_VIEW_DEG = 33.0
-"""Vertical field of view [degree]: narrow, as that of a camera that stands back."""
+"""Vertical field of view [degree]: narrow, for a distant camera."""
 ARM_HEIGHT = 0.8
-"""How high over its foot the arm may bend [m]."""
+"""Largest height of the arm above its base [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """A camera that nobody decides by.
+    """A camera for display; no decision depends on its images.
 
     Attributes:
         matrix: Camera matrix `(3, 3)` [pixel].
-        X_WC: Its pose.
-        size: Width and height of its image [pixel].
+        X_WC: Pose of the camera in the world.
+        size: Width and height of the image [pixel].
     """
 
     matrix: Array
@@ -39,9 +39,9 @@ def overview(config: CellConfig, size: tuple[int, int], part: Box) -> Viewpoint:
     """Return the viewpoint from which arm, workspace and bins of a cell fill a part of the image.
 
     Args:
-        config: The cell.
+        config: The cell file.
         size: Width and height of the image [pixel].
-        part: Left, top, right and bottom of what they are to fill [pixel].
+        part: Left, top, right and bottom of the part of the image to fill [pixel].
     """
     matrix = compute_camera_matrix(*size, FIELD_OF_VIEW_DEG)
     away = [
@@ -51,8 +51,8 @@ def overview(config: CellConfig, size: tuple[int, int], part: Box) -> Viewpoint:
     ]
     R_WC = compute_look_at_pose(away, [0, 0, 0], [0, 0, 1]).rotation
     points = _outline(config) @ R_WC
-    # A camera at p sees a point q within the slopes low and high where
-    # low (q_z - p_z) <= q_x - p_x <= high (q_z - p_z): the nearest such p_z, then the middle for p_x.
+    # A camera at p sees a point q between the slopes low and high if
+    # low (q_z - p_z) <= q_x - p_x <= high (q_z - p_z). Choose the nearest p_z, then the middle of p_x.
     corners = np.linalg.solve(matrix, np.array([[*part[:2], 1.0], [*part[2:], 1.0]]).T).T
     spans = [
         (
@@ -69,7 +69,7 @@ def overview(config: CellConfig, size: tuple[int, int], part: Box) -> Viewpoint:
 
 
 def _outline(config: CellConfig) -> Array:
-    """Return points `(N, 3)` [m] around which everything happens."""
+    """Return points `(N, 3)` [m] that enclose arm, workspace and bins."""
     points = [(0.0, 0.0, 0.0), (0.0, 0.0, ARM_HEIGHT)]
     points += [(x, y, 0.0) for x in config.table.x for y in config.table.y]
     for bin in config.bins.values():
