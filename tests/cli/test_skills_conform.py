@@ -56,7 +56,7 @@ def test_without_a_name_all_skills_are_checked_and_mistakes_have_exit_code_1() -
     result = conform()
     lines = [line for line in result.stdout.splitlines() if not line.startswith("ok")]
     assert lines[:3] == [
-        "failed   Nap.defaults_allowed: Nap.gap has the default 0.3, which is more than 0.2. "
+        "failed   Nap.defaults_allowed: the default of Nap.gap must be at most 0.2 m, not 0.3. "
         "Correct the default, or the limits. (and 1 more)",
         'failed   Dream.arranged: Dream cannot be tried: no value can be generated for "story" (a text). '
         'Return it from a function in a test: conformance(Dream, lambda stage: {"story": ...}), '

@@ -13,7 +13,7 @@ from executive.cell.objects import Target
 from executive.mission.model import nodes
 from executive.skill import HOLDING, Skill
 from executive.testing import faults as effects
-from executive.testing.conformance.stage import list_inputs
+from executive.testing.conformance.situations import list_inputs
 from executive.testing.faults.effect import Effect
 from executive.testing.faults.script import ScheduledFault, after, between, during
 

@@ -51,7 +51,7 @@ def _check_value(case: Case, node: SkillNode, declared: Param | Port, value: Lit
     """Yield a finding if a value does not fit the param or port that it is given to."""
     name, code, hint, sentence = f"{node.skill}.{declared.name}", "wrong-type", "", ""
     if isinstance(declared, Param):
-        code, sentence = _find_param_problem(declared, value.value)
+        code, sentence = find_param_problem(declared, value.value)
     elif declared.direction is Direction.IN:
         sentence, hint = find_input_problem(value.value, declared), case.variable_hint(value.value)
     else:
@@ -81,7 +81,7 @@ def _find_unknown_names(
             yield error(mark, f"unknown-{declared.refers}", message, hint)
 
 
-def _find_param_problem(param: Param, value: object) -> tuple[str, str]:
+def find_param_problem(param: Param, value: object) -> tuple[str, str]:
     """Return code and sentence of a value that does not fit a param; the sentence is "" if it does."""
     try:
         converted = convert(value, param.type)

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from executive.testing.conformance.check import conformance
-from executive.testing.conformance.stage import Stage
+from executive.testing.conformance.situations import Stage
 
 __all__ = ["Stage", "conformance"]

@@ -9,9 +9,8 @@ from typing import Any
 
 from executive.skill import Skill
 from executive.testing.conformance import conduct, declarations
-from executive.testing.conformance.situations import Arrange, NotTried
+from executive.testing.conformance.situations import Arrange, NotTried, Stage
 from executive.testing.conformance.skill_runs import SkillRuns
-from executive.testing.conformance.stage import Stage
 
 Rule = Callable[[SkillRuns], Iterator[str]]
 """Yields the violations by a skill, with place and correction. The docstring states the rule."""

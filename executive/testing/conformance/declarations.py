@@ -5,8 +5,9 @@ from __future__ import annotations
 import ast
 import inspect
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
-from executive.mission.model.typed import WrongType, convert
+from executive.mission.check.skills import find_param_problem
 from executive.skill import Param, Port
 from executive.testing.conformance import source
 from executive.testing.conformance.skill_runs import SkillRuns
@@ -41,8 +42,7 @@ def defaults_allowed(runs: SkillRuns) -> Iterator[str]:
     """Each default is a value that a mission may give: of the type, inside the bounds, among the choices."""
     for param in runs.skill.params.values():
         if not param.is_required and (problem := _default_problem(param)):
-            default = f"{runs.name}.{param.name} has the default {param.default!r}"
-            yield f"{default}{problem}. Correct the default, or the limits."
+            yield f"the default of {runs.name}.{param.name} {problem}. Correct the default, or the limits."
 
 
 def reasons_declared(runs: SkillRuns) -> Iterator[str]:
@@ -100,22 +100,13 @@ def calls_take_effect(runs: SkillRuns) -> Iterator[str]:
 
 
 def _default_problem(param: Param) -> str:
-    """Return the problem with a default, as a continuation of its value, or ""."""
+    """Return the problem with a default, as a continuation of the param's name, or ""."""
+    # None is allowed although no choice.
+    checked = replace(param, choices=None) if param.default is None else param
     try:
-        value = convert(param.default, param.type)
-    except (WrongType, TypeError) as problem:
-        return f": {problem}"
-    if value is None:
-        return ""
-    number = value if isinstance(value, int | float) else None
-    if number is not None and param.ge is not None and number < param.ge:
-        return f", which is less than {param.ge!r}"
-    if number is not None and param.le is not None and number > param.le:
-        return f", which is more than {param.le!r}"
-    # If a param names a part of the cell, its choices are additional values.
-    if param.choices is not None and not param.refers and value not in param.choices:
-        return f", which is not among {', '.join(map(repr, param.choices))}"
-    return ""
+        return find_param_problem(checked, param.default)[1]
+    except TypeError as problem:
+        return str(problem)
 
 
 def _find_reasons(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:

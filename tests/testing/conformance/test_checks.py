@@ -41,11 +41,11 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         'Undocumented.target has no doc. Write port(..., doc="what it is").',
     ]),
     ("defaults_allowed", faulty.BadDefaults, [
-        f"BadDefaults.{problem}. Correct the default, or the limits." for problem in (
-            "near has the default 0.1, which is less than 0.2",
-            "far has the default 0.3, which is more than 0.2",
-            "order has the default 'rows', which is not among 'columns', 'none'",
-            "gap has the default 'wide': must be a number, not the text \"wide\"",
+        f"the default of BadDefaults.{problem}. Correct the default, or the limits." for problem in (
+            "near must be at least 0.2 m, not 0.1",
+            "far must be at most 0.2 m, not 0.3",
+            'order must be "columns" or "none", not the text "rows"',
+            'gap must be a number, not the text "wide"',
         )
     ]),
     ("reasons_declared", faulty.RaisesUndeclared, [
