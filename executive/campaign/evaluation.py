@@ -42,7 +42,7 @@ from executive.training.rendering import generate, run_frames
 from executive.training.samples import Samples
 
 MAX_OBJECTS = 20
-"""Largest number of objects in a scene, if the workspace has room for so many."""
+"""Maximum number of objects in a scene, if the workspace has room for them."""
 Progress = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
 """Opens a named progress bar, whose context yields `update(done, total)`."""
 
@@ -107,15 +107,15 @@ def list_detectors(
     Raises:
         InputError: A cell has no detector of this name.
     """
-    alone: dict[str, DetectorConfig] = {}
+    model: dict[str, DetectorConfig] = {}
     if weights is not None:
-        alone = {MODEL_NAME: model_detector(weights, labels or label_file(weights))}
+        model = {MODEL_NAME: model_detector(weights, labels or label_file(weights))}
     elif not cells:
-        alone = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
+        model = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
     if not cells:
-        yield DetectorUnderTest(None, alone, next(iter(alone)), Path())
+        yield DetectorUnderTest(None, model, next(iter(model)), Path())
     for file, config in cells.items():
-        configs = alone or dict(config.detectors)
+        configs = model or dict(config.detectors)
         name = detector or next(iter(configs))
         if name not in configs:
             hint = alternatives(name, configs, "Its detectors")
@@ -153,8 +153,8 @@ def measure(
     """Return an evaluation of a detector on `dataset`, or on scenes of its cell."""
     config = detector.cell
     run_config = None if dataset is not None or scenes.varied else config
-    with _images(detector, dataset, scenes, progress) as samples:
-        asked = CellDetector(
+    with _open_images(detector, dataset, scenes, progress) as samples:
+        cell_detector = CellDetector(
             detector.configs,
             detector.name,
             base=detector.base,
@@ -162,16 +162,16 @@ def measure(
             view=scenes.view,
             classes=tuple(config.objects) if config else None,
         )
-        with contextlib.closing(asked), progress(f"asking {detector.name}") as update:
+        with contextlib.closing(cell_detector), progress(f"asking {detector.name}") as update:
             return evaluate(
-                asked, _report_progress(samples, update), threshold=threshold, worst=worst_misses,
-                localizer=_localizer(run_config) if run_config else None,
+                cell_detector, _report_progress(samples, update), threshold=threshold, worst=worst_misses,
+                localizer=_build_localizer(run_config) if run_config else None,
                 table=run_config.table if run_config else None,
             )  # fmt: skip
 
 
 @contextlib.contextmanager
-def _images(
+def _open_images(
     detector: DetectorUnderTest, dataset: Path | None, scenes: SceneSettings, progress: Progress
 ) -> Iterator[Samples | list[LabelledImage]]:
     """Provide the images for the measurement of a detector."""
@@ -207,7 +207,7 @@ def _report_progress(
         update_progress(done, len(samples))
 
 
-def _localizer(config: CellConfig) -> Localizer | None:
+def _build_localizer(config: CellConfig) -> Localizer | None:
     """Return the cell's localizer; None for `ray`, which needs the simulated world."""
     if config.localization == "ray":
         return None
@@ -262,7 +262,7 @@ def store_evaluation(
         },
         frames=evaluation.frames,
     )
-    instead = "name another file with --out, and copy it into the folder of your cell file"
-    with explain_os_errors(InputError, f"the measurement {path} cannot be written", instead):
+    advice = "name another file with --out, and copy it into the folder of your cell file"
+    with explain_os_errors(InputError, f"the measurement {path} cannot be written", advice):
         write_atomically(path, format_measurements(read_measurements(path), measurement))
     return path

@@ -130,14 +130,9 @@ def wilson_interval(successes: int, total: int) -> tuple[float, float]:
 
 def summarize_values(values: Sequence[float]) -> dict[str, float]:
     """Return `least, median, mean, most` of `values`; all are 0 without values."""
-    if not values:
-        return dict.fromkeys(("least", "median", "mean", "most"), 0.0)
-    return {
-        "least": round(min(values), 3),
-        "median": round(statistics.median(values), 3),
-        "mean": round(statistics.fmean(values), 3),
-        "most": round(max(values), 3),
-    }
+    functions: dict[str, Callable[[Sequence[float]], float]]
+    functions = {"least": min, "median": statistics.median, "mean": statistics.fmean, "most": max}
+    return {name: round(function(values), 3) if values else 0.0 for name, function in functions.items()}
 
 
 def _fail_job(job: Job, error: BaseException) -> Result:

@@ -21,7 +21,7 @@ RunMethod = Callable[[Skill, Cell], Steps | None]
 
 
 def make_failing(
-    skill: type[Skill], reason: str, *, times: int | None = None, message: str = "as the test wants it"
+    skill: type[Skill], reason: str, *, times: int | None = None, message: str = "injected failure"
 ) -> type[Skill]:
     """Return a skill that fails in its first `times` starts, and then does its work.
 

@@ -14,7 +14,7 @@ from executive.testing.substitutes import make_raising, make_raising_when_halted
 
 When = Literal["first", "middle", "late", "lasting"]
 """Time of a fault in a run: the first activation, the middle, near the end, or repeatedly."""
-INJECTED_FAILURE = "as the campaign wants it"
+INJECTED_FAILURE = "failure injected by the campaign"
 """Message of a skill that fails without a cause in the cell."""
 
 

@@ -23,7 +23,7 @@ AnswerChange = Callable[[Answer], Answer]
 
 def _refuse(answer: Answer) -> Answer:
     """Raise Unavailable."""
-    raise Unavailable(f"detector {answer.detector}: the detector is dead, as the test wants it")
+    raise Unavailable(f"detector {answer.detector}: the detector is dead (injected fault)")
 
 
 def _reduce_confidence(answer: Answer) -> Answer:
@@ -88,7 +88,7 @@ def detector_slow(by: float) -> Effect:
         InputError: The delay is negative.
     """
     if by < 0:
-        raise InputError(f"a slow detector answers later, not by {by:g} s")
+        raise InputError(f"the delay of a detector must be at least 0 s, not {by:g} s")
     return faulty_detector("detector_slow", delay=by)
 
 

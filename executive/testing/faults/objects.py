@@ -78,7 +78,7 @@ def _object_effect(
 ) -> Effect:
     """Return the effect of `change(occurrence, object, *arguments)`."""
     if isinstance(which, int) and which < 1:
-        raise InputError(f"objects are counted from 1, and which is {which}")
+        raise InputError(f"the number of an object is at least 1, not {which}")
     return Effect(name, _change_object, arguments=(change, which, require_share(share), *arguments))
 
 

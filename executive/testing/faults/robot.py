@@ -146,7 +146,7 @@ def _hide(proceed: Callable[[], Frame], occurrence: Occurrence, answer: object) 
 def _lose_depth(proceed: Callable[[], Any], occurrence: Occurrence) -> Any:
     del proceed
     occurrence.record()
-    raise NoDepth("the frame has no depth there, as the test wants it")
+    raise NoDepth("the frame has no depth there (injected fault)")
 
 
 @dataclass(frozen=True)
@@ -164,8 +164,8 @@ class FailingPlanning:
     def result(self) -> Motion:
         """Raise Blocked or Unreachable."""
         if self.is_blocked:
-            raise Blocked("something is in the way, as the test wants it")
-        raise Unreachable("the planner finds no way, as the test wants it")
+            raise Blocked("something is in the way (injected fault)")
+        raise Unreachable("the planner finds no motion (injected fault)")
 
 
 def _fail_planning(proceed: Callable[[], Planning], occurrence: Occurrence, is_blocked: bool) -> Planning:

@@ -69,7 +69,7 @@ def during(pattern: str, effect: Effect, *, nth: int | Collection[int] = ()) -> 
     """
     numbers = (nth,) if isinstance(nth, int) else tuple(nth)
     if any(number < 1 for number in numbers):
-        raise InputError(f"activations are counted from 1, and nth is {nth}")
+        raise InputError(f"the number of an activation is at least 1, not {nth}")
     return ScheduledFault(effect, DuringNode(pattern, numbers))
 
 
@@ -97,7 +97,7 @@ def between(start: float, end: float, effect: Effect) -> ScheduledFault:
         InputError: The end is not after the start.
     """
     if not 0.0 <= start < end:
-        raise InputError(f"a fault lasts from some time until a later one, not from {start:g} s to {end:g} s")
+        raise InputError(f"a fault needs times with 0 <= start < end, not {start:g} s and {end:g} s")
     return ScheduledFault(effect, DuringTime(start, end))
 
 

@@ -90,8 +90,8 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f"(faulty_skills.py:N).{FAULT}",
         f"{EMPTY} while the arm hides the table at tick 12 IndexError: tuple index out of range "
         f"(faulty_skills.py:N).{FAULT}",
-        f"{EMPTY} while no detector answers at tick 12 Unavailable: detector embedded: the detector is dead, "
-        f"as the test wants it (faulty_skills.py:N).{FAULT}",
+        f"{EMPTY} while no detector answers at tick 12 Unavailable: detector embedded: the detector is dead "
+        f"(injected fault) (faulty_skills.py:N).{FAULT}",
         f"{EMPTY} while the detectors see nothing at tick 12 IndexError: tuple index out of range "
         f"(faulty_skills.py:N).{FAULT}",
     ]),

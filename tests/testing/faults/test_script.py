@@ -84,16 +84,16 @@ def test_a_chance_is_met_as_often_as_it_says(probability: float, seed: int) -> N
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: during("*", SLIPS, nth=0), "activations are counted from 1, and nth is 0"),
-        (lambda: between(5, 5, SLIPS), "from some time until a later one, not from 5 s to 5 s"),
-        (lambda: after(-1, SLIPS), "not from -1 s to inf s"),
+        (lambda: during("*", SLIPS, nth=0), "the number of an activation is at least 1, not 0"),
+        (lambda: between(5, 5, SLIPS), "0 <= start < end, not 5 s and 5 s"),
+        (lambda: after(-1, SLIPS), "not -1 s and inf s"),
         (lambda: with_probability(1.5, "*", SLIPS, seed=0), "a probability is 0 to 1, not 1.5"),
         (lambda: effects.seal_breaks(1.0), f"{SHARE}, not 1"),
         (lambda: effects.arm_runs_into(share=0.0), f"{SHARE}, not 0"),
         (lambda: effects.object_removed(share=1.0), f"{SHARE}, not 1"),
-        (lambda: effects.object_removed(0), "objects are counted from 1, and which is 0"),
-        (lambda: effects.object_moved((0.1, 0.0), -1), "objects are counted from 1, and which is -1"),
-        (lambda: effects.detector_slow(-0.5), "a slow detector answers later, not by -0.5 s"),
+        (lambda: effects.object_removed(0), "the number of an object is at least 1, not 0"),
+        (lambda: effects.object_moved((0.1, 0.0), -1), "the number of an object is at least 1, not -1"),
+        (lambda: effects.detector_slow(-0.5), "the delay of a detector must be at least 0 s, not -0.5 s"),
     ],
 )
 def test_a_script_that_makes_no_sense_is_refused(make, sentence: str) -> None:
