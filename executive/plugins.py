@@ -37,8 +37,8 @@ def discover() -> dict[str, type[Skill]]:
     """Return every skill of the entry-point group `executive.skills`, by name.
 
     Raises:
-        InputError:
-            pyproject.toml of the project one works in is wrong.
+        InputError: Two packages register one name, an entry is not a skill or cannot be loaded, or the
+            pyproject.toml of the working directory's project is invalid.
     """
     found: dict[str, type[Skill]] = {}
     for name, entry in registered(SKILLS, "skill").items():
@@ -99,9 +99,9 @@ class PluginEntry:
 def registered(group: str, kind: str) -> dict[str, PluginEntry]:
     """Return the entries of a group by name, sorted by name, without loading their classes.
 
-    The project one works in (`project_here`) need not be installed: its folder is the last
-    place where modules are looked for afterwards. If it is, its pyproject.toml counts all the same, not what
-    it said when it was installed.
+    The project of the working directory (`project_here`) need not be installed: afterwards its folder is the
+    last in which Python looks for modules. If the project is installed, the entries in its pyproject.toml
+    count, not those at the time of the installation.
 
     Raises:
         InputError: Two packages register one name, or the project's pyproject.toml is invalid.
@@ -145,14 +145,14 @@ def _normalize(package: str) -> str:
 
 
 def _locate_error(error: Exception) -> str:
-    """Return the file and line in which a module raised an error, or "" if no code of the plugin did."""
+    """Return the file and line in which a module raised an error, or "" if no code of a plugin did."""
     if isinstance(error, SyntaxError):
         return ""  # The message of a syntax error names file and line.
-    own_folders = Path(__file__).parent, Path(traceback.__file__).parent
+    ignored_folders = Path(__file__).parent, Path(traceback.__file__).parent
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         file = Path(frame.filename)
         is_installed = "site-packages" in file.parts
-        if file.is_file() and (is_installed or not any(folder in file.parents for folder in own_folders)):
+        if file.is_file() and (is_installed or not any(folder in file.parents for folder in ignored_folders)):
             return f", in {file}:{frame.lineno}"
     return ""
 
@@ -195,9 +195,9 @@ class Project:
 def project_here() -> Project | None:
     """Return the project of the working directory, or None if there is no project.
 
-    It is that of the nearest pyproject.toml, in the working directory or above it. Whoever works in a folder
-    has its code run, as with pytest: nothing else is trusted. So no pyproject.toml counts in a folder that is
-    everybody's, as /tmp is, where it may be anyone's.
+    The project is that of the nearest pyproject.toml, in the working directory or above it. A user who works
+    in a folder trusts its code, as with pytest. In a shared folder such as /tmp, any user may have written
+    the pyproject.toml: there it is ignored.
 
     Raises:
         InputError: The file cannot be read, or is not TOML.
@@ -215,7 +215,7 @@ def project_here() -> Project | None:
 
 
 def _is_shared(folder: Path) -> bool:
-    """Return True if every user may create files in a folder, as in `/tmp`."""
+    """Return True if every user may add files to a folder that holds files of others, as /tmp."""
     mode = folder.stat().st_mode
     return bool(mode & stat.S_ISVTX and mode & stat.S_IWOTH)
 

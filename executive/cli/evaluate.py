@@ -64,9 +64,9 @@ def command(
 ) -> None:  # fmt: skip
     """Measure a detector on random scenes of cells, or on labelled images.
 
-    The detector is that of a cell with all settings of its section, or a model file (--weights), or with
-    neither the one that ships with this project. The measurement of a cell's detector, as it is declared, is
-    stored: runs take the error rates of the detector from it.
+    The detector is that of a cell with all settings of its section, or a model file (--weights), by default
+    the one that ships with this project. The measurement of a cell's detector, as it is declared, is stored:
+    runs take the error rates of the detector from it.
     """
     unknown = next((key for key in overrides if not key.startswith("cell.")), "")
     is_picture = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES

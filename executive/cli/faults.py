@@ -23,9 +23,7 @@ def parse_fault_numbers(text: str) -> tuple[int, ...]:
 @options.MISSION
 @options.oracle_option
 @click.option(
-    "--pairs",
-    type=options.COUNT,
-    help="Inject this number of random pairs of faults instead of single faults.",
+    "--pairs", type=options.COUNT, help="Number of random pairs of faults to inject instead of single faults."
 )
 @click.option(
     "--fault", "numbers", type=parse_fault_numbers, metavar="N[+M]",
@@ -46,11 +44,11 @@ def command(
 ) -> None:  # fmt: skip
     """Inject each fault into a run of MISSION; exit code 1 if a run does not handle its fault.
 
-    Every reason of every node, bugs in every skill, detectors, objects and the tool: what happens is made
-    from the mission's tree. Where something in the cell makes a node fail, its skill need not say so by
-    itself: not all that --list shows is run then. Wrong is a run that loses what the fault did not put out
-    of reach, that misplaces something, whose books are not what the world is, or that ends in any other
-    disorder.
+    The faults are made from the mission's tree: every reason of every node, bugs in every skill, and faults
+    of detectors, objects and the tool. If a fault of the cell makes a node fail, the same reason is not
+    injected into its skill: then fewer faults are run than --list shows. A run does not handle its fault if
+    it loses an object that the fault left within reach, misplaces an object, has a ledger that disagrees with
+    the world, or ends in any other disorder.
     """
     if sum((pairs is not None, numbers is not None, is_list)) > 1:
         raise click.UsageError("--pairs, --fault and --list exclude each other")

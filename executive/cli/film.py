@@ -32,8 +32,8 @@ def command(
 ) -> None:  # fmt: skip
     """Make a film of RUN (a run directory, or `latest`): the robot, and beside it the tree and every item.
 
-    The world is rebuilt from the run's world.log and looked at again, so this works for every run on a
-    simulated cell, also one that was halted, cut off or taken up again. Needs no display.
+    The world is rebuilt from the run's world.log and rendered again, so this works for every run on a
+    simulated cell, also one that was halted, interrupted or resumed. Needs no display.
     """
     with stdout_kept_clean():
         from executive.cli.progress import bar

@@ -53,7 +53,7 @@ class Executive(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command at the start of `args`; suggest the right one if it is misspelled."""
+        """Return the command that `args` begin with; the error for a misspelling suggests a command."""
         close = difflib.get_close_matches(args[0], COMMANDS, n=1)
         if args[0] not in COMMANDS and close and not args[0].startswith("-"):
             ctx.fail(f'there is no command "{args[0]}"; did you mean "{close[0]}"?')

@@ -72,7 +72,6 @@ scene_option = click.option(
 )  # fmt: skip
 workers_option = click.option("--workers", type=COUNT, default=2, help="Number of concurrent runs.")
 oracle_option = click.option(
-    "--oracle",
-    is_flag=True,
+    "--oracle", is_flag=True,
     help="Take detections from the true world: a simulated sort then takes about two seconds.",
-)
+)  # fmt: skip

@@ -23,7 +23,7 @@ def command(ctx: click.Context, run: str, edited: Path | None, runs: Path, as_js
     """Repeat the decisions of RUN (a run directory, or `latest`) with the recorded answers of its cell.
 
     Nothing moves and nothing is simulated: tree, skills and ledger get the recorded answers of arm, tool,
-    camera, detectors and operator. Says which decision differs first; exit code 1 if one does.
+    camera, detectors and operator. Prints the first decision that differs; exit code 1 if there is one.
     """
     with stdout_kept_clean():
         from executive.plugins import discover

@@ -50,12 +50,9 @@ if TYPE_CHECKING:
 @click.option("--gui", is_flag=True, help="Open the simulator's window.")
 @click.option("--realtime", is_flag=True, help="Run on the wall clock instead of as fast as possible.")
 @click.option(
-    "--request",
-    "requests",
-    metavar="CLASS",
-    multiple=True,
+    "--request", "requests", metavar="CLASS", multiple=True,
     help="Class that the operator requests; repeatable.",
-)
+)  # fmt: skip
 @click.pass_context
 def command(
     ctx: click.Context, mission: str | None, resume: str | None, seed: int, overrides: dict[str, str],

@@ -14,8 +14,8 @@ from executive.cli.streams import print_json, stdout_kept_clean
 def command(cell: bool, library: bool, journal: bool) -> None:
     """Print the JSON Schema of mission files, including the installed skills.
 
-    A file that begins with `# yaml-language-server: $schema=mission.schema.json` names the schema beside
-    it to every editor with the YAML language server.
+    A file that begins with `# yaml-language-server: $schema=mission.schema.json` names the schema beside it
+    to every editor with the YAML language server.
     """
     if cell + library + journal > 1:
         raise click.UsageError("--cell, --library and --journal exclude each other; give one of them")

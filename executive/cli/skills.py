@@ -68,9 +68,10 @@ def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool
         if not as_json:
             click.echo("\n".join(conformance_lines(skill_verdicts)))
         verdicts += skill_verdicts
-    print_json([asdict(verdict) for verdict in verdicts]) if as_json else click.echo(
-        conformance_total(verdicts)
-    )
+    if as_json:
+        print_json([asdict(verdict) for verdict in verdicts])
+    else:
+        click.echo(conformance_total(verdicts))
     return all(verdict.status == "ok" for verdict in verdicts)
 
 
@@ -93,10 +94,10 @@ def declared(name: str, skill: type[Skill]) -> Declaration:
     return cast(Declaration, json.loads(to_json(facts, inf_nan_mode="strings", fallback=str)))
 
 
-def _declaration_of(value: Param | Port) -> dict[str, Any]:
+def _declaration_of(entry: Param | Port) -> dict[str, Any]:
     """Return the declaration of a param or port by its attributes; the bounds are `min` and `max`."""
-    facts = {**vars(value), "type": _format_type(value.type), "required": value.is_required}
-    facts["default"] = None if value.default is ... else value.default
+    facts = {**vars(entry), "type": _format_type(entry.type), "required": entry.is_required}
+    facts["default"] = None if entry.default is ... else entry.default
     return {{"ge": "min", "le": "max"}.get(name, name): value for name, value in facts.items()}
 
 
@@ -140,23 +141,22 @@ def _ports(facts: Declaration, direction: str) -> list[Declaration]:
     return [port for port in facts["ports"] if port["direction"] == direction]
 
 
-def _describe_value(declaration: Declaration) -> str:
+def _describe_value(entry: Declaration) -> str:
     """Return the complete declaration of a param or port as text."""
-    words = [declaration["type"] + (f" [{declaration['unit']}]" if declaration.get("unit") else "")]
-    if declaration["required"] or "direction" not in declaration:
-        words.append("required" if declaration["required"] else f"default {declaration['default']!r}")
-    elif declaration["direction"] == "in":
+    words = [entry["type"] + (f" [{entry['unit']}]" if entry.get("unit") else "")]
+    if entry["required"] or "direction" not in entry:
+        words.append("required" if entry["required"] else f"default {entry['default']!r}")
+    elif entry["direction"] == "in":
         words.append("may be left out")
-    if declaration.get("min") is not None:
-        words.append(f"at least {declaration['min']:g}")
-    if declaration.get("max") is not None:
-        words.append(f"at most {declaration['max']:g}")
-    if declaration.get("choices"):
-        words.append(f"one of {', '.join(map(str, declaration['choices']))}")
-    if declaration["refers"]:
-        words.append(f"names {'an' if declaration['refers'][0] in 'aeiou' else 'a'} {declaration['refers']}")
-    doc = f". {declaration['doc']}" if declaration["doc"] else ""
-    text = f"{declaration['name']}: {', '.join(words)}{doc}"
+    if entry.get("min") is not None:
+        words.append(f"at least {entry['min']:g}")
+    if entry.get("max") is not None:
+        words.append(f"at most {entry['max']:g}")
+    if entry.get("choices"):
+        words.append(f"one of {', '.join(map(str, entry['choices']))}")
+    if entry["refers"]:
+        words.append(f"names {'an' if entry['refers'][0] in 'aeiou' else 'a'} {entry['refers']}")
+    text = f"{entry['name']}: {', '.join(words)}" + (f". {entry['doc']}" if entry["doc"] else "")
     return textwrap.fill(
         text, _LINE_WIDTH, initial_indent="  ", subsequent_indent=" " * 6,
         break_long_words=False, break_on_hyphens=False,

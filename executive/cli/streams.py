@@ -85,7 +85,7 @@ class TolerantStream(io.TextIOBase):
 
 
 def unescaped_stderr() -> TextIO:
-    """Return standard error without escaping, for a library that draws on the terminal."""
+    """Return standard error without escaping, for a library that draws with control characters."""
     if isinstance(sys.stderr, TolerantStream):
         return cast(TextIO, sys.stderr.unescaped())
     return sys.stderr

@@ -28,12 +28,9 @@ def parse_seed_range(text: str) -> range:
 @click.command(name="sweep")
 @options.MISSION
 @click.option(
-    "--seeds",
-    type=parse_seed_range,
-    metavar="A-B",
-    required=True,
+    "--seeds", type=parse_seed_range, metavar="A-B", required=True,
     help="First and last seed, for instance 0-99.",
-)
+)  # fmt: skip
 @options.workers_option
 @click.option("--frames", is_flag=True, help="Save the images on which the decisions are based.")
 @options.overrides_option
@@ -47,8 +44,7 @@ def command(
 ) -> None:  # fmt: skip
     """Run MISSION once for every seed; exit code 1 if any run did not succeed.
 
-    Ctrl-C halts the current runs, and results of the complete runs are printed; a second Ctrl-C quits at
-    once.
+    Ctrl-C halts the current runs; the results of the complete runs are printed. A second Ctrl-C ends at once.
     """
     with stdout_kept_clean():
         from executive.campaign.sweep import Job, summarize, sweep

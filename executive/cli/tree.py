@@ -24,10 +24,9 @@ if TYPE_CHECKING:
     "--ports", is_flag=True, help="Print the inputs (? if it may be unset) and outputs of every skill."
 )
 @click.option(
-    "--reasons",
-    is_flag=True,
+    "--reasons", is_flag=True,
     help="Print the failure reasons of every skill, and those that every catch handles.",
-)
+)  # fmt: skip
 @click.option("--fold", is_flag=True, help="Print every subtree once, and afterwards only its name.")
 @click.option("--svg", "as_svg", is_flag=True, help="Print the tree as an SVG image on stdout.")
 @click.option("--dot", "as_dot", is_flag=True, help="Print the tree as Graphviz text on stdout.")
@@ -46,11 +45,11 @@ def command(
         from pydantic_core import to_json
 
         from executive.view.tree.dot import dot
-        from executive.view.tree.outline import drawn, folded
+        from executive.view.tree.outline import draw, fold_subtrees
         from executive.view.tree.svg import svg
 
         name, nodes = _outline_of(mission, overrides)
-        nodes = folded(nodes) if fold else nodes
+        nodes = fold_subtrees(nodes) if fold else nodes
         if as_svg:
             shown = svg(nodes, name)
         elif as_dot:
@@ -58,7 +57,7 @@ def command(
         elif as_json:
             shown = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
         else:
-            shown = drawn(nodes, ports=ports, reasons=reasons)
+            shown = draw(nodes, ports=ports, reasons=reasons)
     (print_json if as_json else click.echo)(shown)
 
 

@@ -51,8 +51,8 @@ def test_a_film_is_made_where_it_was_wanted(run: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("-o", "a.mp4", "--gif"), '"a.mp4" is not a name of a GIF'),
-        (("-o", "a.webm"), '"a.webm" is not a name of a film'),
+        (("-o", "a.mp4", "--gif"), '"a.mp4" is no name for a GIF'),
+        (("-o", "a.webm"), '"a.webm" is no name for a film'),
         (("-o", "/nowhere/a.mp4"), 'cannot write the film "/nowhere/a.mp4": no such file or directory'),
         (("--speed", "0"), "0.1<=x<=100"),
     ],

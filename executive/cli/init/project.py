@@ -58,7 +58,8 @@ def _require_empty(folder: Path) -> None:
     if entries:
         raise InputError(
             f'the folder "{folder}" is not empty: it holds {entries[0]}'
-            f"{f' and {len(entries) - 1} more' if entries[1:] else ''}; name an empty or a new folder"
+            f"{f' and {len(entries) - 1} more' if entries[1:] else ''}; "
+            "name one that is empty, or not there yet"
         )
 
 
@@ -79,7 +80,11 @@ def package_name(folder: Path) -> str:
 
 
 def require_free(name: str, source: str) -> str:
-    """Return `name` if it is free and a valid name of a package; `source` describes its origin.
+    """Return `name` if it is a valid and free name of a package.
+
+    Args:
+        name: The name.
+        source: Origin of the name, for an error message.
 
     Raises:
         InputError: The name is invalid, or taken.
@@ -95,7 +100,7 @@ def require_free(name: str, source: str) -> str:
 
 
 def _find_conflict(name: str) -> str:
-    """Return the reason why a package cannot have a name, or ""."""
+    """Return the reason why a name is not free, or ""."""
     if keyword.iskeyword(name):
         return "that is a word of Python's own"
     if name in FOLDERS:

@@ -23,8 +23,10 @@ def _list_parts(detector: str, evaluation: Evaluation) -> Iterator[RenderableTyp
     yield f"  {evaluation.objects} objects on {evaluation.images} images, threshold {evaluation.threshold:g}"
     if evaluation.unavailable:
         share = evaluation.unavailable / evaluation.images
-        count = f"{evaluation.unavailable} of {evaluation.images} images ({share:.1%})"
-        yield f"  unavailable for {count}, at last: {evaluation.why}"
+        yield (
+            f"  unavailable for {evaluation.unavailable} of {evaluation.images} images ({share:.1%}), "
+            f"at last: {evaluation.why}"
+        )
     if not evaluation.answered_by:
         return
     if set(evaluation.answered_by) != {detector}:
@@ -54,7 +56,7 @@ def _make_class_table(evaluation: Evaluation) -> Table:
 
 
 def _make_confusion_table(evaluation: Evaluation) -> Table:
-    """Return the number of objects of each class by the class that was detected."""
+    """Return the number of objects by true and detected class."""
     table = _make_table("taken for", *next(iter(evaluation.confusion.values())))
     for label, row in evaluation.confusion.items():
         table.add_row(label, *("" if label == found == NOTHING else f"{row[found]}" for found in row))

@@ -84,7 +84,7 @@ class Branch:
     """A branch of the tree that runs only after a failure, or at the end.
 
     Attributes:
-        place: File and line where it stands.
+        place: File and line of the branch.
         what: `catch on Grasp.missed`, `recover`, `choice 2`, `finally`.
         paths: Paths of its nodes in the tree; a subtree that is used twice has two paths.
         entered: Number of trials that entered the branch.
@@ -101,15 +101,15 @@ class FaultFigures:
     """Results of a fault campaign on one mission.
 
     Attributes:
-        mission: Its name.
-        cell: Kind of its cell, and where the detections come from.
-        seed: What chance drew from.
+        mission: Name of the mission.
+        cell: Kind of its cell, and source of the detections.
+        seed: Seed of the random numbers.
         robot_time: Time that an undisturbed run takes on its clock [s].
         listed: Single faults of the mission.
         trials: Every run, in the order of the faults.
-        branches: Every way on after a failure, in the order of the tree.
-        complete: False where somebody ended the campaign before its last run.
-        pairs: True where the runs were to have two faults each.
+        branches: Every branch that runs only after a failure or at the end, in the order of the tree.
+        complete: False if the user ended the campaign before its last run.
+        pairs: True if each run has two faults.
     """
 
     mission: str
@@ -233,7 +233,7 @@ def _count_verdicts(trials: Sequence[Trial]) -> Iterator[str]:
     failed = sum(trial.verdict.startswith("FAILURE") for trial in trials)
     yield (
         f"  as undisturbed: {count('ok')}; fewer objects sorted: {fewer}; failed: {failed}; "
-        f"ended by a fault: {count('FAULT')}; fault did not occur: {count('-')}; wrong: {count('!!')}"
+        f"ended as FAULT: {count('FAULT')}; fault did not occur: {count('-')}; wrong: {count('!!')}"
     )
     ends = Counter(trial.reason for trial in trials if trial.verdict.startswith("FAILURE"))
     if ends:

@@ -42,7 +42,7 @@ class FilmCourse:
 
     @property
     def open_paths(self) -> frozenset[str]:
-        """Paths of the running nodes; after the end, of the nodes that ended with the tree and its status."""
+        """Paths of the running nodes; after the end of the tree, of those with its end and its status."""
         timeline = self.timeline
         if running := timeline.running():
             return frozenset(activation.node for activation in running)

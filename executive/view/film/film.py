@@ -62,7 +62,7 @@ def select_steps(steps: int, steps_per_frame: float) -> list[int]:
 def _draw_frames(
     source: FilmSource, steps: Sequence[int], end_frames: int, speed: float, workers: int
 ) -> Generator[Image.Image, None, None]:
-    """Yield the frames of a film: a page for each of these control steps, then the end."""
+    """Yield the frames of a film: a page per control step, and then `end_frames` pages with the result."""
     start, directory = source.start, source.directory
     note = f"seed {start.seed} · cell {source.config.cell}" + (f" · {speed:g}x speed" if speed != 1 else "")
     length = steps[-1] * start.step

@@ -101,8 +101,8 @@ def format_of(out: Path | None, gif: bool) -> Format:
     """Return the format of a film.
 
     Args:
-        out: The file that it is to be in; None where nobody said.
-        gif: Whether somebody asked for a GIF.
+        out: File of the film; None if the user gave none.
+        gif: True if the user asked for a GIF.
 
     Raises:
         InputError: The suffix of the file is unknown or contradicts `gif`.
@@ -112,10 +112,10 @@ def format_of(out: Path | None, gif: bool) -> Format:
         return default
     suffix = out.suffix.lower()
     if gif and suffix != GIF.suffix:
-        raise InputError(f'"{out}" is not a name of a GIF; end it in .gif, or leave out --gif')
+        raise InputError(f'"{out}" is no name for a GIF; end it in .gif, or leave out --gif')
     found = next((format for format in FORMATS if format.suffix == suffix), None)
     if found is None:
-        raise InputError(f'"{out}" is not a name of a film; end it in {MP4.suffix} or {GIF.suffix}')
+        raise InputError(f'"{out}" is no name for a film; end it in {MP4.suffix} or {GIF.suffix}')
     return found
 
 
@@ -128,9 +128,9 @@ def file_for(path: Path, *, force: bool) -> Iterator[Path]:
     """
     if path.exists() and not force:
         raise InputError(f'"{path}" exists; name another file with -o, or overwrite it with --force')
-    instead = "name another place with -o"
+    remedy = "name another place with -o"
     with (
-        explain_os_errors(InputError, f'cannot write the film "{path}"', instead),
-        atomic_replacement(path) as part,
+        explain_os_errors(InputError, f'cannot write the film "{path}"', remedy),
+        atomic_replacement(path) as partial_file,
     ):
-        yield part
+        yield partial_file

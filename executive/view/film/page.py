@@ -46,7 +46,7 @@ def draw_page(
 
     Args:
         source: The record of the run.
-        picture: Picture of the world, of the size `SCENE_SIZE`.
+        picture: Image of the world, of the size `SCENE_SIZE`.
         course: The run so far.
         note: Second line of the page: seed, cell, speed.
         length: Time on the robot's clock in all [s].

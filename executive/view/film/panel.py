@@ -12,7 +12,7 @@ from executive.mission.outline import OutlineNode
 from executive.view.film import ink
 from executive.view.film.course import FilmCourse
 from executive.view.film.ink import DIM, FAILURE, FAINT, INK, RULE, RUNNING, STATUS, SUCCESS
-from executive.view.tree.outline import branches, opened
+from executive.view.tree.outline import branches, open_running
 
 TEXT_SIZE, HEADING_SIZE, MARK_SIZE = 14, 12, 11
 """Sizes of text, of column headings and of status marks [pixel]."""
@@ -34,7 +34,7 @@ def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], cour
 
     Args:
         image: Image to draw on.
-        box: Left, top, right and bottom of the room there is [pixel].
+        box: Left, top, right and bottom of the free area [pixel].
         nodes: The whole tree.
         course: Its open nodes, and what is known of them.
     """
@@ -65,7 +65,7 @@ def select_nodes(nodes: Sequence[OutlineNode], course: FilmCourse, rows: int) ->
     Nodes that never ran are left out first, then nodes that do not run; the last of the tree first.
     """
     open_paths = course.open_paths
-    shown = opened(nodes, open_paths)
+    shown = open_running(nodes, open_paths)
 
     def rank(index: int) -> tuple[bool, bool, int]:
         path = shown[index].path
@@ -86,7 +86,7 @@ def draw_items(image: Image.Image, box: Box, rows: Sequence[ItemChanged], bins: 
 
     Args:
         image: Image to draw on.
-        box: Left, top, right and bottom of the room there is [pixel].
+        box: Left, top, right and bottom of the free area [pixel].
         rows: The items.
         bins: Colour of each bin, by name.
     """
@@ -110,7 +110,7 @@ def draw_items(image: Image.Image, box: Box, rows: Sequence[ItemChanged], bins: 
 
 
 def select_items(rows: Sequence[ItemChanged]) -> list[ItemChanged]:
-    """Return at most `MAX_ITEM_ROWS` items in order; items in a final state are left out first."""
+    """Return at most `MAX_ITEM_ROWS` items in their order; the first in a final state are left out first."""
     order = sorted(range(len(rows)), key=lambda index: (rows[index].state not in _FINAL_STATES, index))
     left_out = set(order[: max(len(rows) - MAX_ITEM_ROWS, 0)])
     return [row for index, row in enumerate(rows) if index not in left_out]

@@ -108,7 +108,7 @@ function scrollToRunning() {
   const view = frame.getBoundingClientRect();
   const inside = box.left >= view.left && box.right <= view.right && box.top >= view.top && box.bottom <= view.bottom;
   if (inside) return;
-  // At once: a showCamera this large glides at the cost of the run.
+  // Without animation: the smooth scroll of a large drawing would slow down the run.
   frame.scrollTo({
     left: frame.scrollLeft + box.left - view.left - 0.62 * view.width,
     top: frame.scrollTop + box.top - view.top - 0.4 * view.height,
@@ -134,7 +134,7 @@ function showCamera() {
   shown.append(makeElement("image", { href: look.source, width: look.width, height: look.height }));
   const chosen = findChosen(look);
   look.found.forEach((box, number) => shown.append(...drawBox(box, number === chosen)));
-  document.querySelector("#look .showCamera").replaceChildren(shown);
+  document.querySelector("#look .picture").replaceChildren(shown);
   find("frame").textContent = `${look.camera}, frame ${look.frame} at ${look.stamp.toFixed(2)} s, by ${look.detector}`;
 }
 

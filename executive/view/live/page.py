@@ -52,8 +52,8 @@ REQUIRED_PACKAGES = ("aiohttp", "trimesh", "viser")
 class LivePage:
     """Shows a run in browsers that open `address`, and runs their commands; implements `View`.
 
-    While nobody watches it is told only of events, which are small. Whatever goes wrong with it, the run goes
-    on without it.
+    While no browser shows the page, only events are sent, which are small. After an error of the page the run
+    goes on without it.
 
     Attributes:
         address: Address of the page; every user who knows it can watch and control the run.

@@ -61,7 +61,7 @@ async def _serve(listener: socket.socket, path: Path, write_command: Callable[[P
         except EOFError:
             pass
         finally:
-            # A run that was killed in the middle of a word is ended, too.
+            # The input also ends if the run was killed, even in the middle of a message.
             loop.call_soon_threadsafe(ended.set)
 
     apply_batch(first_messages)

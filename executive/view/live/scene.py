@@ -23,7 +23,7 @@ class LiveScene:
     """A viser server that shows shapes.
 
     Args:
-        path: The Unix socket it listens on, and nothing else: viser asks nobody who they are.
+        path: Unix socket of the server, its only one: viser does not check who connects.
         shapes: The shapes.
     """
 

@@ -50,17 +50,17 @@ class Server:
 
     Args:
         board: State of the page.
-        tunnel: Leads to the scene.
-        command: Takes what a person wants of the run, and how many watch.
+        tunnel: Proxy to the scene.
+        send_command: Receives the commands of watchers, and their number.
         token: First part of every address.
-        port: The server's.
+        port: Port of the server.
     """
 
     def __init__(
-        self, board: Board, tunnel: Tunnel, command: Callable[[PageCommand], None], token: str, port: int
+        self, board: Board, tunnel: Tunnel, send_command: Callable[[PageCommand], None], token: str, port: int
     ) -> None:
         self._board = board
-        self._send_command = command
+        self._send_command = send_command
         self._token = token
         # Not `localhost`: this name may lead to another server, at [::1].
         self._host = f"127.0.0.1:{port}"
@@ -98,7 +98,7 @@ class Server:
             await self.send_changes()
 
     async def end(self) -> None:
-        """Say the last changes and good-bye."""
+        """Send the last changes, and close all connections."""
         await self.send_changes()
         closing = [asyncio.create_task(watcher.close()) for watcher in self._watchers]
         if closing:
@@ -113,7 +113,7 @@ class Server:
         return web.Response(text=text, content_type=kind, headers={"Content-Security-Policy": POLICY})
 
     async def _serve_socket(self, request: web.Request) -> web.WebSocketResponse:
-        """Show a watcher everything, then the changes; take what they want."""
+        """Send a watcher the whole state, then the changes; receive commands."""
         socket = web.WebSocketResponse(max_msg_size=MAX_MESSAGE_SIZE, heartbeat=10)
         await socket.prepare(request)
         await socket.send_str(json.dumps(self._board.state))

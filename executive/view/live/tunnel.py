@@ -82,7 +82,7 @@ class Tunnel:
         return browser
 
     async def session(self) -> aiohttp.ClientSession:
-        """Return a session with the scene's server; wait for the shapes; start the server if necessary."""
+        """Return a session with the scene's server; wait for the shapes, and start the server once."""
         shapes = await asyncio.shield(self._shapes)
         async with self._building:
             if self._scene is None:

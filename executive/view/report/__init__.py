@@ -1,1 +1,1 @@
-"""The page that explains a finished run: one HTML file that needs nothing else."""
+"""Report of a finished run: one self-contained HTML file."""

@@ -17,7 +17,7 @@ from executive.view.report.shares import shares
 from executive.view.terminal.summary import repeat_command
 
 CUT_OFF = "CUT OFF"
-"""Status of a run whose record has no end: it was killed, or goes on."""
+"""Status of a run whose record has no end: the run was killed, or still goes on."""
 
 
 class ReportFacts:
@@ -30,7 +30,7 @@ class ReportFacts:
         path: The run directory.
         start: Start of the run.
         result: Content of `result.json`, or None if it does not belong to the journal.
-        ended: The result, else the end in the journal, else None.
+        end: The result, else the end in the journal, else None.
         status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `CUT OFF`.
         nodes: The tree.
         timeline: Timeline of the run.
@@ -39,11 +39,11 @@ class ReportFacts:
         pictures: Pictures of decisions and failures.
         requests: Requests of the operator.
         repeat: The command that repeats the run.
-        resume: The command that resumes it; "" for a run that cannot be resumed.
+        resume: The command that resumes the run, or "" if the run cannot be resumed.
         replay: The command that replays it.
 
     Raises:
-        InputError: The directory lacks the journal or the tree, or holds a run that had not begun.
+        InputError: The directory lacks the journal or the tree, or its run never started.
     """
 
     def __init__(self, path: Path) -> None:
@@ -52,8 +52,8 @@ class ReportFacts:
         self.path = path
         self.start = find_start(events, path, "there is nothing to report")
         self.result = read_result(directory, events)
-        self.ended = self.result or find_end(events)
-        self.status = CUT_OFF if self.ended is None else self.ended.status
+        self.end = self.result or find_end(events)
+        self.status = CUT_OFF if self.end is None else self.end.status
         self.nodes = read_tree(directory.tree)
         self.timeline = Timeline.of(events)
         items = self.timeline.items.now()

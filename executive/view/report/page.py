@@ -1,4 +1,4 @@
-"""Report of a run: one HTML file that needs neither scripts nor anything else to be read."""
+"""Report of a run: one self-contained HTML file without scripts."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from executive.view.text import render
 from executive.view.tree.svg import Note, svg
 
 COLOURS = {LOOK: "#56B4E9", RETRY: "#D55E00", WAITING: "#9aa5b4"}
-"""Colours of the activities that are no skill's; skills have the rest of the palette, in their order."""
+"""Colours of activities without a skill; skills have the other colours of the palette, in order."""
 
 
 def leave_report(run: str) -> tuple[str, str]:
-    """Write the report of the run in a directory; return its file, or "" and the reason why there is none.
+    """Write the report of the run in a directory; return its file and "", or "" and the error.
 
-    Errors of the report do not change the end of the run.
+    Errors of the report do not change the result of the run.
     """
     try:
         return str(write_report(Path(run))), ""
@@ -46,21 +46,21 @@ def leave_report(run: str) -> tuple[str, str]:
 
 
 def write_report(path: Path) -> Path:
-    """Write the report of the run in a directory, whole or not at all, and return its file.
+    """Write the report of the run in a directory completely or not at all, and return its file.
 
     Raises:
         InputError: The directory lacks journal or tree, or cannot be written to.
     """
     file = RunDirectory(path).report
-    page = report(ReportFacts(path))
-    instead = "copy the run directory to where you may write, and have the report of the copy made"
-    with convert_os_errors(f'write the report "{file}"', instead):
+    page = render_report(ReportFacts(path))
+    remedy = "copy the run directory to where you may write, and have the report of the copy made"
+    with convert_os_errors(f'write the report "{file}"', remedy):
         write_atomically(file, page)
     return file
 
 
-def report(facts: ReportFacts) -> str:
-    """Return the report as HTML. Whatever a mission or a skill says in it is text, and never markup."""
+def render_report(facts: ReportFacts) -> str:
+    """Return the report as HTML; texts of missions and skills are escaped."""
     result, timeline = facts.result, facts.timeline
     story = None if result is None else result.story
     items = [item.item for item in facts.objects]
@@ -70,63 +70,65 @@ def report(facts: ReportFacts) -> str:
         "report/report.html",
         facts=facts,
         result=result,
-        reason=_reason(facts),
-        verdict=_verdict(facts),
+        reason=_find_reason(facts),
+        verdict=_describe_end(facts),
         counts={} if result is None else asdict(result.items),
         audit=asdict(result.audit) if result is not None and result.audit is not None else {},
         unknown=describe_unknown({} if result is None else result.unknown),
         story=story,
         story_facts=[] if story is None else list(text.facts(story)),
-        moment=next((each for each in facts.pictures if story and each.file == story.picture), None),
+        last_picture=next(
+            (picture for picture in facts.pictures if story and picture.file == story.picture), None
+        ),
         titles={node.path: node.title for node in facts.nodes},
         place=place_on_table,
-        colours=_colours(facts.shares.activities),
+        colours=_choose_colours(facts.shares.activities),
         sums={item: sum(spent.values()) for item, spent in rows.items()},
-        tree=Markup(svg(facts.nodes, facts.start.mission, _notes(facts))),
+        tree=Markup(svg(facts.nodes, facts.start.mission, _make_notes(facts))),
         lanes=Markup(draw_lanes(timeline, facts.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
-        other=[each for each in facts.pictures if each.reason and each.item not in items],
+        other=[picture for picture in facts.pictures if picture.reason and picture.item not in items],
     )
 
 
-def _reason(facts: ReportFacts) -> str:
+def _find_reason(facts: ReportFacts) -> str:
     """Return the reason of the end, if the status does not say it already."""
-    reason = "" if facts.ended is None else facts.ended.reason
+    reason = "" if facts.end is None else facts.end.reason
     return "" if reason.upper() == facts.status else reason
 
 
-def _verdict(facts: ReportFacts) -> str:
+def _describe_end(facts: ReportFacts) -> str:
     """Return the end of the run in one sentence."""
     warning = "" if facts.result is None else disagreement(facts.result)
-    return ". ".join(filter(None, (warning, _ending(facts))))
+    return ". ".join(filter(None, (warning, _describe_status(facts))))
 
 
-def _ending(facts: ReportFacts) -> str:
-    result, ended = facts.result, facts.ended
-    if ended is None:
+def _describe_status(facts: ReportFacts) -> str:
+    result, end = facts.result, facts.end
+    if end is None:
         return "The record has no end: the run was killed, or goes on."
     if result is not None and result.story is not None:
         return result.story.verdict
-    if ended.message:
-        return ended.message
+    if end.message:
+        return end.message
     if result is None:
-        return "It came to its end; only the journal is left of its result."
+        return "The run has ended; its result file is missing."
     items = result.items
     if not items.seen:
-        return "The mission was done; no object was seen."
+        return "The mission succeeded; no object was seen."
     left = {"rejected": items.rejected, "skipped": items.skipped, "lost": items.lost}
-    others = "".join(f", {number} {end}" for end, number in left.items() if number)
+    others = "".join(f", {number} {state}" for state, number in left.items() if number)
     return f"{items.placed} of {items.seen} objects are in their bins{others}."
 
 
-def _colours(activities: Sequence[str]) -> dict[str, str]:
+def _choose_colours(activities: Sequence[str]) -> dict[str, str]:
     """Return the colour of each activity."""
     free = cycle(colour for colour in PALETTE if colour not in COLOURS.values())
     return {activity: COLOURS.get(activity) or next(free) for activity in activities}
 
 
-def _notes(facts: ReportFacts) -> dict[str, Note]:
-    """Return the note of each node in the picture of the tree."""
+def _make_notes(facts: ReportFacts) -> dict[str, Note]:
+    """Return the note of each node in the drawing of the tree."""
     return {
         path: Note(ran[-1].status, tuple(filter(None, (count_ends(ran), find_last_failure(ran)))))
         for path, ran in group_by_node(facts.timeline.activations).items()

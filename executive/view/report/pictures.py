@@ -1,4 +1,4 @@
-"""Pictures of a run, for a page that holds them."""
+"""Images of decisions and failures of a run, for the report."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-ROOM = 3_000_000
-"""Bytes of all pictures of a page in all, so that it can be sent by mail; others are linked."""
+MAX_EMBEDDED_SIZE = 3_000_000
+"""Total size of embedded images, small enough for an e-mail [bytes]; further images are linked."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture.
+    """One image of a run.
 
     Attributes:
-        source: What an `img` takes: the picture itself, or where there is no room a link to its file.
-        file: Its place below the run directory.
-        tick: Control step that it is of.
-        item: What it is about, or "".
-        reason: What went wrong, or "".
+        source: Source of an `img` element: the embedded image, or a link to its file.
+        file: Its path below the run directory.
+        tick: Control step of the image.
+        item: Object of the decision or failure, or "".
+        reason: Reason of the failure, or "".
     """
 
     source: str
@@ -32,29 +32,29 @@ class Picture:
 
 
 def pictures(folder: Path, items: Collection[str]) -> list[Picture]:
-    """Return the pictures in the folder `frames` of a run.
+    """Return the images in the folder `frames` of a run.
 
-    First come those of the last decision for each object, which have no reason and are the first to be given
-    room, then those of failures in their order.
+    First come the images of the last decision for each object, which have no reason and are embedded first,
+    then those of failures in their order.
     """
-    named = sorted(
-        (_named(file, items) for file in folder.glob("*.jpg")), key=lambda each: (each[1], each[0])
+    parsed = sorted(
+        (_parse_name(file, items) for file in folder.glob("*.jpg")), key=lambda entry: (entry[1], entry[0])
     )
-    decided = {item: (file, tick, item, "") for file, tick, item, reason in named if item and not reason}
-    room = ROOM
+    decided = {item: (file, tick, item, "") for file, tick, item, reason in parsed if item and not reason}
+    free_size = MAX_EMBEDDED_SIZE
     found = []
-    for file, tick, item, reason in [*decided.values(), *(each for each in named if each[3])]:
-        place = f"{file.parent.name}/{file.name}"
-        source = quote(place)
-        if 4 * file.stat().st_size / 3 <= room:
+    for file, tick, item, reason in [*decided.values(), *(entry for entry in parsed if entry[3])]:
+        path = f"{file.parent.name}/{file.name}"
+        source = quote(path)
+        if 4 * file.stat().st_size / 3 <= free_size:
             source = "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
-            room -= len(source)
-        found.append(Picture(source, place, tick, item, reason))
+            free_size -= len(source)
+        found.append(Picture(source, path, tick, item, reason))
     return found
 
 
-def _named(file: Path, items: Collection[str]) -> tuple[Path, int, str, str]:
-    """Return a file with what its name says: tick, object and reason."""
+def _parse_name(file: Path, items: Collection[str]) -> tuple[Path, int, str, str]:
+    """Return a file with the parts of its name: tick, object and reason."""
     tick, _, rest = file.stem.partition("_")
     number = int(tick) if tick.isdecimal() else 0
     for item in sorted(items, key=len, reverse=True):

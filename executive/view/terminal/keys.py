@@ -22,8 +22,8 @@ class Keys:
     """Reads single keys in a thread; Ctrl-C stays a signal.
 
     Args:
-        file: The terminal's file descriptor.
-        control: The run's.
+        file: File descriptor of the terminal.
+        control: Control of the run.
     """
 
     def __init__(self, file: int, control: RunControl) -> None:
@@ -44,7 +44,7 @@ class Keys:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop to read keys, and restore the line mode of the terminal."""
+        """Stop reading keys, and restore the line mode of the terminal."""
         if self._thread is None:
             return
         self._stopped.set()

@@ -17,7 +17,7 @@ from executive.record.timeline.timeline import Timeline
 from executive.run.run import Run
 from executive.run.run_control import RunControl
 from executive.view.terminal.keys import HELP, HELP_PAUSED, Keys
-from executive.view.tree.outline import branches, opened
+from executive.view.tree.outline import branches, open_running
 
 REDRAWS_PER_SECOND = 10
 """Frequency of drawing [1/s]."""
@@ -94,7 +94,7 @@ class Terminal:
             return Group(head, page)
 
     def _set_visible(self, is_visible: bool) -> None:
-        """Show the view and read keys, or release terminal and keyboard for other input and output."""
+        """Show the view and read keys, or release the terminal and its keyboard for others."""
         try:
             (self._live.start if is_visible else self._live.stop)()
         finally:
@@ -103,7 +103,7 @@ class Terminal:
 
     def _render_tree(self) -> RenderableType:
         """Return the running nodes and their neighbours: a whole tree is taller than a terminal."""
-        shown = opened(self._outline, {running.node for running in self.timeline.running()})
+        shown = open_running(self._outline, {running.node for running in self.timeline.running()})
         lines = Text()
         for node, branch in zip(shown, branches(shown), strict=True):
             last = self.timeline.nodes.get(node.path)

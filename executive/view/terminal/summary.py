@@ -50,8 +50,7 @@ def verdict(status: str, reason: str, node: str, message: str) -> str:
 def summary(result: Result, items: Iterable[ItemChanged], repeat: str, report: str = "") -> str:
     """Return the end of a run, its times, and a line for each bin and each other end of an item.
 
-    The diagnosis of a run that did not succeed stands at the end, because the last lines on a terminal are
-    read first.
+    The diagnosis of a run that did not succeed is at the end, because users read the last lines first.
 
     Args:
         result: Result of the run.

@@ -1,1 +1,1 @@
-"""A tree, seen: as text, as a picture, as Graphviz."""
+"""Representations of a tree: text, SVG, Graphviz."""

@@ -1,4 +1,4 @@
-"""What a picture of a tree says of one node."""
+"""Texts of one node in a drawing of a tree."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from executive.mission.outline import OutlineNode
 from executive.tree.node import ControlNode
 from executive.view.text import fitted
-from executive.view.tree.outline import reads, why, writes
+from executive.view.tree.outline import describe_inputs, describe_outputs, failure_reasons
 
 COLUMNS = 28
 """Length of a node's lines [characters]."""
@@ -15,13 +15,13 @@ COLUMNS = 28
 
 @dataclass(frozen=True)
 class Card:
-    """A node in a picture.
+    """Texts of a node in a drawing.
 
     Attributes:
-        symbol: What stands before the title of a control node; "" for a skill.
+        symbol: Symbol before the title of a control node; "" for a skill.
         title: Its name.
-        lines: What the mission says about it, shortened.
-        tooltip: Everything about it, one fact a line.
+        lines: Its condition and its details in the mission, shortened.
+        tooltip: All facts about it, one per line.
     """
 
     symbol: str
@@ -31,24 +31,24 @@ class Card:
 
 
 def card(node: OutlineNode) -> Card:
-    """Return what a picture says of a node."""
+    """Return the texts of a node."""
     symbol = "" if node.kind == "skill" else node.symbol or ControlNode.symbol
     title = "".join(fitted(node.title, COLUMNS))
     lines = fitted(node.when, COLUMNS, 2) + fitted(node.detail, COLUMNS, 3 if symbol else 2)
-    return Card(symbol, title, lines, "\n".join(_facts(node)))
+    return Card(symbol, title, lines, "\n".join(_list_facts(node)))
 
 
-def _facts(node: OutlineNode) -> list[str]:
-    """Return everything there is to say about a node, most important first."""
+def _list_facts(node: OutlineNode) -> list[str]:
+    """Return all facts about a node, the most important first."""
     word = node.skill or node.kind
     facts = (
         node.title if node.title == word else f"{node.title}: {word}",
         node.doc,
         node.when,
         node.detail,
-        reads(node),
-        writes(node),
-        why(node),
+        describe_inputs(node),
+        describe_outputs(node),
+        failure_reasons(node),
         f"subtree {node.subtree}" if node.subtrees else "",
         node.path,
     )

@@ -1,8 +1,8 @@
-"""Layout of a picture of a tree that grows from left to right.
+"""Layout of a drawing of a tree that grows from left to right.
 
-Every depth is a column as wide as its widest node. Every node owns a band of rows that holds it and all
-that hangs from it, so nothing can overlap; a subtree's band has room for a frame around it. A node stands
-level with its first child, so the picture reads like text, from the top left corner.
+Every depth is a column as wide as its widest node. Every node has a band of rows for itself and its
+descendants, so that nothing overlaps; the band of a subtree has room for a frame. A node is level with its
+first child, so that the drawing reads like text, from the top left corner.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ FRAME_HEAD = 20.0
 
 @dataclass(frozen=True)
 class Size:
-    """How much room a node needs.
+    """Size of the box and the texts of a node [pixel].
 
     Attributes:
-        width, height: Of its box.
-        slot: Of what stands on the line that leads to it, 0 where nothing does.
-        name: Of the name of the subtree that begins with it, 0 where none does.
+        width, height: Size of the box.
+        slot: Length of the text on the line to the node, 0 without a text.
+        name: Length of the name of the subtree that begins with the node, 0 without a subtree.
     """
 
     width: float
@@ -35,7 +35,7 @@ class Size:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A rectangle; y points down."""
+    """A rectangle [pixel]; y points down."""
 
     x: float
     y: float
@@ -44,24 +44,24 @@ class Rectangle:
 
     @property
     def right(self) -> float:
-        """Its right side."""
+        """Horizontal coordinate of the right side."""
         return self.x + self.width
 
     @property
     def middle(self) -> float:
-        """Half of its height."""
+        """Vertical coordinate of the centre."""
         return self.y + self.height / 2
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A picture of a tree.
+    """Layout of a tree [pixel].
 
     Attributes:
-        boxes: One for every node.
-        trunks: x where the lines to the nodes of each depth part from another.
-        frames: Around every subtree, by the index of the node that it begins with.
-        width, height: Of the whole picture, margins included.
+        boxes: Box of every node.
+        trunks: x of the vertical line to the nodes of each depth.
+        frames: Frame around every subtree, by the index of its first node.
+        width, height: Size of the drawing with its margins.
     """
 
     boxes: tuple[Rectangle, ...]
@@ -72,71 +72,75 @@ class Layout:
 
 
 def layout(depths: Sequence[int], children: Sequence[Sequence[int]], sizes: Sequence[Size]) -> Layout:
-    """Return where the nodes of a tree stand, given parents before children."""
-    columns, trunks = _columns(depths, sizes)
-    bands, middles = _bands(children, sizes)
-    tops = _tops(children, bands, middles)
+    """Return the layout of the nodes of a tree, with parents before children."""
+    columns, trunks = _place_columns(depths, sizes)
+    bands, middles = _size_bands(children, sizes)
+    tops = _place_bands(children, bands, middles)
     boxes = tuple(
         Rectangle(columns[depth], top + middle - size.height / 2, size.width, size.height)
         for depth, top, middle, size in zip(depths, tops, middles, sizes, strict=True)
     )
-    reaches = _reaches(children, sizes, boxes)
+    right_ends = _find_right_ends(children, sizes, boxes)
     frames = {
         index: Rectangle(
-            box.x - FRAME, tops[index] + GAP / 2, reaches[index] - box.x + FRAME, bands[index] - GAP
+            box.x - FRAME, tops[index] + GAP / 2, right_ends[index] - box.x + FRAME, bands[index] - GAP
         )
         for index, box in enumerate(boxes)
         if sizes[index].name
     }
-    return Layout(boxes, trunks, frames, max(reaches) + MARGIN, tops[0] + bands[0] + MARGIN - GAP / 2)
+    return Layout(boxes, trunks, frames, max(right_ends) + MARGIN, tops[0] + bands[0] + MARGIN - GAP / 2)
 
 
-def _columns(depths: Sequence[int], sizes: Sequence[Size]) -> tuple[list[float], tuple[float, ...]]:
-    """Return where the boxes of every depth begin, and where the lines that lead to them part."""
+def _place_columns(depths: Sequence[int], sizes: Sequence[Size]) -> tuple[list[float], tuple[float, ...]]:
+    """Return x of the boxes, and x of the vertical line to them, by depth."""
     columns: list[float] = []
     trunks: list[float] = []
     right = 0.0
     for depth in range(max(depths) + 1):
-        here = [size for size, at in zip(sizes, depths, strict=True) if at == depth]
-        frame = FRAME if any(size.name for size in here) else 0.0
+        sizes_at_depth = [size for size, at in zip(sizes, depths, strict=True) if at == depth]
+        frame = FRAME if any(size.name for size in sizes_at_depth) else 0.0
         trunks.append(right + STEM if depth else MARGIN)
-        columns.append(trunks[-1] + (STEM + max(size.slot for size in here) if depth else 0.0) + frame)
-        right = columns[-1] + max(size.width for size in here)
+        columns.append(
+            trunks[-1] + (STEM + max(size.slot for size in sizes_at_depth) if depth else 0.0) + frame
+        )
+        right = columns[-1] + max(size.width for size in sizes_at_depth)
     return columns, tuple(trunks)
 
 
-def _bands(children: Sequence[Sequence[int]], sizes: Sequence[Size]) -> tuple[list[float], list[float]]:
-    """Return how high the band of every node is, and how far below its top the node has its middle."""
+def _size_bands(children: Sequence[Sequence[int]], sizes: Sequence[Size]) -> tuple[list[float], list[float]]:
+    """Return the height of every node's band, and the distance from its top to the node's centre."""
     bands, middles = [0.0] * len(sizes), [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
-        size, below = sizes[index], children[index]
+        size, child_indices = sizes[index], children[index]
         head, foot = (FRAME_HEAD, FRAME) if size.name else (0.0, 0.0)
         half = (size.height + GAP) / 2
-        level = middles[below[0]] if below else 0.0
+        level = middles[child_indices[0]] if child_indices else 0.0
         middles[index] = head + max(half, level)
-        end = middles[index] - level + sum(bands[child] for child in below)
+        end = middles[index] - level + sum(bands[child] for child in child_indices)
         bands[index] = max(middles[index] + half, end) + foot
     return bands, middles
 
 
-def _tops(children: Sequence[Sequence[int]], bands: Sequence[float], middles: Sequence[float]) -> list[float]:
-    """Return where the band of every node begins."""
+def _place_bands(
+    children: Sequence[Sequence[int]], bands: Sequence[float], middles: Sequence[float]
+) -> list[float]:
+    """Return y of the top of the band of every node."""
     tops = [MARGIN - GAP / 2] * len(bands)
-    for index, below in enumerate(children):
-        top = tops[index] + middles[index] - (middles[below[0]] if below else 0.0)
-        for child in below:
+    for index, child_indices in enumerate(children):
+        top = tops[index] + middles[index] - (middles[child_indices[0]] if child_indices else 0.0)
+        for child in child_indices:
             tops[child] = top
             top += bands[child]
     return tops
 
 
-def _reaches(
+def _find_right_ends(
     children: Sequence[Sequence[int]], sizes: Sequence[Size], boxes: Sequence[Rectangle]
 ) -> list[float]:
-    """Return how far to the right everything reaches that hangs from a node, frame included."""
-    reaches = [0.0] * len(sizes)
+    """Return x of the right end of every node with its descendants, including frames."""
+    right_ends = [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
         size, box = sizes[index], boxes[index]
-        reach = max([box.right, *(reaches[child] for child in children[index])])
-        reaches[index] = max(reach + FRAME, box.x + size.name) if size.name else reach
-    return reaches
+        right_end = max([box.right, *(right_ends[child] for child in children[index])])
+        right_ends[index] = max(right_end + FRAME, box.x + size.name) if size.name else right_end
+    return right_ends

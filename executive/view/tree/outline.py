@@ -1,4 +1,4 @@
-"""Text of a tree, as a person reads it in a terminal."""
+"""Text of a tree for a terminal."""
 
 from __future__ import annotations
 
@@ -9,48 +9,50 @@ from executive.mission.model.grammar import USE
 from executive.mission.outline import Connection, OutlineNode, children
 
 WIDTH = 100
-"""Where long lines are wrapped [columns]."""
+"""Line length [columns]."""
 
-_LEAST = 40
+_MIN_TEXT_WIDTH = 40
 
 
-def drawn(nodes: Sequence[OutlineNode], *, ports: bool = False, reasons: bool = False) -> str:
-    """Return an outline as text, one line per node where it is not too long.
+def draw(nodes: Sequence[OutlineNode], *, ports: bool = False, reasons: bool = False) -> str:
+    """Return an outline as text, one line per node unless it is too long.
 
     Args:
         nodes: The outline.
-        ports: Say below every skill which variables it reads and writes.
-        reasons: Say below every skill why it may fail, and below every catch which failures it is for.
+        ports: True to list the inputs and outputs of every skill below it.
+        reasons: True to list the failure reasons of every skill, and those that every catch handles.
     """
     lines = []
     for node, branch, below in zip(nodes, branches(nodes), children(nodes), strict=True):
         margin = branch.replace("├─", "│ ").replace("└─", "  ") + ("│  " if below else "   ")
         detail = f"  ({node.detail})" if node.detail else ""
-        lines += _wrapped(f"{node.name}{detail}", branch, margin)
-        for sentence in _said_below(node, ports, reasons):
-            lines += _wrapped(sentence, margin, margin)
+        lines += _wrap(f"{node.name}{detail}", branch, margin)
+        for sentence in _list_details(node, ports, reasons):
+            lines += _wrap(sentence, margin, margin)
     return "\n".join(lines)
 
 
-def reads(node: OutlineNode) -> str:
-    """Return which variables a skill reads, with `?` where one may be unset; "" if none."""
-    return "reads " + ", ".join(_wire(wire, "<-") for wire in node.reads) if node.reads else ""
+def describe_inputs(node: OutlineNode) -> str:
+    """Return the variables that a skill reads, with `?` for one that may be unset; "" if none."""
+    return "reads " + ", ".join(_format_connection(wire, "<-") for wire in node.reads) if node.reads else ""
 
 
-def writes(node: OutlineNode) -> str:
-    """Return which variables a skill writes; "" if none."""
-    return "writes " + ", ".join(_wire(wire, "->") for wire in node.writes) if node.writes else ""
+def describe_outputs(node: OutlineNode) -> str:
+    """Return the variables that a skill writes; "" if none."""
+    return (
+        "writes " + ", ".join(_format_connection(wire, "->") for wire in node.writes) if node.writes else ""
+    )
 
 
-def why(node: OutlineNode) -> str:
-    """Return why a skill may fail; "" if it cannot."""
+def failure_reasons(node: OutlineNode) -> str:
+    """Return the failure reasons of a skill; "" if it cannot fail."""
     return f"may fail: {', '.join(node.reasons)}" if node.reasons else ""
 
 
 def branches(nodes: Sequence[OutlineNode]) -> list[str]:
-    """Return what joins each node to its parent when the tree is drawn."""
+    """Return the characters before each node that draw the lines to its parent."""
     joints = []
-    # From the last node up: at which depths does a later node hang from the same parent?
+    # From the last node up: depths at which a later node has the same parent.
     more_follow: set[int] = set()
     for node in reversed(nodes):
         more_follow = {depth for depth in more_follow if depth <= node.depth}
@@ -64,14 +66,14 @@ def branches(nodes: Sequence[OutlineNode]) -> list[str]:
 def skills(nodes: Sequence[OutlineNode]) -> dict[str, str]:
     """Return the names of the leaves by path: the skills, which have no node below them.
 
-    What a skill is to its parent (`recover: Grasp`) is left out.
+    The role of a skill in its parent (`recover: Grasp`) is left out.
     """
     leaves = (node for node, below in zip(nodes, children(nodes), strict=True) if not below)
     return {node.path: node.name.rpartition(": ")[2] for node in leaves}
 
 
-def folded(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
-    """Return an outline in which every subtree is shown once; where it is used again stands its name."""
+def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
+    """Return an outline with every subtree once; each further use is a node with the name of the subtree."""
     shown: list[OutlineNode] = []
     first: dict[str, list[tuple[int, str, str]]] = {}
     index = 0
@@ -82,20 +84,20 @@ def folded(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
         branch = nodes[index:end]
         known = next((subtree for subtree in node.subtrees if subtree in first), None)
         if known is None:
-            first |= {subtree: _content(branch) for subtree in node.subtrees}
+            first |= {subtree: _list_content(branch) for subtree in node.subtrees}
             shown.append(node)
             index += 1
         else:
-            same = first[known] == _content(branch)
-            shown.append(_use(node, known, "as above" if same else "as above, other params"))
+            same = first[known] == _list_content(branch)
+            shown.append(_make_use(node, known, "as above" if same else "as above, other params"))
             index = end
     return shown
 
 
-def opened(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[OutlineNode]:
-    """Return the root and what stands directly below a running node; what rests stays folded."""
+def open_running(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[OutlineNode]:
+    """Return the root, the running nodes and their children."""
     shown = []
-    # Whether the last node met at each depth is running, and with it everything above.
+    # True for each depth at which the last node is running.
     runs: list[bool] = []
     for node in nodes:
         del runs[node.depth :]
@@ -105,36 +107,36 @@ def opened(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[Outli
     return shown
 
 
-def _wrapped(text: str, first: str, other: str) -> list[str]:
-    """Return a text in lines that are not too long, after what stands before the first and the others."""
+def _wrap(text: str, first: str, other: str) -> list[str]:
+    """Return a wrapped text, with prefixes for the first and for the other lines."""
     return textwrap.wrap(
-        text, max(WIDTH, len(other) + _LEAST), initial_indent=first, subsequent_indent=f"{other}  ",
+        text, max(WIDTH, len(other) + _MIN_TEXT_WIDTH), initial_indent=first, subsequent_indent=f"{other}  ",
         break_long_words=False, break_on_hyphens=False,
     )  # fmt: skip
 
 
-def _said_below(node: OutlineNode, ports: bool, reasons: bool) -> Iterator[str]:
-    """Yield what is said below a node."""
+def _list_details(node: OutlineNode, ports: bool, reasons: bool) -> Iterator[str]:
+    """Yield the lines below a node."""
     if reasons and node.when:
         yield node.when
-    if ports and (flow := "; ".join(filter(None, (reads(node), writes(node))))):
+    if ports and (flow := "; ".join(filter(None, (describe_inputs(node), describe_outputs(node))))):
         yield flow
     if reasons and node.reasons:
-        yield why(node)
+        yield failure_reasons(node)
 
 
-def _wire(wire: Connection, arrow: str) -> str:
+def _format_connection(wire: Connection, arrow: str) -> str:
     variable = f"${wire.variable}" + ("" if wire.required else "?")
     return variable if wire.port == wire.variable else f"{wire.port} {arrow} {variable}"
 
 
-def _content(branch: Sequence[OutlineNode]) -> list[tuple[int, str, str]]:
-    """Return what tells two uses of a subtree from each other."""
+def _list_content(branch: Sequence[OutlineNode]) -> list[tuple[int, str, str]]:
+    """Return depth, title and detail of each node, by which two uses of a subtree are compared."""
     return [(node.depth - branch[0].depth, node.title, node.detail) for node in branch]
 
 
-def _use(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
-    """Return what stands for a subtree that begins with this node; those around it stay what they are."""
+def _make_use(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
+    """Return the node that replaces a repeated subtree; the subtrees around it remain."""
     around = node.subtrees[: node.subtrees.index(subtree)]
     return OutlineNode(
         node.path, node.name, node.depth, detail, USE, subtree, node.slot, node.when, around, symbol="…",

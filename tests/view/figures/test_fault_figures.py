@@ -50,13 +50,13 @@ def test_a_cell_of_several_runs_tells_how_many_were_ok_and_the_worst_of_the_othe
     failed = replace(MISSED, status="FAILURE", reason="Grasp.missed")
     assert cell(MISSED, failed, failed) == "ok 1/3, FAILURE Grasp.missed"
     assert cell(MISSED, failed, replace(MISSED, problems=("bad",))) == "ok 1/3, !!"
-    # What found no occasion was tried otherwise, too.
+    # A fault that did not occur was also tried at another time.
     assert cell(MISSED, replace(MISSED, happened=False)) == "ok"
 
 
 def test_what_went_wrong_and_what_was_never_entered_is_told_with_its_place() -> None:
     assert fault_text(FIGURES).splitlines()[8:] == [
-        "  as undisturbed: 2; fewer objects sorted: 1; failed: 1; ended by a fault: 0; "
+        "  as undisturbed: 2; fewer objects sorted: 1; failed: 1; ended as FAULT: 0; "
         "fault did not occur: 1; wrong: 1",
         "  failures: Release.stuck 1",
         "  runs with a problem: 1",
@@ -77,7 +77,7 @@ def test_pairs_have_no_matrix_a_campaign_cut_short_says_so_and_one_run_is_a_few_
     assert lines[:3] == [
         "sort (fake), seed 3: 1 runs with pairs of faults; undisturbed it takes 11.5 s",
         "  ended by the user before the last run",
-        "  as undisturbed: 0; fewer objects sorted: 0; failed: 0; ended by a fault: 0; "
+        "  as undisturbed: 0; fewer objects sorted: 0; failed: 0; ended as FAULT: 0; "
         "fault did not occur: 1; wrong: 0",
     ]
 

@@ -52,8 +52,8 @@ def test_a_gif_goes_round_and_keeps_its_colours_to_the_end(frames: list[Image.Im
 @pytest.mark.parametrize(
     ("out", "gif", "found"),
     [(None, False, MP4), (None, True, GIF), ("a.mp4", False, MP4), ("a.GIF", False, GIF),
-     ("a.mp4", True, '"a.mp4" is not a name of a GIF; end it in .gif, or leave out --gif'),
-     ("a.avi", False, '"a.avi" is not a name of a film; end it in .mp4 or .gif')],
+     ("a.mp4", True, '"a.mp4" is no name for a GIF; end it in .gif, or leave out --gif'),
+     ("a.avi", False, '"a.avi" is no name for a film; end it in .mp4 or .gif')],
 )  # fmt: skip
 def test_the_name_says_what_a_film_is_and_another_is_refused(out: str | None, gif: bool, found) -> None:
     try:

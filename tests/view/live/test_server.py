@@ -56,9 +56,8 @@ NAMES = ("evil.example", "localhost:8123", "127.0.0.1", f"{HOST}.evil")
     ],
 )
 def test_only_the_page_itself_is_let_in_and_only_with_the_token(path: str, headers: dict, said: str) -> None:
-    assert (
-        find_refusal(make_mocked_request("GET", path, headers={"Host": HOST} | headers), TOKEN, HOST) == said
-    )
+    request = make_mocked_request("GET", path, headers={"Host": HOST} | headers)
+    assert find_refusal(request, TOKEN, HOST) == said
 
 
 @dataclass

@@ -15,7 +15,7 @@ from made_up_runs import TREE, activation, picks, ran
 from executive.mission.outline import OutlineNode
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
-from executive.view.report.lanes import LONGEST, MOST, SHORTEST, draw_lanes
+from executive.view.report.lanes import MAX_BARS, MAX_LENGTH, MIN_LENGTH, draw_lanes
 
 THINNEST = 1.5
 SVG = "{http://www.w3.org/2000/svg}"
@@ -77,12 +77,12 @@ def test_bars_that_can_be_told_apart_stay_apart_and_what_took_no_time_can_be_see
 
 def test_however_long_the_run_its_timeline_has_a_bound():
     text = drawn(picks(3_000), 15_000.0)
-    assert MOST / 3 < text.count("<rect") <= MOST + len(TREE)
-    assert len(text) < 300 * MOST
+    assert MAX_BARS / 3 < text.count("<rect") <= MAX_BARS + len(TREE)
+    assert len(text) < 300 * MAX_BARS
 
 
 @pytest.mark.parametrize(
-    ("end", "length"), [(0.0, SHORTEST), (1.0, SHORTEST), (100.0, 4500.0), (4e6, LONGEST)]
+    ("end", "length"), [(0.0, MIN_LENGTH), (1.0, MIN_LENGTH), (100.0, 4500.0), (4e6, MAX_LENGTH)]
 )
 def test_the_time_axis_is_neither_too_short_nor_too_long_and_its_times_stand_clear(end, length):
     picture = ElementTree.fromstring(drawn([ran("Wait", 0.0, end)], end))

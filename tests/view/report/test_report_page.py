@@ -13,7 +13,7 @@ from page_reader import SECTIONS, Page
 
 from executive.record.journal import find_start, read_journal
 from executive.view.report.facts import ReportFacts
-from executive.view.report.page import report, write_report
+from executive.view.report.page import render_report, write_report
 
 NASTY = """</style></title><script>alert("x")</script><img src=x onerror='y'> & {{ 7 * 7 }} {% raw %} \x00"""
 WORDS = {"kind", "status", "state", "file", "node", "path", "item", "origin", "picture"}
@@ -21,7 +21,7 @@ WORDS = {"kind", "status", "state", "file", "node", "path", "item", "origin", "p
 
 
 def page(run: Path) -> Page:
-    return Page(report(ReportFacts(run)))
+    return Page(render_report(ReportFacts(run)))
 
 
 def change(file: Path, change: Any) -> None:
@@ -50,14 +50,17 @@ def test_the_verdict_comes_first_and_then_why_objects_timeline_and_tree(failed):
     )
     for section, words in (
         ("header", "trial , seed 3, 1.4 s on the robot's clock"),
-        ("story", "Why nothing in the mission stopped it, from the root down: retry all 2 attempts failed"),
+        (
+            "story",
+            "Why no node of the mission handled the failure, from the root down: retry all 2 attempts failed",
+        ),
         ("story", "tree/5:retry/do/Grasp"),
         ("story", "left to do 2: sphere-1"),
         ("tree", "2 failed missed: no seal on"),
         ("timeline", "Grasp Grasp of sphere-1: FAILURE"),
     ):
         assert words in found.texts[section]
-    assert "The last picture before the end" in [attributes.get("alt") for _, attributes in found.elements]
+    assert "The last image before the end" in [attributes.get("alt") for _, attributes in found.elements]
     assert {"timeline", "behaviour-tree"} <= {attributes.get("class") for _, attributes in found.elements}
 
 
@@ -75,7 +78,7 @@ def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_
     assert "2 seen, 0 placed, 2 rejected" in told
     assert "0.81 s Grasp.missed no seal on sphere-1" in told
     alts = [attributes["alt"] for tag, attributes in found.elements if tag == "img"]
-    assert alts.count("What the decision for sphere-1 was made from") == 1
+    assert alts.count("Image on which the decision for sphere-1 is based") == 1
     assert alts.count("sphere-1: missed") == 2
 
 
@@ -88,7 +91,7 @@ def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed, co
     assert "no object" in page(braked).texts["objects"]
     for run in (failed, done, killed, braked):
         facts = ReportFacts(run)
-        rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", report(facts))
+        rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", render_report(facts))
         assert len(rows) == len(facts.shares.rows)
         assert sum(map(float, rows)) == pytest.approx(facts.timeline.clock, abs=0.01 * len(rows))
 
@@ -102,16 +105,16 @@ def test_params_versions_and_the_commands_that_repeat_it_are_there(failed):
     start = find_start(read_journal(failed / "journal.jsonl"), failed, "")
     repeat = ["executive", "run", start.file, "--seed", "3"]
     repeat += ["--set", "cell.kind=fake", "--set", "cell.table.objects=[2, 2]"]
-    assert f"repeat {shlex.join(repeat)} decide anew" in again
+    assert f"repeat {shlex.join(repeat)} replay" in again
     assert f"executive replay {shlex.quote(str(failed))}" in again
-    assert "go on" not in again
+    assert "resume" not in again
 
 
 def test_a_run_that_was_killed_is_told_as_far_as_it_came_with_the_command_that_goes_on(killed):
     assert not (killed / "result.json").exists()
     found = page(killed)
     assert found.texts["header"].startswith("CUT OFF The record has no end: the run was killed, or goes on.")
-    assert f"go on executive run --resume {shlex.quote(str(killed))}" in found.texts["again"]
+    assert f"resume executive run --resume {shlex.quote(str(killed))}" in found.texts["again"]
     assert "Transit Transit of sphere-1: RUNNING" in found.texts["timeline"]
     assert "sphere-1 held" in found.texts["objects"]
     assert "1 under way" in found.texts["tree"]
@@ -124,7 +127,7 @@ def test_a_run_whose_result_is_gone_has_the_verdict_of_its_journal(failed, done,
     change(
         run / "journal.jsonl", lambda entry: entry | ({"message": ""} if entry["kind"] == "RunEnded" else {})
     )
-    assert "It came to its end; only the journal is left of its result." in page(run).texts["header"]
+    assert "The run has ended; its result file is missing." in page(run).texts["header"]
 
 
 def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(failed, copy):
@@ -138,7 +141,7 @@ def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(
     )
     found = page(run)
     assert "sphere-1 missed at step 325" in found.texts["objects"]
-    assert "What the decision for sphere-1 was made from" not in found.texts["objects"]
+    assert "Image on which the decision for sphere-1 is based" not in found.texts["objects"]
     table, _ = found.texts["objects"].split(" look: ")
     assert "sphere-1" in table
 
@@ -151,7 +154,7 @@ def test_whatever_a_mission_says_is_text(failed, copy):
     odd.rename(run / "frames" / "000001_<script>'{{ 7 * 7 }}\".jpg")
     for name in ("journal.jsonl", "tree.json", "result.json"):
         change(run / name, nasty)
-    text = report(ReportFacts(run))
+    text = render_report(ReportFacts(run))
     found = Page(text)
     assert found.shape == plain.shape
     assert found.raw == plain.raw
@@ -164,7 +167,7 @@ def test_whatever_a_mission_says_is_text(failed, copy):
 
 @pytest.mark.parametrize("name", ["done", "failed", "killed"])
 def test_the_page_needs_nothing_from_outside(name, request):
-    text = report(ReportFacts(request.getfixturevalue(name)))
+    text = render_report(ReportFacts(request.getfixturevalue(name)))
     found = Page(text)
     tags = {tag for tag, _ in found.elements}
     assert not tags & {"script", "iframe", "object", "embed", "base", "form", "image", "use", "foreignobject"}
