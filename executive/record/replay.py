@@ -91,7 +91,7 @@ def replay(
     Raises:
         InputError: The directory holds no run that can be replayed.
     """
-    log = InputLog.of(events)
+    log = InputLog.from_events(events)
     run = log.start
     if run is None or not log.inputs:
         raise InputError(

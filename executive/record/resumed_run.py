@@ -67,11 +67,11 @@ def resume_run(
     recorder = Recorder(directory, frames=record.frames, resume=True)
     try:
         events = read_journal(directory.journal)
-        log, start = InputLog.of(events), find_start(events, path, "run the mission again")
+        log, start = InputLog.from_events(events), find_start(events, path, "run the mission again")
         has_ended, seed = _has_ended(directory, events), start.seed
         loaded = read_mission_of_run(path, start, skills)
         # The control step of a halt or fault is not compared, so that a corrected skill can repeat the step.
-        certain = log if log.halt is None else log.before(log.halt.tick)
+        certain = log if log.halt is None else log.select_before(log.halt.tick)
         replay = compare(loaded, skills, certain, seed)
         if not replay.same:
             raise InputError(
@@ -130,7 +130,7 @@ def _describe_gap(replayed: ReplayedCell) -> str:
     last = replayed.last
     if last is None or last.last_action != UNKNOWN_ACTION:
         return ""
-    steps = last.resumed - last.complete
+    steps = last.resumed_at - last.complete_steps
     return (
         f"the journal ends {steps} control steps ({steps * replayed.log.step:.2f} s) before the log of the "
         "world, so actions of the tool are unknown; the whole scene is observed before the run continues"

@@ -1,4 +1,4 @@
-"""Codecs between the answers of a cell and plain values; nothing is lost but images and paths."""
+"""Codecs between the answers of a cell and plain values, without images and paths of motions."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ import base64
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.arm import Motion
 from executive.cell.detection import Answer, Detection, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.geometry import Array, Pose
 
 MAX_PIXELS = 10**8
-"""Largest number of pixels of an image."""
+"""Maximum number of pixels of an image."""
 
 
 class Codec(NamedTuple):
-    """Functions between an answer of a cell and its plain form.
+    """Conversions between an answer of a cell and its plain form.
 
     Attributes:
-        write: Returns an answer as plain values.
-        read: Returns an answer from plain values.
+        write: Converts an answer to plain values.
+        read: Converts plain values to an answer.
     """
 
     write: Callable[[Any], Any]
@@ -35,7 +35,7 @@ class Codec(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """Duration of a planned motion [s], the recorded part of the motion; implements `cell.arm.Motion`."""
+    """Recorded part of a planned motion: its duration [s]; implements `cell.arm.Motion`."""
 
     duration: float
 
@@ -46,18 +46,18 @@ def read_array(value: Any) -> Array:
 
 
 def write_pose(pose: Pose) -> list[Any]:
-    """Return rotation and position of a pose."""
+    """Return rotation and position of a pose as lists."""
     return [pose.rotation.tolist(), pose.position.tolist()]
 
 
 def read_pose(value: Any) -> Pose:
-    """Return what `write_pose` was given."""
+    """Return the pose of `write_pose`."""
     rotation, position = value
     return Pose(read_array(rotation), read_array(position))
 
 
 def write_frame(frame: Frame) -> dict[str, Any]:
-    """Return a frame without what it shows: image and depth are not kept."""
+    """Return a frame without image and depth."""
     return {
         "id": frame.id,
         "camera": frame.camera,
@@ -65,13 +65,13 @@ def write_frame(frame: Frame) -> dict[str, Any]:
         "X_WC": write_pose(frame.X_WC),
         "stamp": frame.stamp,
         "epoch": frame.epoch,
-        "visible": _packed(frame.visible),
+        "visible": _pack(frame.visible),
         "size": list(frame.visible.shape),
     }
 
 
 def read_frame(value: Any) -> Frame:
-    """Return what `write_frame` was given, its image black and without depth."""
+    """Return the frame of `write_frame`, with a black image and without depth."""
     height, width = value["size"]
     if not 0 < height * width <= MAX_PIXELS:
         raise ValueError(f"an image of {height} x {width} pixels")
@@ -83,66 +83,72 @@ def read_frame(value: Any) -> Frame:
         matrix=read_array(value["matrix"]),
         X_WC=read_pose(value["X_WC"]),
         stamp=value["stamp"],
-        visible=_unpacked(value["visible"], (height, width)),
+        visible=_unpack(value["visible"], (height, width)),
         epoch=value["epoch"],
     )
 
 
 def write_detection(detection: Detection) -> list[Any]:
-    """Return label, confidence, box and confidence of the second class."""
+    """Return label, confidence, box and confidence of the second class of a detection."""
     box = [float(edge) for edge in detection.box]
     return [detection.label, float(detection.confidence), box, float(detection.rival)]
 
 
 def read_detection(value: Any) -> Detection:
-    """Return what `write_detection` was given."""
+    """Return the detection of `write_detection`."""
     label, confidence, box, rival = value
     return Detection(label, confidence, tuple(box), rival)
 
 
 def write_answer(answer: Answer) -> dict[str, Any]:
-    """Return a detector's answer."""
+    """Return the answer of a detector as a mapping."""
     return {
         "detector": answer.detector,
-        "found": [write_detection(one) for one in answer.found],
+        "found": list(map(write_detection, answer.found)),
         "reliability": list(astuple(answer.error_rates)),
-        "doubtful": [write_detection(one) for one in answer.doubtful],
-        "unknown": [write_detection(one) for one in answer.unknown],
+        "doubtful": list(map(write_detection, answer.doubtful)),
+        "unknown": list(map(write_detection, answer.unknown)),
     }
 
 
 def read_answer(value: Any) -> Answer:
-    """Return what `write_answer` was given."""
+    """Return the answer of `write_answer`."""
     found, doubtful, unknown = (
-        tuple(read_detection(one) for one in value[key]) for key in ("found", "doubtful", "unknown")
+        tuple(map(read_detection, value[key])) for key in ("found", "doubtful", "unknown")
     )
     return Answer(value["detector"], found, ErrorRates(*value["reliability"]), doubtful, unknown)
 
 
 def write_observations(observations: Sequence[Observation]) -> list[Any]:
-    """Return the observations of one frame."""
+    """Return the observations of one frame as lists."""
     return [
-        [write_detection(one.detection), one.position.tolist(), one.std, one.confident, one.contradiction]
-        for one in observations
+        [
+            write_detection(new.detection),
+            new.position.tolist(),
+            new.std,
+            new.confident,
+            new.contradiction,
+        ]
+        for new in observations
     ]
 
 
 def read_observations(value: Any) -> list[Observation]:
-    """Return what `write_observations` was given."""
+    """Return the observations of `write_observations`."""
     return [
         Observation(read_detection(detection), read_array(position), *others)
         for detection, position, *others in value
     ]
 
 
-def _packed(mask: NDArray[np.bool_]) -> str:
-    """Return a mask as text; "" where all of it is true."""
+def _pack(mask: NDArray[np.bool_]) -> str:
+    """Return a mask as text; "" for a mask without False."""
     if mask.all():
         return ""
     return base64.b64encode(zlib.compress(np.packbits(mask).tobytes())).decode("ascii")
 
 
-def _unpacked(text: str, size: tuple[int, int]) -> NDArray[np.bool_]:
+def _unpack(text: str, size: tuple[int, int]) -> NDArray[np.bool_]:
     if not text:
         return np.ones(size, np.bool_)
     bits = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
@@ -153,16 +159,8 @@ def _identity(value: Any) -> Any:
     return value
 
 
-def _duration(motion: Motion) -> float:
-    return motion.duration
-
-
-def _nothing(value: Any) -> None:
-    del value
-
-
 PLAIN = Codec(_identity, _identity)
-NOTHING = Codec(_nothing, _nothing)
+NOTHING = Codec(lambda _: None, lambda _: None)
 TEXTS = Codec(list, _identity)
 BOX = Codec(list, tuple)
 ARRAY = Codec(np.ndarray.tolist, read_array)
@@ -170,4 +168,4 @@ POSE = Codec(write_pose, read_pose)
 FRAME = Codec(write_frame, read_frame)
 ANSWER = Codec(write_answer, read_answer)
 OBSERVATIONS = Codec(write_observations, read_observations)
-MOTION = Codec(_duration, RecordedMotion)
+MOTION = Codec(attrgetter("duration"), RecordedMotion)

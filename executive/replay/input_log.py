@@ -1,4 +1,4 @@
-"""Recorded inputs of a run and its interruptions, from its journal."""
+"""Recorded inputs and interruptions of a run, from its journal."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ UNKNOWN_ACTION = "unknown"
 
 
 class RecordedInput(NamedTuple):
-    """One answer of a cell.
+    """A recorded answer of a cell.
 
     Attributes:
         tick: Control step in which the answer was read.
-        read: The answer.
+        answer: Event of the answer.
     """
 
     tick: int
-    read: InputRead
+    answer: InputRead
 
 
 @dataclass(frozen=True)
@@ -43,20 +43,20 @@ class Interruption:
         last_action: Last action of the tool before the interruption, `open` or `close`; "" if there was none;
             `UNKNOWN_ACTION` if arm or tool did more than the journal knows.
         reopens: True if the run had ended as INCOMPLETE, so that the tree starts again.
-        resumed: Control step at which the run was resumed.
+        resumed_at: Control step at which the run was resumed.
     """
 
-    complete: int
+    complete_steps: int
     last_action: str
     reopens: bool
-    resumed: int
+    resumed_at: int
 
 
 class Halt(NamedTuple):
     """Halt of a run: its control step, and True if the tree was ticked in this step."""
 
     tick: int
-    ticked: bool
+    is_tree_ticked: bool
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class InputLog:
 
     Attributes:
         events: Events of the journal that no resumption made void, in order.
-        inputs: Recorded answers by name of the input, in order; repeated answers are left out.
-        interruptions: Interruptions by `Interruption.complete`.
+        inputs: Recorded answers by name of the input, in order, without repeated answers.
+        interruptions: Interruptions by `Interruption.complete_steps`.
         halt: The last halt, or None.
     """
 
@@ -76,35 +76,35 @@ class InputLog:
     halt: Halt | None = None
 
     @staticmethod
-    def of(events: Iterable[TimedEvent]) -> InputLog:
-        """Return the log of a journal.
+    def from_events(events: Iterable[TimedEvent]) -> InputLog:
+        """Return the log of the events of a journal.
 
         A resumption voids all earlier events from the first incomplete control step on.
         """
-        kept: list[TimedEvent] = []
+        valid: list[TimedEvent] = []
         for timed in events:
             if isinstance(timed.event, RunResumed):
-                kept = _before(kept, timed.event.ticked)
-            kept.append(timed)
-        reopened = {end + 1 for end in _incomplete_ends(kept)}
+                valid = _select_before(valid, timed.event.ticked)
+            valid.append(timed)
+        incomplete_ends = _find_incomplete_ends(valid)
         interruptions: dict[int, Interruption] = {}
         inputs: dict[str, list[RecordedInput]] = defaultdict(list)
         halt = None
-        for timed in kept:
+        for timed in valid:
             tick, event = timed.tick, timed.event
             match event:
-                case RunResumed(ticked, intent):
-                    interruptions[ticked] = Interruption(ticked, intent, ticked in reopened, tick)
+                case RunResumed(steps, action):
+                    interruptions[steps] = Interruption(steps, action, steps - 1 in incomplete_ends, tick)
                 case InputRead(name):
                     inputs[name].append(RecordedInput(tick, event))
-                case RunHalted(ticked):
-                    halt = Halt(tick, ticked)
-        return InputLog(kept, inputs, interruptions, halt)
+                case RunHalted(is_tree_ticked):
+                    halt = Halt(tick, is_tree_ticked)
+        return InputLog(valid, inputs, interruptions, halt)
 
     @property
     def start(self) -> RunStarted | None:
         """Start of the run, or None if the run had not started."""
-        return next((one.event for one in self.events if isinstance(one.event, RunStarted)), None)
+        return next((timed.event for timed in self.events if isinstance(timed.event, RunStarted)), None)
 
     @property
     def step(self) -> float:
@@ -123,13 +123,13 @@ class InputLog:
         events = (timed.event for timed in reversed(self.events))
         return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
-    def interruption_after(
+    def find_interruption(
         self, steps: int, last_command: int = 0, known_command: int = 0, *, is_complete: bool = True
     ) -> Interruption:
         """Return the interruption at the end of the log.
 
-        The steps in which the arm only braked do not count: those from a halt on, and those of an interrupted
-        resumption. A run that ended as INCOMPLETE counts as a whole.
+        The steps after a halt and those of an interrupted resumption are not complete, because the arm only
+        braked. All steps of a run that ended as INCOMPLETE are complete.
 
         Args:
             steps: Number of control steps that the world of the cell has made.
@@ -137,18 +137,19 @@ class InputLog:
             known_command: Control step of the last command to arm or tool by a replay of this log.
             is_complete: True if the log holds all events of its last control step.
         """
-        if self.last_tick in _incomplete_ends(self.events):
+        incomplete_ends = _find_incomplete_ends(self.events)
+        if self.last_tick in incomplete_ends:
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
         end = self.last_tick + is_complete if self.halt is None else self.halt.tick
         complete = min(steps, end)
-        # The journal of a halted run reaches beyond the halt, which the replay does not.
+        # The journal of a halted run contains events after the halt; the replay ends at the halt.
         lacks_actions = last_command > (known_command if self.halt is None else self.last_tick)
         for earlier in reversed(list(self.interruptions.values())):
-            if earlier.resumed >= complete:
-                complete = min(complete, earlier.complete)
+            if earlier.resumed_at >= complete:
+                complete = min(complete, earlier.complete_steps)
                 lacks_actions |= earlier.last_action == UNKNOWN_ACTION
         action = UNKNOWN_ACTION if lacks_actions else self.last_action
-        return Interruption(complete, action, complete - 1 in _incomplete_ends(self.events), steps)
+        return Interruption(complete, action, complete - 1 in incomplete_ends, steps)
 
     def is_over(self, tick: int) -> bool:
         """Return True if the recorded run ended before its tree was ticked in this control step."""
@@ -160,25 +161,24 @@ class InputLog:
         """Return True if the recorded run was halted after its tree was ticked in this control step."""
         return self.halt == (tick, True)
 
-    def before(self, tick: int) -> InputLog:
-        """Return the log of everything before a control step, and of the start of the run."""
-        return InputLog.of(_before(self.events, tick))
+    def select_before(self, tick: int) -> InputLog:
+        """Return the log of all events before a control step, and of the start of the run."""
+        return InputLog.from_events(_select_before(self.events, tick))
 
-    def number_of(self, kind: type[Event]) -> int:
+    def count_events(self, kind: type[Event]) -> int:
         """Return the number of events of a kind."""
         return sum(isinstance(timed.event, kind) for timed in self.events)
 
-    def number_of_answers(self, name: str) -> int:
+    def count_answers(self, name: str) -> int:
         """Return the number of recorded answers of an input."""
         return len(self.inputs.get(name, ()))
 
 
-def _before(events: Iterable[TimedEvent], tick: int) -> list[TimedEvent]:
-    return [one for one in events if one.tick < tick or isinstance(one.event, RunStarted)]
+def _select_before(events: Iterable[TimedEvent], tick: int) -> list[TimedEvent]:
+    return [timed for timed in events if timed.tick < tick or isinstance(timed.event, RunStarted)]
 
 
-def _incomplete_ends(events: Iterable[TimedEvent]) -> frozenset[int]:
+def _find_incomplete_ends(events: Iterable[TimedEvent]) -> set[int]:
     """Return the control steps in which the run ended as INCOMPLETE."""
-    return frozenset(
-        one.tick for one in events if isinstance(one.event, RunEnded) and one.event.status == "INCOMPLETE"
-    )
+    ends = ((timed.tick, timed.event) for timed in events if isinstance(timed.event, RunEnded))
+    return {tick for tick, end in ends if end.status == "INCOMPLETE"}

@@ -1,11 +1,12 @@
 """Recorder of the inputs of a run: the answers of its cell.
 
-Every answer that differs from the last answer to the same question becomes an event. A replay of these
-answers repeats all decisions of the tree, its skills and the ledger, without the cell.
+Each answer that differs from the last answer to the same query becomes an event. A replay of these answers
+repeats all decisions of the tree, its skills and the ledger, without the cell.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -17,40 +18,41 @@ Answer = TypeVar("Answer")
 
 
 class InputRecorder:
-    """Emits every new answer of a cell as an event; used by the tick thread only.
+    """Emits each new answer of a cell as an event; used in the thread of the control loop only.
 
     Args:
-        emit: Takes the events.
+        emit: Emits an event.
     """
 
     def __init__(self, emit: Emit) -> None:
         self._emit = emit
-        self._reads: dict[str, int] = {}
-        self._last: dict[str, object] = {}
+        self._read_counts: Counter[str] = Counter()
+        self._last_values: dict[str, object] = {}
 
     def begin_step(self) -> None:
-        """Begin a control step: the count of reads starts again."""
-        self._reads.clear()
+        """Begin a control step, in which the counts of reads start from 0."""
+        self._read_counts.clear()
 
-    def read(self, name: str, ask: Callable[[], Answer], codec: Codec = PLAIN) -> Answer:
-        """Return the cell's answer, and record it if it is new.
+    def read(self, name: str, query: Callable[[], Answer], codec: Codec = PLAIN) -> Answer:
+        """Return the answer of the cell, and record a new answer.
 
         Args:
-            name: Name of the input; the same question has the same name.
-            ask: Asks the cell.
-            codec: Makes the answer plain.
+            name: Name of the input; equal queries have the same name.
+            query: Queries the cell.
+            codec: Converts the answer to plain values.
 
         Raises:
-            Exception: The cell raised it; it is recorded, too.
+            Exception: The cell raised an exception, which is also recorded.
         """
-        nth = self._reads[name] = self._reads.get(name, 0) + 1
+        self._read_counts[name] += 1
+        read_number = self._read_counts[name]
         try:
-            answer = ask()
+            answer = query()
         except (Exception, Stopped) as error:
-            self._emit(InputRead(name, nth, str(error), type(error).__name__))
+            self._emit(InputRead(name, read_number, str(error), type(error).__name__))
             raise
         value = codec.write(answer)
-        if name not in self._last or value != self._last[name]:
-            self._last[name] = value
-            self._emit(InputRead(name, nth, value))
+        if name not in self._last_values or value != self._last_values[name]:
+            self._last_values[name] = value
+            self._emit(InputRead(name, read_number, value))
         return answer

@@ -43,8 +43,8 @@ class InputFormat(NamedTuple):
     codec: Codec = PLAIN
 
     @staticmethod
-    def of(access: Access) -> InputFormat:
-        """Return the format of the answer to an access; all commands have the same one."""
+    def find(access: Access) -> InputFormat:
+        """Return the format of the answer to an access; all commands have the same format."""
         if access.name in COMMANDS:
             return _COMMAND
         name, codec = INPUT_FORMATS[access.name]
@@ -89,7 +89,7 @@ MOVING_COMMANDS = frozenset({"arm.start", "tool.close", "tool.open"})
 """Commands that the log of a simulated world contains, too."""
 
 RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
-"""Roles whose answers are recorded. A replay builds its own ledger, and reads the cell file for the rest."""
+"""Roles with recorded answers. A replay builds its own ledger; the cell file defines the other roles."""
 
 _COMMAND = InputFormat("command", NOTHING)
 """Format of the answer to a command: None, unless the cell raises an exception."""
@@ -99,14 +99,14 @@ _PATTERNS = [
     (re.compile(re.sub(r"\\{.*?\\}", ".+", re.escape(form.name))), form.codec)
     for form in sorted(INPUT_FORMATS.values(), key=lambda form: -len(form.name))
 ]
-"""Pattern of the names of the inputs of each format, and their codec; the most specific ones first."""
+"""Pattern of the input names of each format, and codec of the format; the most specific patterns first."""
 
 
 def check_input(name: str, value: JsonValue) -> None:
-    """Return if an answer can be replayed; one with an unknown name is not asked for.
+    """Raise an error if a recorded answer cannot be replayed.
 
     Raises:
-        ValueError: The answer has not the form of the answers to this question.
+        ValueError: The answer does not have the format of the input.
     """
     codec = next((codec for pattern, codec in _PATTERNS if pattern.fullmatch(name)), PLAIN)
     try:
@@ -116,8 +116,8 @@ def check_input(name: str, value: JsonValue) -> None:
         raise ValueError(f'"value" is no answer of the input "{name}" ({problem})') from error
 
 
-def recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
-    """Return a copy of the cell that uses `clock`, and whose answers are recorded.
+def record_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
+    """Return a copy of the cell with the clock `clock` and with recorded answers.
 
     Each action of the tool is emitted as an event before the action.
     """
@@ -125,7 +125,7 @@ def recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: E
     def answer(access: Access) -> Any:
         if access.role == "tool" and access.name in COMMANDS:
             emit(ToolCommanded(access.member))
-        name, codec = InputFormat.of(access)
+        name, codec = InputFormat.find(access)
         return recorder.read(name, access.proceed, codec)
 
     return replace(intercept(cell, answer, RECORDED_ROLES), clock=clock)

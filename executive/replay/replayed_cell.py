@@ -19,26 +19,25 @@ from executive.replay.recorded_cell import MOVING_COMMANDS, RECORDED_ROLES, Inpu
 
 
 class ReplayedCell(CellWrapper):
-    """Answers as the recorded run was answered; the cell inside is used only for its ledger.
+    """Answers queries with the recorded answers; the inner cell is used only for its ledger.
 
-    With a `last` interruption, the cell inside takes over after it: then all questions and commands go to the
-    cell inside.
+    With a `last` interruption, all queries and commands after this interruption go to the inner cell.
 
     Args:
-        inner: The cell inside.
+        inner: The inner cell.
         log: The recorded inputs.
         last: Interruption at the end of the log, or None to replay only.
 
     Attributes:
         log: The recorded inputs that are replayed: those before the last interruption.
         last: Interruption at the end of the log, or None.
-        interruption: Interruption before this control step after which the run was not resumed yet, or None.
-        is_live: True from the moment at which the cell inside has taken over.
+        interruption: Interruption before this control step, until the run is resumed; else None.
+        is_live: True if all queries and commands go to the inner cell.
     """
 
     def __init__(self, inner: Workcell, log: InputLog, last: Interruption | None = None) -> None:
         super().__init__(inner)
-        self.log = log if last is None else log.before(last.complete)
+        self.log = log if last is None else log.select_before(last.complete_steps)
         self.last = last
         self._replayer = InputReplayer(self.log)
         self._is_halted = False
@@ -47,7 +46,7 @@ class ReplayedCell(CellWrapper):
         clock = StepClock(self._now, self.log.step)
         self._cell = replace(intercept(inner.cell, self._answer, RECORDED_ROLES), clock=clock)
         self._begin_step(0)
-        self.interruption = self._interruption_at(0)
+        self.interruption = self._find_interruption(0)
 
     @property
     def cell(self) -> Cell:
@@ -66,7 +65,7 @@ class ReplayedCell(CellWrapper):
 
     @property
     def unanswered(self) -> str:
-        """Message of the first question without a recorded answer, or ""."""
+        """Message of the first query without a recorded answer, or ""."""
         return self._replayer.unanswered
 
     @property
@@ -77,26 +76,26 @@ class ReplayedCell(CellWrapper):
     @property
     def is_reopened(self) -> bool:
         """True if the recorded run ended in this control step as INCOMPLETE and was resumed."""
-        following = None if self.is_live else self._interruption_at(self._steps + 1)
-        return following is not None and following.reopens
+        next_interruption = None if self.is_live else self._find_interruption(self._steps + 1)
+        return next_interruption is not None and next_interruption.reopens
 
     def resume(self) -> None:
-        """Continue after the interruption; after the last one, the cell inside takes over.
+        """Continue after the interruption; after the last interruption, on the inner cell.
 
-        The cell inside first makes the control steps that it lacks.
+        The inner cell first makes the control steps that it lacks.
         """
         interruption, self.interruption = self.interruption, None
         assert interruption is not None, "only an interrupted run can be resumed"
         if interruption is not self.last:
-            self._begin_step(interruption.resumed)
+            self._begin_step(interruption.resumed_at)
             return
-        while self.inner.steps < interruption.complete:
+        while self.inner.steps < interruption.complete_steps:
             self.inner.advance()
         self.is_live = True
 
     @contextmanager
-    def muted(self) -> Iterator[None]:
-        """Answer with the last recorded answers meanwhile; no command has an effect."""
+    def mute(self) -> Iterator[None]:
+        """Answer with the last recorded answers in the `with` block; commands have no effect there."""
         is_live, self.is_live = self.is_live, False
         try:
             yield
@@ -104,7 +103,7 @@ class ReplayedCell(CellWrapper):
             self.is_live = is_live
 
     def advance(self) -> None:
-        """Let one control step pass.
+        """Make one control step.
 
         Raises:
             Stopped: The recorded run was halted in this step; raised once.
@@ -116,27 +115,27 @@ class ReplayedCell(CellWrapper):
             self._is_halted = True
             raise Stopped("the recorded run was halted here")
         self._begin_step(self._steps + 1)
-        self.interruption = self._interruption_at(self._steps)
+        self.interruption = self._find_interruption(self._steps)
 
     def _begin_step(self, steps: int) -> None:
         self._steps = steps
         self._replayer.begin_step(steps)
 
-    def _interruption_at(self, steps: int) -> Interruption | None:
-        if self.last is not None and steps == self.last.complete:
+    def _find_interruption(self, steps: int) -> Interruption | None:
+        if self.last is not None and steps == self.last.complete_steps:
             return self.last
         return self.log.interruptions.get(steps)
 
     def _now(self) -> float:
         if self.is_live:
             return self.inner.cell.clock.now
-        ahead: float = self._replayer.read("clock")
-        return self._steps * self.log.step + ahead
+        offset: float = self._replayer.read("clock")
+        return self._steps * self.log.step + offset
 
     def _answer(self, access: Access) -> Any:
         if self.is_live:
             return access.proceed()
         if access.name in MOVING_COMMANDS and self._steps <= self.log.last_tick:
             self._last_command = self._steps
-        name, codec = InputFormat.of(access)
+        name, codec = InputFormat.find(access)
         return self._replayer.read(name, codec)

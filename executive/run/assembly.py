@@ -115,9 +115,9 @@ def assemble_resumed(
         InputError: The cell is of a kind that is not installed, or its world cannot be rebuilt.
     """
     parts = _Parts(loaded, skills, options)
-    frames, pose_changes = (log.number_of_answers(f"camera.{name}") for name in ("frame", "next_pose"))
-    inner = parts.build_cell(ResumePoint(world, frames, pose_changes), log.number_of(RequestGiven))
-    last = log.interruption_after(inner.steps, inner.last_command, known_command, is_complete=is_complete)
+    frames, pose_changes = (log.count_answers(f"camera.{name}") for name in ("frame", "next_pose"))
+    inner = parts.build_cell(ResumePoint(world, frames, pose_changes), log.count_events(RequestGiven))
+    last = log.find_interruption(inner.steps, inner.last_command, known_command, is_complete=is_complete)
     return parts.build_resumed_run(inner, log, None if has_ended else last)
 
 

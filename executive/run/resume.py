@@ -99,14 +99,14 @@ class ResumedRun(Run):
         context.begin_step(replayed.steps)
         if replayed.is_live:
             self._wall_start = time.monotonic() - context.now
-            ticked, intent = interruption.complete, interruption.last_action
+            ticked, intent = interruption.complete_steps, interruption.last_action
             context.emit(RunResumed(ticked, intent, dict(versions())))
         self._is_scene_known &= interruption.last_action != UNKNOWN_ACTION
         if self._is_scene_known:
             restart_skills(self.root)
         else:
             # The arm may be elsewhere than the journal says: a halted skill must not open the tool there.
-            with replayed.muted(), contextlib.suppress(Fault):
+            with replayed.mute(), contextlib.suppress(Fault):
                 restart_skills(self.root)
         require_rest(context.come_to_rest)
         if interruption.reopens:

@@ -9,7 +9,7 @@ from executive.cell.protocols import Cell
 from executive.cell.workcell import Workcell
 from executive.events import Event, Observer, TimedEvent
 from executive.replay.input_recorder import InputRecorder
-from executive.replay.recorded_cell import recorded_cell
+from executive.replay.recorded_cell import record_cell
 from executive.run.planning_ahead import PlanningAhead
 
 MAX_BRAKING_TIME = 2.0
@@ -54,7 +54,7 @@ class RunContext:
             self.observe(planner.observe)
         self._step = workcell.cell.clock.step
         clock = StepClock(lambda: self.now, self._step)
-        self.cell = recorded_cell(workcell.cell, self._recorder, clock, self.emit)
+        self.cell = record_cell(workcell.cell, self._recorder, clock, self.emit)
 
     def observe(self, observer: Observer, *, first: bool = False) -> None:
         """Call `observer` with every event from now on; with `first`, before all other observers."""

@@ -251,7 +251,7 @@ def _resume(subject: Subject, path: Path, case: str) -> Figures:
         except InputError as error:
             has_begun = "had not begun" not in str(error)
             return {"agrees": True, "status": "refused", "problems": [str(error)] if has_begun else []}
-        after = InputLog.of(read_journal(path / "journal.jsonl"))
+        after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = find_wrong_claims(result)
         if difference := compare(subject.loaded, subject.skills, after, result.seed).difference:
             problems.append(f"the replay differs: {difference}")

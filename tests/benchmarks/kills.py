@@ -101,13 +101,13 @@ def run_and_kill(subject: Subject, seed: int, runs: Path, delay: float) -> bool:
         entries = read_journal(find_run(LATEST, runs) / "journal.jsonl")
     except ExecutiveError:
         return False
-    return InputLog.of(entries).start is not None and find_end(entries) is None
+    return InputLog.from_events(entries).start is not None and find_end(entries) is None
 
 
 def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
     """Change the world if asked to, resume a killed run, and return its figures and problems."""
     path = find_run(LATEST, runs)
-    past = InputLog.of(read_journal(path / "journal.jsonl"))
+    past = InputLog.from_events(read_journal(path / "journal.jsonl"))
     nodes = (timed.event for timed in past.events if isinstance(timed.event, NodeStarted | NodeEnded))
     last = {event.node: event for event in nodes if event.skill}
     kill: Figures = {
@@ -122,7 +122,7 @@ def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> F
         done = change_world(subject, seed, path, past, change) if change else ""
         options = RunOptions(seed, kind=subject.kind)
         result = resume_run(path, subject.skills, options, RecordOptions(frames=False))
-        after = InputLog.of(read_journal(path / "journal.jsonl"))
+        after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = [*check_result(result, change_made=done), *find_handled_twice(after.events)]
         difference = compare(subject.loaded, subject.skills, after, seed).difference
         if difference:

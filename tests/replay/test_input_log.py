@@ -21,22 +21,24 @@ START = at(0, run_started())
 
 
 def values(log: InputLog) -> list[object]:
-    return [one.read.value for one in log.inputs["tool.holding"]]
+    return [one.answer.value for one in log.inputs["tool.holding"]]
 
 
 def test_answers_are_in_order_by_the_name_of_the_input() -> None:
-    log = InputLog.of([START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)])
-    assert [(one.tick, one.read.nth, one.read.value) for one in log.inputs["tool.holding"]] == [
+    log = InputLog.from_events(
+        [START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)]
+    )
+    assert [(one.tick, one.answer.nth, one.answer.value) for one in log.inputs["tool.holding"]] == [
         (0, 1, False),
         (7, 2, True),
     ]
-    assert (log.number_of_answers("arm.met"), log.number_of_answers("arm.q")) == (1, 0)
+    assert (log.count_answers("arm.met"), log.count_answers("arm.q")) == (1, 0)
 
 
 def test_an_incomplete_control_step_is_void_once_the_run_was_resumed() -> None:
     killed = [START, sense(4, True), sense(5, False), at(5, ToolCommanded("open"))]
-    assert InputLog.of(killed).last_action == "open"
-    resumed = InputLog.of([*killed, resume(5, 5, "open"), sense(5, True, nth=3)])
+    assert InputLog.from_events(killed).last_action == "open"
+    resumed = InputLog.from_events([*killed, resume(5, 5, "open"), sense(5, True, nth=3)])
     assert values(resumed) == [True, True]
     assert (resumed.last_action, resumed.interruptions[5].last_action) == ("", "open")
 
@@ -45,17 +47,17 @@ def test_a_second_resumption_voids_only_the_end_of_the_first() -> None:
     entries = [
         START, sense(2, 1), sense(3, 2), resume(3, 3), sense(4, 3), sense(6, 4), resume(9, 6), sense(9, 5),
     ]  # fmt: skip
-    log = InputLog.of(entries)
+    log = InputLog.from_events(entries)
     assert values(log) == [1, 3, 5]
-    assert {one.complete: one.resumed for one in log.interruptions.values()} == {3: 3, 6: 9}
+    assert {one.complete_steps: one.resumed_at for one in log.interruptions.values()} == {3: 3, 6: 9}
 
 
 def test_the_steps_after_a_halt_do_not_count() -> None:
     halted = [START, sense(8, 1), at(9, RunHalted(True)), sense(30, 2), at(30, run_ended())]
-    log = InputLog.of(halted)
-    assert (log.interruption_after(30).complete, values(log.before(9))) == (9, [1])
+    log = InputLog.from_events(halted)
+    assert (log.find_interruption(30).complete_steps, values(log.select_before(9))) == (9, [1])
     # Once the run was resumed, the halt is void.
-    assert InputLog.of([*halted, resume(30, 9)]).halt is None
+    assert InputLog.from_events([*halted, resume(30, 9)]).halt is None
 
 
 @pytest.mark.parametrize(("steps", "complete"), [(0, 0), (7, 7), (8, 8), (9, 9), (500, 9)])
@@ -63,7 +65,7 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
     steps: int, complete: int
 ) -> None:
     # Step 8 is the last one in the journal: whether it is complete is known from the steps of the world.
-    assert InputLog.of([START, sense(8, 1)]).interruption_after(steps).complete == complete
+    assert InputLog.from_events([START, sense(8, 1)]).find_interruption(steps).complete_steps == complete
 
 
 @pytest.mark.parametrize(
@@ -73,41 +75,41 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
 def test_a_world_that_did_more_than_the_journal_knows(
     last_command: int, is_complete: bool, complete: int, action: str
 ) -> None:
-    log = InputLog.of([START, at(8, ToolCommanded("open"))])
-    interruption = log.interruption_after(20, last_command, 8, is_complete=is_complete)
-    assert (interruption.complete, interruption.last_action) == (complete, action)
+    log = InputLog.from_events([START, at(8, ToolCommanded("open"))])
+    interruption = log.find_interruption(20, last_command, 8, is_complete=is_complete)
+    assert (interruption.complete_steps, interruption.last_action) == (complete, action)
 
 
 def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> None:
-    log = InputLog.of([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
-    interruption = log.interruption_after(9, 8)
-    assert (interruption.complete, interruption.last_action) == (6, "unknown")
+    log = InputLog.from_events([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
+    interruption = log.find_interruption(9, 8)
+    assert (interruption.complete_steps, interruption.last_action) == (6, "unknown")
 
 
 def test_a_kill_within_a_control_step_loses_no_action() -> None:
-    interruption = InputLog.of([START, at(8, ToolCommanded("open"))]).interruption_after(
+    interruption = InputLog.from_events([START, at(8, ToolCommanded("open"))]).find_interruption(
         8, 8, 8, is_complete=False
     )
-    assert (interruption.complete, interruption.last_action) == (8, "open")
+    assert (interruption.complete_steps, interruption.last_action) == (8, "open")
 
 
 @pytest.mark.parametrize(("steps", "complete"), [(9, 6), (10, 10)])
 def test_a_resumption_that_was_interrupted_at_once_is_repeated_from_its_beginning(
     steps: int, complete: int
 ) -> None:
-    log = InputLog.of([START, sense(5, 1), resume(9, 6, "close"), sense(9, 2)])
-    interruption = log.interruption_after(steps)
-    assert (interruption.complete, interruption.resumed) == (complete, steps)
+    log = InputLog.from_events([START, sense(5, 1), resume(9, 6, "close"), sense(9, 2)])
+    interruption = log.find_interruption(steps)
+    assert (interruption.complete_steps, interruption.resumed_at) == (complete, steps)
 
 
 def test_a_run_that_ended_as_incomplete_is_reopened() -> None:
-    log = InputLog.of([START, sense(8, 1), at(9, run_ended("INCOMPLETE"))])
-    assert log.interruption_after(9) == Interruption(10, "", True, 10)
-    log = InputLog.of([*log.events, resume(10, 10), sense(11, 2)])
+    log = InputLog.from_events([START, sense(8, 1), at(9, run_ended("INCOMPLETE"))])
+    assert log.find_interruption(9) == Interruption(10, "", True, 10)
+    log = InputLog.from_events([*log.events, resume(10, 10), sense(11, 2)])
     assert log.interruptions[10].reopens
 
 
 def test_the_start() -> None:
-    assert InputLog.of([]).start is None
-    log = InputLog.of([START, at(3, RequestGiven(None)), at(4, RequestGiven(None))])
-    assert (log.step, log.number_of(RequestGiven)) == (1 / 240, 2)
+    assert InputLog.from_events([]).start is None
+    log = InputLog.from_events([START, at(3, RequestGiven(None)), at(4, RequestGiven(None))])
+    assert (log.step, log.count_events(RequestGiven)) == (1 / 240, 2)

@@ -37,7 +37,7 @@ class FilmSource:
         events = read_journal(directory.journal)
         self.directory = directory
         self.start = find_start(events, directory.path, "there is nothing to film")
-        self.events = InputLog.of(events).events
+        self.events = InputLog.from_events(events).events
         self.nodes = read_tree(directory.tree)
         self.config = read_cell(directory.path)
         self.bins = {
