@@ -61,12 +61,12 @@ class Approach(Skill):
             seen = f"{item} was seen at {self.target.stamp:.2f} s"
             raise self.failure("stale", f"{seen}, and the robot may have moved it since; look again")
 
-        def ask() -> tuple[Goal, Task]:
+        def find_goal() -> tuple[Goal, Task]:
             return approach(cell, self.target, self.overtravel, self.offset)
 
-        motion = yield from plan(self, cell.arm, ask)
-        goal, _ = ask()
-        yield from follow(self, cell, motion, until=_new_contact_check(tool))
+        motion = yield from plan(self, cell.arm, find_goal)
+        goal, _ = find_goal()
+        yield from follow(self, cell, motion, until=_build_contact_check(tool))
         kind, middle = cell.classes[self.target.label], float(self.target.position[2])
         height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded
         expected = f"expected at {(highest - cell.descent) * 1000:.0f} mm"
@@ -98,14 +98,14 @@ def _proves_absence(goal: Goal, target: Target, kind: ObjectClass) -> bool:
     return is_central and z < target.position[2] and z <= 2 * PROBE_CLEARANCE
 
 
-def _new_contact_check(tool: Tool) -> Callable[[], bool]:
-    """Return a function that returns True on a new contact; a contact that exists now must first end."""
-    away = not tool.touching
+def _build_contact_check(tool: Tool) -> Callable[[], bool]:
+    """Return a function that returns True on a new contact; an existing contact must end first."""
+    was_free = not tool.touching
 
-    def landed() -> bool:
-        nonlocal away
-        touching = tool.touching
-        away = away or not touching
-        return away and touching
+    def has_new_contact() -> bool:
+        nonlocal was_free
+        is_touching = tool.touching
+        was_free = was_free or not is_touching
+        return was_free and is_touching
 
-    return landed
+    return has_new_contact

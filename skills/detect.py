@@ -60,7 +60,7 @@ class Detect(Skill):
             raise self.failure("crowded", str(error)) from error
         except Unavailable as error:
             raise self.failure("unavailable", str(error)) from error
-        on_table = (one for one in answer.doubtful if not shows_bin_content(cell, one, frame))
+        on_table = (box for box in answer.doubtful if not shows_bin_content(cell, box, frame))
         if not answer.found and self.doubtful == "fail" and (best := next(on_table, None)):
             raise self.failure("unsure", answer.describe_doubt(best))
         self.detections = Detections(**vars(answer), frame=frame, view=self.view, area=camera.area(self.view))

@@ -26,15 +26,15 @@ class Grasp(Skill):
     def run(self, cell: Cell) -> Steps:
         """Close the tool, wait, and read the sensor."""
         cell.tool.close()
-        sealed = False
+        is_sealed = False
         try:
             yield from cell.clock.sleep(self.settle)
-            sealed = cell.tool.holding
+            is_sealed = cell.tool.holding
         finally:
             # A halted skill must not leave an object in the tool that the ledger does not know.
-            if not sealed:
+            if not is_sealed:
                 cell.tool.open()
-        if not sealed:
+        if not is_sealed:
             cell.ledger.record_miss(self.target.item)
             raise self.failure("missed", f"no seal on {self.target.item} {self.settle:.2f} s after contact")
         cell.ledger.record_grasp(self.target.item)

@@ -25,12 +25,12 @@ class IsHolding(Skill):
 
     def run(self, cell: Cell) -> None:
         """Compare the sensor with the ledger."""
-        believed = cell.ledger.find_held_item()
-        if cell.tool.holding and believed is not None:
-            self.held = believed
+        item = cell.ledger.find_held_item()
+        if cell.tool.holding and item is not None:
+            self.held = item
             return
         cell.tool.open()
-        if believed is not None:
-            cell.ledger.record_drop(believed)
-            raise self.failure("empty", f"the sensor feels no seal; {believed} was dropped")
+        if item is not None:
+            cell.ledger.record_drop(item)
+            raise self.failure("empty", f"the sensor feels no seal; {item} was dropped")
         raise self.failure("empty", "the sensor feels no seal")

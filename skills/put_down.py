@@ -37,15 +37,15 @@ class PutDown(Skill):
         """Carry the item to the place, lower it, release it."""
         kind = cell.classes[cell.ledger.get_label(self.held)]
         goal, height = goal_aside(cell, kind, self.drop, self.held), kind.height
-        lying = float(cell.safe_place[2]) + height
+        lying_height = float(cell.safe_place[2]) + height
         try:
             yield from carry(self, cell, self.held, goal, "the safe place")
         except SkillFailed as failure:
-            # An item that was not lifted stands at its old position, which is as good as another one.
-            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > lying + MIN_LIFT_HEIGHT:
+            # An item that was not lifted can stay at its position.
+            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > lying_height + MIN_LIFT_HEIGHT:
                 raise
         x, y, _ = cell.arm.tool_pose.position
-        place = np.array((x, y, lying - height / 2))
+        place = np.array((x, y, lying_height - height / 2))
         yield from let_go(
             self, cell, self.held, self.settle, lambda: cell.ledger.record_put_down(self.held, place)
         )

@@ -34,7 +34,7 @@ class SelectTarget(Skill):
     def run(self, cell: Cell) -> None:
         """Take the first candidate in the preferred order."""
         candidates = [
-            target for target in nearest_first(cell, self.targets) if self._is_sought(cell, target.item)
+            target for target in nearest_first(cell, self.targets) if self._is_requested(cell, target.item)
         ]
         if not candidates:
             raise self._explain_none(cell)
@@ -46,7 +46,7 @@ class SelectTarget(Skill):
         self.bin = min(bins, key=lambda bin: count_used_slots(cell, bin))
         cell.decided(best, self.bin)
 
-    def _is_sought(self, cell: Cell, item: Item) -> bool:
+    def _is_requested(self, cell: Cell, item: Item) -> bool:
         label = cell.ledger.get_label(item)
         return (
             label in cell.routes
@@ -56,13 +56,13 @@ class SelectTarget(Skill):
 
     def _explain_none(self, cell: Cell) -> SkillFailed:
         """Return the failure that states why there is no candidate."""
-        doubtful = [item for item in cell.ledger.find_uncertain_items() if self._is_sought(cell, item)]
-        if doubtful:
-            names = ", ".join(doubtful)
+        uncertain = [item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item)]
+        if uncertain:
+            names = ", ".join(uncertain)
             return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
-        sought = self.same or self.wanted or "object to sort"
+        name = self.same or self.wanted or "object to sort"
         if self.same is None and cell.ledger.is_table_empty(self.wanted):
-            left = f"no {sought} is left on the table but what was rejected"
-            message = "; ".join(filter(None, (left, describe_unknown(cell.ledger.unknown))))
+            empty = f"no {name} is left on the table but what was rejected"
+            message = "; ".join(filter(None, (empty, describe_unknown(cell.ledger.unknown))))
             return self.failure("no_candidate", message)
-        return self.failure("unseen", f"no {sought} is in sight, and the table is not known to be empty")
+        return self.failure("unseen", f"no {name} is in sight, and the table is not known to be empty")

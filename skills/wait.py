@@ -9,7 +9,7 @@ from executive.skill import Seconds, Skill, param
 
 
 class Wait(Skill):
-    """Do nothing until `seconds` have passed on the run's clock."""
+    """Wait until `seconds` have passed on the clock of the run."""
 
     seconds: Seconds = param(ge=0, le=3600, doc="duration")
     reasons: ClassVar = ()

@@ -88,7 +88,10 @@ class Certainty:
             chance = f"leave a chance of {belief.class_error:.1%} that it is no {record.label}"
             limit = f"at most {self.config.misjudged:.1%} is allowed"
             record.set_state(State.REJECTED, f"{belief.looks} looks from one pose {chance}; {limit}")
-        elif not is_known and (belief.uncertain_looks >= MAX_UNCERTAIN_LOOKS or _is_contradicted(record)):
+        elif not is_known and (
+            belief.uncertain_looks >= MAX_UNCERTAIN_LOOKS
+            or record.contradictions >= max(MIN_CONTRADICTIONS_TO_REJECT, belief.looks + 1)
+        ):
             details = f": {record.contradiction}" if record.contradiction else ""
             record.set_state(State.REJECTED, REASON_UNCERTAIN + details)
             belief.log_odds = max(belief.log_odds, 0.0)
@@ -110,8 +113,3 @@ class Certainty:
             and len(belief.answers) == 1
             and record.label not in self.distinct_by_touch
         )
-
-
-def _is_contradicted(record: Record) -> bool:
-    """Return True if enough looks contradict the class of an item, and more contradict than support it."""
-    return record.contradictions >= max(MIN_CONTRADICTIONS_TO_REJECT, record.belief.looks + 1)

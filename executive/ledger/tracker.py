@@ -17,12 +17,7 @@ from executive.cell.protocols import Routes
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
-from executive.ledger.accounts import (
-    count_states,
-    find_final_state,
-    find_lost_elsewhere,
-    forget_rejected,
-)  # fmt: skip
+from executive.ledger.accounts import count_states, find_final_state, find_lost_elsewhere, forget_rejected
 from executive.ledger.bins import Bins, find_believed_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage

@@ -20,7 +20,7 @@ ARMS: Mapping[str, tuple[int, KinematicsFactory]] = {"kuka_iiwa/model.urdf": (II
 
 
 def find_unsupported_arm(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key and a sentence if the arm of a cell file is not supported, or its limits do not fit."""
+    """Yield key and message if the arm of a cell file, or the number of its limits, is not supported."""
     if config.arm.urdf not in ARMS:
         yield (
             ("arm", "urdf"),

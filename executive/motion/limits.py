@@ -33,7 +33,7 @@ class JointRange(NamedTuple):
         return np.asarray(np.all((self.lower <= qs) & (qs <= self.upper), axis=-1))
 
     def excess(self, qs: Array) -> Array:
-        """Return how far each joint of `qs` `(..., n)` is outside the range [rad]; negative inside."""
+        """Return the distance of each joint of `qs` `(..., n)` from the range [rad]; negative inside."""
         return np.asarray(np.maximum(qs - self.upper, self.lower - qs))
 
     def describe(self, joint: int) -> str:
@@ -48,11 +48,11 @@ class JointLimits:
 
     Attributes:
         position: Range of the joint positions.
-        velocity: [rad/s].
-        acceleration: [rad/s²].
-        jerk: [rad/s³].
-        stop_acceleration: Maximum acceleration while braking [rad/s²].
-        stop_jerk: Maximum jerk while braking [rad/s³].
+        velocity: Maximum velocity [rad/s].
+        acceleration: Maximum acceleration [rad/s²].
+        jerk: Maximum jerk [rad/s³].
+        stop_acceleration: Maximum acceleration during braking [rad/s²].
+        stop_jerk: Maximum jerk during braking [rad/s³].
     """
 
     position: JointRange
@@ -87,9 +87,8 @@ def min_time(change: Array, limits: JointLimits) -> Array:
     Each joint has its own jerk-limited profile, and the slowest joint determines the time. Depending on the
     distance, a profile reaches the maximum velocity, or only the maximum acceleration, or neither.
     """
-    far = np.abs(change)
-    v, a, j = limits.velocity, limits.acceleration, limits.jerk
+    d, v, a, j = np.abs(change), limits.velocity, limits.acceleration, limits.jerk
     rise = a / j  # [s] from rest to the maximum acceleration
     ramp = np.where(v >= a * rise, v / a + rise, 2 * np.sqrt(v / j))  # [s] to the maximum velocity
-    short = np.where(far >= 2 * a * rise**2, rise + np.sqrt(rise**2 + 4 * far / a), 4 * np.cbrt(far / 2 / j))
-    return np.max(np.where(far >= v * ramp, far / v + ramp, short), axis=-1)
+    short = np.where(d >= 2 * a * rise**2, rise + np.sqrt(rise**2 + 4 * d / a), 4 * np.cbrt(d / 2 / j))
+    return np.max(np.where(d >= v * ramp, d / v + ramp, short), axis=-1)

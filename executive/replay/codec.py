@@ -122,13 +122,7 @@ def read_answer(value: Any) -> Answer:
 def write_observations(observations: Sequence[Observation]) -> list[Any]:
     """Return the observations of one frame as lists."""
     return [
-        [
-            write_detection(new.detection),
-            new.position.tolist(),
-            new.std,
-            new.confident,
-            new.contradiction,
-        ]
+        [write_detection(new.detection), new.position.tolist(), new.std, new.confident, new.contradiction]
         for new in observations
     ]
 
