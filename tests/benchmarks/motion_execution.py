@@ -12,7 +12,7 @@ from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.tool import SuctionTool
-from executive.cells.sim.world import World, held_part
+from executive.cells.sim.world import World, name_held
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Pose
 from executive.motion.planner import Planner
@@ -83,19 +83,19 @@ class ClearanceMonitor:
         things = [
             body for body in (world.table, *bins, *world.bodies) if body not in (held, self._target_body)
         ]
-        load = "" if held is None else held_part(world.bodies[held])
+        load = "" if held is None else name_held(world.bodies[held])
         for body in things:
             for point in near(world.arm, body, MAX_MEASURED_DISTANCE):
                 if point[3] >= world.robot.first_moving_link:
-                    yield point[8], f"{world.part_of(point[3])} - {world.name_of(body)}"
+                    yield point[8], f"{world.name_link(point[3])} - {world.name_body(body)}"
             for point in near(held, body, MAX_MEASURED_DISTANCE) if load else ():
-                yield point[8], f"{load} - {world.name_of(body)}"
+                yield point[8], f"{load} - {world.name_body(body)}"
         for one, other in world.robot.self_pairs:
             for point in near(world.arm, world.arm, MAX_MEASURED_DISTANCE, linkIndexA=one, linkIndexB=other):
-                yield point[8], f"{world.part_of(one)} - {world.part_of(other)}"
+                yield point[8], f"{world.name_link(one)} - {world.name_link(other)}"
         for point in near(held, world.arm, MAX_MEASURED_DISTANCE) if load else ():
             if world.robot.first_moving_link <= point[4] < world.robot.wrist_link:
-                yield point[8], f"{load} - {world.part_of(point[4])}"
+                yield point[8], f"{load} - {world.name_link(point[4])}"
 
 
 class _Execution:

@@ -1,4 +1,4 @@
-"""Rendered images of the simulated world, depth, noise, and the camera that a simulated cell offers."""
+"""Camera of the simulated cell: rendered images, depth and noise."""
 
 from __future__ import annotations
 
@@ -54,19 +54,19 @@ class Light(Section):
 
 
 CELL_LIGHT = Light()
-"""The lamp of every simulated cell: white, a little in front and to the left, no shadows."""
+"""Light of every simulated cell: a white lamp, slightly in front and to the left, without shadows."""
 DEPTH_STREAM = 1
-"""Sets the random numbers of a frame's depth apart from those of its image; 0 would not."""
+"""Last number of the seed of the depth noise, which separates it from the seed of the image noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Render:
-    """A part of a camera's image as the renderer made it, free of noise.
+    """A rendered part of a camera image, without noise.
 
     Attributes:
         image: `(h, w, 3)` uint8, RGB.
-        bodies: `(h, w)` body seen at each pixel, -1 where there is none.
-        buffer: `(h, w)` OpenGL's depth buffer.
+        bodies: `(h, w)` visible body at each pixel, -1 for none.
+        buffer: `(h, w)` depth buffer of OpenGL.
     """
 
     image: Image
@@ -75,23 +75,23 @@ class Render:
 
     @property
     def depth(self) -> Array:
-        """Distances along the optical axis `(h, w)` [m], inf where there is no body."""
+        """Distances along the optical axis `(h, w)` [m], inf at pixels without a body."""
         with np.errstate(divide="ignore"):
             distances = FAR * NEAR / (FAR - (FAR - NEAR) * self.buffer.astype(np.float64))
         return np.where(self.buffer < 1.0, distances, np.inf)
 
 
 def camera_pose(world: World, config: CameraConfig) -> Pose:
-    """Return `X_WC` of a camera where it is mounted now."""
+    """Return the current pose `X_WC` of a camera."""
     _, X_MC = compute_calibration(config)
     return X_MC if config.mount == "fixed" else world.flange_pose() @ X_MC
 
 
 def render(world: World, matrix: Array, X_WC: Pose, part: tuple[int, int, int, int], light: Light) -> Render:
-    """Draw `part` (left, top, right, bottom [pixel]) of a camera's image at the camera's own resolution."""
+    """Render `part` (left, top, right, bottom [pixel]) of a camera image at the resolution of the camera."""
     left, top, right, bottom = part
     width, height = right - left, bottom - top
-    # TinyRenderer samples a pixel at its lower left corner; half a pixel further is its centre.
+    # TinyRenderer samples a pixel at its lower left corner; a shift by half a pixel samples the centre.
     sampled = (left + 0.5, top - 0.5, right + 0.5, bottom - 0.5)
     _, _, rgba, buffer, segmentation = world.client.getCameraImage(
         width,
@@ -116,45 +116,44 @@ def render(world: World, matrix: Array, X_WC: Pose, part: tuple[int, int, int, i
 
 
 def add_noise(image: Image, noise: NoiseConfig, rng: np.random.Generator) -> Image:
-    """Return the image with one brightness factor for the frame and read noise for every pixel."""
+    """Return the image with a random brightness factor and read noise at each pixel."""
     gain = rng.normal(1.0, noise.gain)
     read = rng.standard_normal(image.shape, dtype=np.float32) * np.float32(noise.read)
     return np.asarray(np.clip(image * np.float32(gain) + read + 0.5, 0, 255).astype(np.uint8))
 
 
 def add_depth_noise(true: Array, config: DepthConfig, rng: np.random.Generator) -> Array:
-    """Return what the sensor measures of distances `(H, W)` [m]: NaN where it measures nothing.
+    """Return measurements of distances `(H, W)` [m], NaN at pixels without a measurement.
 
-    Neighbours err alike, for stereo matches windows and not pixels. Beside an edge one of its two cameras
-    sees what the other does not, so there it often has nothing to match.
+    The noise of neighbours is correlated, because stereo matching compares windows. Beside an edge a surface
+    is often visible to only one of the two cameras of the sensor, so measurements are often missing.
     """
     noise = rng.standard_normal(true.shape)
     if config.grain:
-        # Averaging weakens noise; it shall have the deviation that the figures say.
+        # The blur reduces the standard deviation; the division restores it to 1.
         noise = np.asarray(cv2.GaussianBlur(noise, (0, 0), config.grain), dtype=np.float64)
         noise /= noise.std()
     seen = np.where(np.isfinite(true), true, np.nan)
     measured = seen + noise * (config.floor + config.growth * seen**2)
     if config.step:
         measured = np.round(measured / config.step) * config.step
-    lost = rng.random(true.shape) < np.where(_edges(true, config), config.edge_dropout, config.dropout)
+    lost = rng.random(true.shape) < np.where(_find_edges(true, config), config.edge_dropout, config.dropout)
     return np.where(lost, np.nan, measured)
 
 
-def _edges(true: Array, config: DepthConfig) -> Mask:
-    """Return where `(H, W)` a jump of the distance is near."""
+def _find_edges(true: Array, config: DepthConfig) -> Mask:
+    """Return the mask `(H, W)` of pixels near a depth discontinuity."""
     finite = np.where(np.isfinite(true), true, FAR).astype(np.float32)
-    around = np.ones((3, 3), np.uint8)
-    jumps = (cv2.dilate(finite, around) - cv2.erode(finite, around) > config.edge).astype(np.uint8)
+    kernel = np.ones((3, 3), np.uint8)
+    edges = (cv2.dilate(finite, kernel) - cv2.erode(finite, kernel) > config.edge).astype(np.uint8)
     width = 2 * config.edge_width + 1
-    return cv2.dilate(jumps, np.ones((width, width), np.uint8)).astype(bool)
+    return cv2.dilate(edges, np.ones((width, width), np.uint8)).astype(bool)
 
 
 class SimCamera(MountedCamera):
     """A camera of the simulated world; satisfies `executive.cell.protocols.Camera`.
 
-    The noise of frame n depends on the seed and n alone, and that of its image
-    not on whether there is a depth sensor.
+    The noise of frame n depends only on the seed and n; a depth sensor does not change the noise of images.
     """
 
     def __init__(
@@ -174,17 +173,17 @@ class SimCamera(MountedCamera):
         """Mount the camera.
 
         Args:
-            world: What it looks at.
-            name: Its name in the cell file.
-            config: Its section of the cell file.
-            clock: Stamps the frames.
-            seed: Seed of its noise.
-            shadow: Tells what the arm hides; by default it hides nothing, and the table is always seen.
-            epoch: Tells the ledger's count of changes of the table.
-            light: How the scene is lit.
-            true: The camera as it really is, if it differs from `config`: pose, lens and noise of the images.
-                Frames carry the matrix and the pose of `config`.
-            bins: The bins whose places in a frame show whether the camera is where `config` says.
+            world: The observed world.
+            name: Name of the camera in the cell file.
+            config: Section of the camera in the cell file.
+            clock: Clock for the time of the frames.
+            seed: Seed of the noise.
+            shadow: Occlusion by the arm; by default the arm hides nothing, and the table is always visible.
+            epoch: Returns the ledger's count of changes of the table.
+            light: Light of the scene.
+            true: True pose, lens and noise of the images if they differ from `config`. Frames carry the
+                matrix and the pose of `config`.
+            bins: Bins whose positions in a frame show a displacement of the camera.
         """
         super().__init__(name, config, world.flange_pose, clock, epoch)
         self._true = true or config
@@ -195,11 +194,11 @@ class SimCamera(MountedCamera):
         self._bins = bins
 
     def sees_table(self) -> bool:
-        """Tell whether the whole workspace is in view now, the arm not in front of it."""
+        """Return True if the whole workspace is visible now, not hidden by the arm."""
         return self._shadow is None or self._shadow.sees_table(self.matrix, self._pose(), self._size)
 
     def displacement(self, frame: Frame) -> str:
-        """Return in words how far a frame shows the camera beside its declared pose; "" if it does not."""
+        """Return a text with the displacement of the camera from its declared pose in a frame; "" if none."""
         return describe_displacement(frame, self._bins)
 
     @property
@@ -207,11 +206,11 @@ class SimCamera(MountedCamera):
         return self.config.width, self.config.height
 
     def _true_view(self) -> tuple[Array, Pose]:
-        """Return the camera matrix and the pose `X_WC` that the images really have."""
+        """Return the true camera matrix and the true pose `X_WC`."""
         return compute_calibration(self._true)[0], camera_pose(self._world, self._true)
 
     def _sense(self) -> tuple[Image, Array | None]:
-        """Return the image and, with a depth sensor, the depth of the frame being taken."""
+        """Return the image and, with a depth sensor, the depth of the current frame."""
         clean = render(self._world, *self._true_view(), (0, 0, *self._size), self._light)
         image = add_noise(clean.image, self._true.noise, np.random.default_rng([self._seed, self._frames]))
         if self.config.depth is None:

@@ -17,7 +17,7 @@ from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.least_times import SimLeastTimes
 from executive.cells.sim.models import find_missing_models, object_class_with_mass
 from executive.cells.sim.poses import find_places_out_of_reach, find_unfit_poses
-from executive.cells.sim.rebuild import UnderWay, rebuild
+from executive.cells.sim.rebuild import InterruptedArm, rebuild
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.scene_world import build_light
 from executive.cells.sim.spawn import PartSeeds, find_lack_of_room, first_world
@@ -41,8 +41,8 @@ class SimCell(CellWithoutHardware):
 
     Args:
         config: The cell file.
-        seed: Decides which objects lie where, and the camera's noise.
-        routes: Class label to the bins that are right for it.
+        seed: Random seed of the objects, their poses and the noise of the camera.
+        routes: Class label to the correct bins of the class.
         emit: Receives the events of the cell.
         options: Options of the run.
         camera: Builds the camera.
@@ -74,8 +74,8 @@ class SimCell(CellWithoutHardware):
         self._clearance = PathClearance(config)
         planner = build_planner(config, self._clearance.check)
         self._tool = SuctionTool(self._world, config.tool)
-        under_way = None if options.resume is None else self._rebuild(options.resume.log)
-        self._arm = SimArm(self._world, planner, config, clock, lambda: self._tool.held_body, emit, under_way)
+        resumed = None if options.resume is None else self._rebuild(options.resume.log)
+        self._arm = SimArm(self._world, planner, config, clock, lambda: self._tool.held_body, emit, resumed)
         name, camera_config = next(iter(config.cameras.items()))
         self._camera = camera(
             self._world,
@@ -93,7 +93,7 @@ class SimCell(CellWithoutHardware):
             self._camera.skip(options.resume.frames, options.resume.turns)
         classes = {label: object_class_with_mass(label, kind) for label, kind in config.objects.items()}
         localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
-        # Last of all: some detectors start processes, which nobody would end if a later statement failed.
+        # Detectors are built last: some start processes, which would go on if a later statement failed.
         folders = (options.base, shipped_folder() / "cells")
         self._detectors = detectors(
             config, clock=clock, base=options.base, seed=seeds.detectors, folders=folders
@@ -110,7 +110,7 @@ class SimCell(CellWithoutHardware):
 
     @staticmethod
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return what this kind of cell cannot do of a cell file, with the key it is about.
+        """Return the demands of a cell file that the simulated cell cannot meet: key and sentence of each.
 
         An unsupported arm, missing models and detectors, places out of reach, more objects than fit, poses in
         collision, and cameras that do not see the whole workspace.
@@ -124,38 +124,38 @@ class SimCell(CellWithoutHardware):
             *find_problems(config.detectors, base),
             *find_places_out_of_reach(config),
             *find_lack_of_room(config),
-            # A world cannot be made without its models.
+            # Without its models a world cannot be built.
             *(() if missing else find_unfit_poses(config)),
         )
 
     @staticmethod
     def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return the classes that each detector knows, None where it does not say; loads no model."""
+        """Return the classes of each detector, None if they are unknown; loads no model."""
         return find_known_labels(config.detectors, base)
 
     @staticmethod
     def least_times(config: CellConfig) -> SimLeastTimes:
-        """Return what things take at the very least."""
+        """Return the lower bounds of the times of motions and skills."""
         return SimLeastTimes(config)
 
     def log_to(self, path: Path) -> None:
-        """Keep in a file, from now on, what is done to the world."""
+        """Record all commands to the world in a file from now on."""
         self._world.log = CommandLog(path, self._world.robot.joint_count)
         self._arm.hold()
 
     def advance(self) -> None:
-        """Let one physics step pass."""
+        """Advance the cell by one physics step."""
         self._arm.advance()
         self._world.step()
         super().advance()
         self._tool.advance()
 
     def visuals(self) -> SimVisuals:
-        """Return what there is to be seen, for people only."""
+        """Return the shapes of the world for display."""
         return SimVisuals(self._world)
 
     def audit(self) -> dict[str, int]:
-        """Return what really became of the objects; for after the run only."""
+        """Return counts of the true outcomes of the objects, to be used only after the run."""
         return audit(
             self._world,
             {body: [place, *self._world.stood.get(body, ())] for body, place in self._initial.items()},
@@ -168,22 +168,22 @@ class SimCell(CellWithoutHardware):
         )
 
     def close(self) -> None:
-        """End the detectors and the physics."""
+        """Close the detectors and the physics servers."""
         for detector in self._detectors.values():
             detector.close()
         self._clearance.close()
         self._world.close()
 
-    def _rebuild(self, log: Path) -> UnderWay:
+    def _rebuild(self, log: Path) -> InterruptedArm:
         """Rebuild the world from its log, and continue the log."""
-        under_way = rebuild(self._world, self._tool, read_commands(log))
-        self.steps, self.last_command = under_way.steps, under_way.last_command
+        resumed = rebuild(self._world, self._tool, read_commands(log))
+        self.steps, self.last_command = resumed.steps, resumed.last_command
         self._world.log = CommandLog(log, self._world.robot.joint_count, again=True)
-        return under_way
+        return resumed
 
 
 def _find_lack_of_depth(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key and a sentence for every camera without the depth that the cell file localizes by."""
+    """Yield key and sentence for each camera without a depth sensor if the cell localizes by depth."""
     if config.localization != "depth":
         return
     for name, camera in config.cameras.items():

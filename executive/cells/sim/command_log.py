@@ -1,7 +1,7 @@
-"""What was done to a simulated world, step by step: from it the world can be rebuilt as it stands.
+"""Log of the commands to a simulated world, from which the world can be rebuilt.
 
-PyBullet's own snapshots lose constraints and motor targets; the same commands to the same world give the
-same bits.
+Snapshots of PyBullet lose constraints and motor targets, while the same commands to the same world give
+bitwise the same world.
 """
 
 from __future__ import annotations
@@ -25,15 +25,14 @@ VERSION = 2
 MAX_JOINTS = 100
 """Largest number of joints of an arm."""
 MAGIC = b"executive world "
-"""Begins every log; version and number of joints follow in the first line: `executive world 2 joints 7`."""
+"""Start of every log; the first line also has version and number of joints: `executive world 2 joints 7`."""
 STEP, IDLE, CLOSE, OPEN, PART, JOINTS_TO, MOTION, DONE, PLACE, REMOVE = b"SICOPJMDXR"
-"""Kinds of commands: a physics step of the run, and one between two parts of a run; vacuum on and off; a seal
-that gives way; joint targets; a motion that begins, and one that is over; an object that is put elsewhere,
-and one that is taken away."""
+"""Kinds of commands: a physics step of a run, and one between the parts of a run; vacuum on and off; a break
+of the seal; joint targets; start and end of a motion; a new pose of an object, and its removal."""
 _BODIES = {
     STEP: "", IDLE: "", CLOSE: "", OPEN: "", PART: "", DONE: "", MOTION: "2dI", PLACE: "i7d", REMOVE: "i",
 }  # fmt: skip
-"""Numbers of each command but JOINTS_TO, which has a time and one number for each joint."""
+"""Number formats of each command except JOINTS_TO, which has a time and one number for each joint."""
 
 
 class Command(NamedTuple):
@@ -45,15 +44,15 @@ class Command(NamedTuple):
 
 
 class CommandLog:
-    """Appends commands to a file, each before it is done.
+    """Appends commands to a file, each before its execution.
 
     Args:
-        path: The file; None: nothing is kept.
-        joint_count: Number of the arm's joints.
-        again: Whether the file is there already, and goes on; a command that a kill tore is cut off.
+        path: The file; None: nothing is recorded.
+        joint_count: Number of joints of the arm.
+        again: True continues an existing file, from which an incomplete last command is removed.
 
     Raises:
-        InputError: It cannot be written, or is no log.
+        InputError: The file cannot be written, or is no log.
     """
 
     def __init__(self, path: Path | None = None, joint_count: int = 0, *, again: bool = False) -> None:
@@ -76,14 +75,14 @@ class CommandLog:
             self._append(bytes([kind]) + struct.pack(f"<{body}", *numbers))
 
     def motion(self, motion: Trajectory) -> None:
-        """Append that the arm begins to follow a motion: whoever comes later can brake on its path."""
+        """Append the start of a motion with its states, so that a resumed run can brake on its path."""
         if self._file is not None:
             states = np.hstack(motion.samples)
             head = struct.pack(f"<{_BODIES[MOTION]}", motion.duration, motion.guarded, len(states))
             self._append(bytes([MOTION]) + head + states.astype("<f8").tobytes())
 
     def close(self) -> None:
-        """Close the file; more calls do nothing."""
+        """Close the file; further calls do nothing."""
         if self._file is not None:
             self._file.close()
 
@@ -94,16 +93,16 @@ class CommandLog:
 
 
 def is_log(path: Path) -> bool:
-    """Tell whether a file begins as the log of a world does.
+    """Return True if a file is a command log of a world.
 
     Raises:
-        InputError: It cannot be read.
+        InputError: The file cannot be read.
     """
     return _content(path).startswith(MAGIC)
 
 
 def read_commands(path: Path) -> Iterator[Command]:
-    """Yield the commands of a log, in order; one that a kill tore is left out.
+    """Yield the commands of a log in order, except an incomplete last one.
 
     Raises:
         InputError: There is no such log.
@@ -113,7 +112,7 @@ def read_commands(path: Path) -> Iterator[Command]:
 
 
 def _commands(path: Path) -> Iterator[tuple[Command, int]]:
-    """Yield the whole commands of a log, each with how long the log is up to its end."""
+    """Yield the complete commands of a log, each with the position of its end in the file [byte]."""
     data = _content(path)
     if not data.startswith(MAGIC):
         raise InputError(f'"{path}" is no log of a world: it does not begin with {MAGIC.decode().strip()!r}')
@@ -132,7 +131,7 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
         kind, start = data[place], place
         if kind not in bodies:
             if not data[place:].strip(b"\0"):
-                # A power cut lost the last blocks.
+                # A power failure left the last blocks empty.
                 return
             raise _damaged(path, start)
         body = struct.Struct(f"<{bodies[kind]}")
@@ -147,7 +146,7 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
                 return
             states = np.frombuffer(data, "<f8", state * int(numbers[-1]), place).reshape(-1, state)
             place += size
-        # The time from which on a motion is guarded may be infinite.
+        # The start of the guarded part of a motion may be infinite.
         finite = numbers if states is None else (numbers[0], *states.flat)
         if not all(map(math.isfinite, finite)):
             raise _damaged(path, start)
@@ -155,7 +154,7 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
 
 
 def _damaged(path: Path, place: int) -> InputError:
-    """Return the error for a log that holds no command at a place [bytes]."""
+    """Return the error for a log without a valid command at a position [byte]."""
     return InputError(
         f'the log of the world "{path}" is damaged at byte {place}: a log is only ever appended to, so '
         "somebody changed it after the run, or the disk lost a part of it; restore a copy"

@@ -1,4 +1,4 @@
-"""Models of objects: the mesh that a camera sees, read from a file, and the body that collides."""
+"""Models of objects: visual mesh, body in the simulator, mass, and check of the declared size."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose
 
 SIZE_TOLERANCE = 0.003
-"""Difference between a cell file's figure and the model's own from which it counts as wrong [m]."""
+"""Largest difference between a size in a cell file and the size of the model [m]."""
 FRICTION = 0.0005
-"""Rolling and spinning friction: without it a ball at rest creeps, and a released one never stops."""
+"""Coefficient of rolling and spinning friction, without which balls creep at rest and never stop."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh in the object's frame O: z up as the object stands, origin as `upright` says.
+    """A triangle mesh in the frame O of an upright object: z up, origin as in `upright`.
 
     Attributes:
         vertices: `(N, 3)` [m].
@@ -40,23 +40,23 @@ class Mesh:
 
     @property
     def bottom(self) -> float:
-        """Height of the lowest vertex over the origin [m], negative where it lies below."""
+        """Height of the lowest vertex above the origin [m], negative below it."""
         return float(self.vertices[:, 2].min())
 
     @property
     def top(self) -> float:
-        """Height of the highest vertex over the origin [m]."""
+        """Height of the highest vertex above the origin [m]."""
         return float(self.vertices[:, 2].max())
 
     @property
     def radius(self) -> float:
-        """Radius [m] of the circle around the outline seen from above, about the middle of its extents."""
+        """Radius [m] of the circle around the outline from above, centred in the bounding box."""
         outline = self.vertices[:, :2]
         return float(np.linalg.norm(outline - (outline.min(axis=0) + outline.max(axis=0)) / 2, axis=1).max())
 
     @cached_property
     def centroid(self) -> Array:
-        """Centre of the enclosed volume `(3,)` [m]; the middle of the extents where it encloses none."""
+        """Centroid of the enclosed volume `(3,)` [m]; without a volume, the centre of the bounding box."""
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
         if abs(volumes.sum()) < 1e-12:
@@ -65,7 +65,7 @@ class Mesh:
 
     @cached_property
     def convex(self) -> bool:
-        """True where no vertex lies more than 0.1 mm outside of any triangle's plane."""
+        """True if no vertex is more than 0.1 mm outside of the plane of any triangle."""
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         normals = np.cross(b - a, c - a)
         lengths = np.linalg.norm(normals, axis=1)
@@ -75,10 +75,10 @@ class Mesh:
 
 
 def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
-    """Put an object at `X_WO` (z up as it stands) and return its body.
+    """Add an upright object at `X_WO` and return its body.
 
     Raises:
-        InputError: Its model is not there, or is no mesh.
+        InputError: The model is missing, or is no mesh.
     """
     X_WL = X_WO @ upright(config)
     body = _add_mesh(client, config, X_WL) if config.mesh else _add_urdf(client, config, X_WL)
@@ -95,7 +95,7 @@ def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
 
 
 def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
-    """Add a mesh of uniform density; to collide, its groups become convex and grow by Bullet's 1 mm."""
+    """Add a mesh of uniform density; each group collides as its convex hull, enlarged by 1 mm."""
     shape = {"fileName": str(find_model(config.mesh)), "meshScale": [config.scale] * 3}
     centre = upright(config).inverse().apply(load_mesh(config).centroid)
     return int(
@@ -111,7 +111,7 @@ def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
 
 
 def mass_of(config: ObjectConfig) -> float:
-    """Return what an object weighs in simulation [kg]: as the cell file or its URDF says."""
+    """Return the mass of a simulated object [kg], from the cell file or its URDF."""
     if config.mesh:
         return config.mass
     masses = read_urdf(find_model(config.urdf)).iterfind(".//inertial/mass")
@@ -119,12 +119,12 @@ def mass_of(config: ObjectConfig) -> float:
 
 
 def object_class_with_mass(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return what skills know of a class of objects of a cell file, with what it weighs in simulation."""
+    """Return the object class of a section of a cell file, with the mass in simulation."""
     return replace(object_class(label, config), mass=mass_of(config))
 
 
 def find_missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key of every model of a cell file that is missing or not as the file says, and a sentence."""
+    """Yield key and sentence for each model of a cell file that is missing or has another size."""
     for label, kind in config.objects.items():
         key: KeyPath = ("objects", label)
         try:
@@ -139,10 +139,10 @@ def find_missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _find_wrong_sizes(label: str, kind: ObjectConfig) -> Iterator[tuple[str, str]]:
-    """Yield height and radius where they are not the model's, with a sentence.
+    """Yield `height` or `radius`, with a sentence, for each declared size that differs from the model.
 
-    Everything that is known of an object's place hangs on them: where its middle is, where its surface,
-    what is free beside it. A model without a mesh cannot be measured.
+    Centre, surface and free space of an object follow from these sizes. A model without a mesh cannot be
+    measured.
     """
     try:
         mesh = load_mesh(kind)
@@ -160,15 +160,15 @@ def _find_wrong_sizes(label: str, kind: ObjectConfig) -> Iterator[tuple[str, str
 
 @lru_cache(maxsize=64)
 def upright(config: ObjectConfig) -> Pose:
-    """Return `X_OL`: how the model's own frame L lies in the object's frame O.
+    """Return `X_OL`, the pose of the frame L of the model file in the frame O of the upright object.
 
-    A URDF keeps its origin. A mesh has it anywhere; there O stands in the middle of the extents.
+    O has the origin of a URDF; for a mesh, whose origin is arbitrary, O is in the centre of the bounding box.
     """
-    turned = Pose(_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
+    rotated = Pose(_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
     if not config.mesh:
-        return turned
-    corners = turned.apply(read_obj(find_model(config.mesh))[0] * config.scale)
-    return Pose(turned.rotation, -(corners.min(axis=0) + corners.max(axis=0)) / 2)
+        return rotated
+    corners = rotated.apply(read_obj(find_model(config.mesh))[0] * config.scale)
+    return Pose(rotated.rotation, -(corners.min(axis=0) + corners.max(axis=0)) / 2)
 
 
 @lru_cache(maxsize=64)
@@ -176,7 +176,7 @@ def load_mesh(config: ObjectConfig) -> Mesh:
     """Return the visual mesh of a class of objects, scaled and upright.
 
     Raises:
-        InputError: The model has no mesh in Wavefront format to look at.
+        InputError: The model has no visual mesh in Wavefront format.
     """
     if config.mesh:
         corners, faces = read_obj(find_model(config.mesh))
@@ -202,7 +202,7 @@ def load_mesh(config: ObjectConfig) -> Mesh:
 
 
 def _rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation of URDF's fixed-axis angles [rad]: about x, then y, then z."""
+    """Return the rotation matrix of the fixed-axis angles of a URDF [rad]: about x, then y, then z."""
     (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
     about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
     about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])

@@ -1,4 +1,4 @@
-"""Places and poses of a cell file that cannot serve: out of reach, too near to something, without a view."""
+"""Checks of places and poses of a cell file: reach, clearance and view of the cameras."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ POINTS_PER_SIDE = 9
 
 
 def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield a key of the cell file and a sentence for every place the tool has to go to and cannot.
+    """Yield key and sentence for each place of the cell file that the tool cannot reach.
 
-    Asked for are every drop slot of every bin and the safe place, from travel height down to where a load is
-    let go in one posture, and every named pose within the joint limits.
+    The tool must reach each drop slot of each bin and the safe place, from travel height down to the release
+    height in one posture; each named pose must be within the joint limits.
     """
     planner = build_planner(config)
     load = max(kind.height for kind in config.objects.values())
@@ -50,14 +50,14 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
 
 
 def find_unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield a key of the cell file and a sentence for every pose that cannot serve.
+    """Yield key and sentence for each pose of the cell file without clearance or view.
 
-    No named pose may bring arm or tool nearer to table, bins or the arm itself than the margin, for there
-    is no motion to it then; and from every scan pose the camera must see the whole workspace.
+    In each named pose, arm and tool must keep the margin to table, bins and the arm itself, because otherwise
+    no motion reaches the pose. From each scan pose the camera must see the whole workspace.
     """
     with contextlib.closing(PathClearance(config)) as clearance:
         for name, pose in config.arm.poses_deg.items():
-            near = clearance.too_near(np.radians(pose))
+            near = clearance.find_violation(np.radians(pose))
             if near:
                 yield (
                     ("arm", "poses_deg", name),
@@ -67,7 +67,7 @@ def find_unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _find_blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the scan poses and the bins that keep a camera from seeing the whole workspace."""
+    """Yield key and sentence for scan poses and bins that hide a part of the workspace from a camera."""
     planner = build_planner(config)
     shadow = ArmShadow(SimArm(world, planner, config, StepClock(lambda: 0.0)), planner.kinematics, config)
     for name, camera in config.cameras.items():

@@ -1,4 +1,4 @@
-"""Rebuilding a simulated world as it stood when the run that drove it was cut off."""
+"""Reconstruction of a simulated world at the interruption of its run, from the command log."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from executive.motion.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)
-class UnderWay:
-    """What the arm was doing when nobody commanded it any more.
+class InterruptedArm:
+    """Motion of the arm at the interruption of a run.
 
     Attributes:
         command: Joint positions of the last command before the last physics step `(n,)` [rad].
-        motion: The motion it followed, or None.
-        time: How far on that path it was [s].
+        motion: The motion of the arm, or None.
+        time: Time since the start of the motion [s].
         steps: Number of control steps of the run.
         last_command: Control step of the last command to arm or tool; 0 if there was none.
     """
@@ -40,12 +40,12 @@ class UnderWay:
 
 
 class Rebuilding:
-    """Does to a world, fresh from the same cell file and seed, one by one what was done to another one.
+    """Repeats the commands to a recorded world in a new world with the same cell file and seed.
 
-    After each command the world is to the last bit what the other one was then.
+    After each command the new world is bitwise equal to the recorded world after that command.
 
     Args:
-        world: The fresh world.
+        world: The new world.
         tool: The tool on its arm.
     """
 
@@ -56,22 +56,22 @@ class Rebuilding:
         self._time = 0.0
         self._steps = self._last_command = 0
         self._stepped: tuple[Array, float] | None = None
-        """Command before the last physics step, and its time; None if no command has followed the step."""
+        """Command before the last physics step, and its time; None if no command followed the step."""
 
     @property
-    def under_way(self) -> UnderWay:
-        """What the arm was following: as a controller that lost its master, it is to brake on its path.
+    def interrupted(self) -> InterruptedArm:
+        """Motion of the arm, on whose path it is to brake, as a controller does without new commands.
 
-        If no physics step has followed the last command, the command before it counts: the arm would
-        otherwise move by two steps at once, which may tear a load off the cup.
+        If no physics step followed the last command, the previous command is used. Otherwise the arm would
+        move by two steps at once, which may tear a load off the cup.
         """
         command, time = self._command, self._time
         if self._stepped and self._motion is not None:
             command, time = self._stepped
-        return UnderWay(command, self._motion, time, self._steps, self._last_command)
+        return InterruptedArm(command, self._motion, time, self._steps, self._last_command)
 
     def do(self, command: Command) -> None:
-        """Do the next command."""
+        """Execute the next command."""
         kind, numbers, _ = command
         if kind in (log.MOTION, log.CLOSE, log.OPEN):
             self._last_command = self._steps
@@ -99,20 +99,20 @@ class Rebuilding:
             {log.CLOSE: tool.close, log.OPEN: tool.open, log.PART: tool.part}[kind]()
 
 
-def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> UnderWay:
-    """Do all commands to a fresh world, and return what the arm was following when nobody commanded it."""
+def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> InterruptedArm:
+    """Execute all commands in a new world, and return the motion of the arm at the interruption."""
     rebuilding = Rebuilding(world, tool)
     for command in commands:
         rebuilding.do(command)
-    return rebuilding.under_way
+    return rebuilding.interrupted
 
 
 class SampledPiece:
-    """A piece between given states: polynomials of fifth degree that agree with them; implements `Piece`.
+    """Quintic spline through given states; implements `Piece`.
 
     Args:
-        states: Every `STEP`, and at the end; each array of shape `(N, n)`.
-        duration: Time it takes [s].
+        states: States at every `STEP` and at the end; each array has the shape `(N, n)`.
+        duration: Duration of the piece [s].
     """
 
     def __init__(self, states: JointState, duration: float) -> None:
@@ -130,7 +130,7 @@ class SampledPiece:
 
     @cached_property
     def _curves(self) -> tuple[BPoly, BPoly, BPoly]:
-        if len(self._times) == 1:  # a motion to where the arm is: it takes no time
+        if len(self._times) == 1:  # a motion of duration 0
             q = BPoly(self._states.q[None], [0.0, 1.0])
         else:
             q = BPoly.from_derivatives(self._times, np.stack(self._states, axis=1))
@@ -138,5 +138,5 @@ class SampledPiece:
 
 
 def join_samples(states: JointState, duration: float, guarded: float = math.inf) -> Trajectory:
-    """Return the motion that `Trajectory.samples` gave these states of."""
+    """Return the motion of which `Trajectory.samples` returned these states."""
     return Trajectory([SampledPiece(states, duration)], guarded)

@@ -1,4 +1,4 @@
-"""Pictures of a recorded world, taken while it is rebuilt, in several processes."""
+"""Pictures of a recorded world, rendered during its reconstruction in several processes."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ from executive.cells.sim.viewpoint import Viewpoint
 from executive.processes import Workers
 
 FILM_LIGHT = Light(direction=(0.5, -0.6, 1.2), ambient=0.6, diffuse=0.4, shadow=True)
-"""A lamp that lets things stand out from each other: from the right, and with shadows."""
+"""Light with contrast between objects: from the right, with shadows."""
 SKY, GROUND = (226, 231, 237), (172, 182, 194)
-"""Colours at the top and at the bottom of what is behind the cell, RGB."""
+"""Colours of the background at the top and at the bottom, RGB, each 0 to 255."""
 MIN_EDGE_CONTRAST = 24
-"""Difference of brightness between neighbours from which there is an edge, of 255."""
+"""Smallest difference in brightness between neighbouring pixels at an edge, of 255."""
 PICTURES_PER_BLOCK = 24
-"""Pictures that a process takes in one world; each block does again what was done before it."""
+"""Number of pictures per block; each block has a world of its own and repeats all earlier commands."""
 PICTURES_IN_FIRST_BLOCK = 2
-"""Pictures of the first block, so that the first picture comes soon."""
+"""Number of pictures of the first block, which is small so that the first picture is early."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shoot:
-    """What pictures are taken of.
+    """Run and viewpoint of pictures.
 
     Attributes:
-        config: The cell.
-        seed: That of the run.
-        log: What was done to its world.
-        viewpoint: Where it is looked at from.
-        scene: The scene file of the run, or None. Its light is the cameras' alone.
+        config: The cell file of the run.
+        seed: Seed of the run.
+        log: Command log of the world.
+        viewpoint: Viewpoint of the pictures.
+        scene: Scene file of the run, or None. Its light does not affect the pictures.
     """
 
     config: CellConfig
@@ -54,7 +54,7 @@ class Shoot:
 
 
 def count_steps(log: Path) -> int:
-    """Return how many control steps of a run the log of its world tells of.
+    """Return the number of control steps of a run in the command log of its world.
 
     Raises:
         InputError: There is no such log.
@@ -63,37 +63,37 @@ def count_steps(log: Path) -> int:
 
 
 def take_pictures(shoot: Shoot, steps: Sequence[int], workers: int) -> Generator[Image, None, None]:
-    """Yield pictures `(h, w, 3)` uint8 RGB of the world after so many control steps of the run, in order.
+    """Yield pictures `(h, w, 3)` uint8 RGB of the world after the given control steps of the run, in order.
 
     Args:
-        shoot: What they are taken of.
-        steps: After how many steps, ascending.
-        workers: Processes that take them.
+        shoot: Run and viewpoint.
+        steps: Numbers of control steps, ascending.
+        workers: Number of processes.
     """
     bounds = [0, *range(PICTURES_IN_FIRST_BLOCK, len(steps), PICTURES_PER_BLOCK), len(steps)]
     blocks = [steps[first:end] for first, end in pairwise(bounds)]
     with Workers(workers) as pool:
-        under_way: deque[Future[list[Image]]] = deque()
-        # No more at a time than keeps everybody busy: pictures that nobody fetches yet fill the memory.
+        pending: deque[Future[list[Image]]] = deque()
+        # The number of pending blocks is limited, because waiting pictures occupy memory.
         for block in blocks:
-            under_way.append(pool.submit(_take, shoot, block))
-            if len(under_way) > workers:
-                yield from under_way.popleft().result()
-        while under_way:
-            yield from under_way.popleft().result()
+            pending.append(pool.submit(_take, shoot, block))
+            if len(pending) > workers:
+                yield from pending.popleft().result()
+        while pending:
+            yield from pending.popleft().result()
 
 
 def _take(shoot: Shoot, steps: Sequence[int]) -> list[Image]:
-    """Take the pictures after these steps; runs in a process of its own."""
+    """Return the pictures after these steps; runs in a process of its own."""
     return list(take_pictures_in_order(shoot, steps))
 
 
 def take_pictures_in_order(shoot: Shoot, steps: Sequence[int]) -> Iterator[Image]:
-    """Yield the pictures of `take_pictures`, taken in one world in this process."""
+    """Yield the pictures of `take_pictures`, rendered in one world in this process."""
     scene = load_scene(shoot.scene, shoot.config)
     world, viewpoint = first_world(shoot.config, shoot.seed, scene=scene), shoot.viewpoint
     try:
-        # The floor's pattern would draw the eye; what is transparent is not drawn.
+        # The distracting pattern of the floor is hidden: transparent bodies are not rendered.
         world.client.changeVisualShape(world.plane, -1, rgbaColor=[1, 1, 1, 0])
         rebuilding = Rebuilding(world, SuctionTool(world, shoot.config.tool))
         commands = read_commands(shoot.log)
@@ -103,15 +103,15 @@ def take_pictures_in_order(shoot: Shoot, steps: Sequence[int]) -> Iterator[Image
                 command = next(commands)
                 rebuilding.do(command)
                 done += command.kind == STEP
-            yield _picture(
+            yield _compose_picture(
                 render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, *viewpoint.size), FILM_LIGHT)
             )
     finally:
         world.close()
 
 
-def _picture(rendered: Render) -> Image:
-    """Return what was rendered before an even background, its edges smoothed: the renderer leaves steps."""
+def _compose_picture(rendered: Render) -> Image:
+    """Return a rendered image with a background and smooth edges; the renderer has no antialiasing."""
     height = len(rendered.image)
     share = np.linspace(0, 1, height)[:, None, None]
     backdrop = (1 - share) * np.array(SKY) + share * np.array(GROUND)

@@ -1,4 +1,4 @@
-"""The world that a run begins with: its seeds, and random objects at rest, some on top of others."""
+"""Initial world of a run: random seeds, and random objects at rest, some of them stacked."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose, about_z
 
 MAX_PLACE_ATTEMPTS = 2000
-"""Places tried for one set of objects before the workspace counts as too small for it."""
+"""Maximum number of places tried for one set of objects; then the workspace counts as too small."""
 LAYOUT_COUNT = 5
 """Number of random sets of objects tried before `find_lack_of_room` reports a lack of room."""
 DROP_HEIGHT = 0.002
-"""Height over what carries it at which an object is let go [m]."""
+"""Height above its support at which an object is released [m]."""
 MAX_REST_SPEED = 0.002
-"""Speed under which an object counts as still [m/s]."""
+"""Speed below which an object counts as at rest [m/s]."""
 MIN_SETTLING_STEPS, MAX_SETTLING_STEPS = 60, 480
-"""Physics steps given to settle: at least, for nothing moves in the first ones, and at most."""
+"""Smallest and largest number of physics steps for settling; in the first steps objects are slow."""
 MAX_STACK_OFFSET = 0.004
-"""Largest distance of an object's axis from that of the one it is put on, along x and y [m]."""
+"""Largest offset between the axes of two stacked objects, along x and y [m]."""
 NUDGE_SPEED = 0.1
-"""Speed at which it is pushed aside to see whether it stays [m/s]; friction stops that within 1 mm."""
+"""Speed of the sideways push that tests a stack [m/s]; friction stops a stable object within 1 mm."""
 MAX_SHIFT = 0.005
 """Distance beyond which an object counts as moved [m]."""
 
@@ -41,9 +41,9 @@ class PartSeeds:
     """Random seeds of the parts of a simulated cell.
 
     Attributes:
-        objects: Decides which objects lie where.
-        camera: Decides the camera's noise.
-        detectors: Decides what detectors leave to chance.
+        objects: Seed of the objects and their poses.
+        camera: Seed of the noise of the camera.
+        detectors: Seed of the random numbers of detectors.
     """
 
     objects: int
@@ -52,7 +52,7 @@ class PartSeeds:
 
     @staticmethod
     def of(seed: int) -> PartSeeds:
-        """Return the seeds that follow from a run's."""
+        """Return the seeds of the parts for the seed of a run."""
         parts = np.random.SeedSequence(seed).spawn(3)
         return PartSeeds(*(int(part.generate_state(1)[0]) for part in parts))
 
@@ -60,9 +60,9 @@ class PartSeeds:
 def first_world(
     config: CellConfig, seed: int, *, gui: bool = False, scene: SceneConfig = DECLARED_SCENE
 ) -> World:
-    """Return the world as a run of this seed finds it: arm at `home`, its objects at rest on the table.
+    """Return the initial world of a run with this seed: arm at `home`, objects at rest on the table.
 
-    The attribute `config` of the world is the cell as the scene changes it.
+    The attribute `config` of the world is the cell with the changes of the scene.
 
     Raises:
         InputError: The workspace has no room for the objects.
@@ -81,17 +81,17 @@ def spawn(
     count: int | None = None,
     unknown: UnknownConfig | None = None,
 ) -> tuple[int, ...]:
-    """Put objects on the table, let them come to rest and return their bodies.
+    """Put objects on the table, step until they are at rest, and return the bodies.
 
     Args:
-        world: Where they go.
-        config: Says how many, which classes and where.
-        seed: Decides everything random.
-        count: How many, or None for a random number in the cell file's range.
-        unknown: Objects of no class that lie beside them; None: none do.
+        world: The world of the objects.
+        config: The cell file.
+        seed: Seed of all random choices.
+        count: Number of objects; None: random, in the range of the cell file.
+        unknown: Additional objects without a class; None: none.
 
     Raises:
-        InputError: The workspace has no room for so many.
+        InputError: The workspace has no room for the objects.
     """
     rng = np.random.default_rng(seed)
     table = config.table
@@ -138,9 +138,9 @@ def find_max_count(config: CellConfig, most: int) -> int:
 
 
 def _places(config: CellConfig, radii: Sequence[float], rng: np.random.Generator) -> list[Array]:
-    """Return places `(2,)` [m] for outlines of these radii [m] that keep the gap.
+    """Return random places `(2,)` [m] for outlines of these radii [m], with the gap between them.
 
-    The whole set is drawn again when one gets stuck.
+    All places are drawn again if an outline finds no place.
     """
     low, high = np.array([config.table.x, config.table.y]).T
     places: list[Array] = []
@@ -161,17 +161,16 @@ def _places(config: CellConfig, radii: Sequence[float], rng: np.random.Generator
 
 
 def _stack(world: World, bodies: Sequence[int], share: float, rng: np.random.Generator) -> None:
-    """Put each object on another one with probability `share`, if there is one that carries it.
+    """Put each object on another one with probability `share`, if another one can carry it.
 
-    Which others do is found out by trying: what falls, also when nudged, is put back where it lay, and all
-    else too. So a ball is carried by nothing and carries nothing. No object gets on one that lies on
-    another, and none has two on top.
+    A simulation tests each stack: if the upper object falls, with or without a push, all objects return to
+    their poses. Balls are therefore never stacked. A stack has two objects.
 
     Args:
-        world: Where they lie, at rest.
+        world: The world with the objects at rest.
         bodies: The objects.
-        share: 0 to 1.
-        rng: Decides which, where, and how they are turned.
+        share: Probability, 0 to 1.
+        rng: Random number generator.
     """
     free = set(bodies)
     for upper in bodies:
@@ -184,7 +183,7 @@ def _stack(world: World, bodies: Sequence[int], share: float, rng: np.random.Gen
 
 
 def _put_on(world: World, upper: int, lower: int, rng: np.random.Generator) -> bool:
-    """Put one object on another, and tell whether it stayed; if not, all is again as it was."""
+    """Put one object on another, and return True if it stays; otherwise restore all poses."""
     before = {body: world.object_pose(body) for body in world.bodies}
     base = before[lower].position
     below, above = (load_mesh(world.models[body]) for body in (lower, upper))
@@ -206,17 +205,17 @@ def _put_on(world: World, upper: int, lower: int, rng: np.random.Generator) -> b
 
 
 def _has_moved(world: World, goal: Mapping[int, Pose]) -> bool:
-    """Tell whether any body is far from where it should be."""
+    """Return True if any body is farther than `MAX_SHIFT` from its goal."""
     return any(
         float(np.linalg.norm(world.object_pose(body).position - X_WO.position)) > MAX_SHIFT
         for body, X_WO in goal.items()
     )
 
 
-def _come_to_rest(world: World, bodies: Sequence[int], enough: Callable[[], bool] = lambda: False) -> None:
-    """Step until every body has come to rest, or for two seconds, or until `enough` holds."""
+def _come_to_rest(world: World, bodies: Sequence[int], is_done: Callable[[], bool] = lambda: False) -> None:
+    """Step until all bodies are at rest or `is_done` returns True, at most for `MAX_SETTLING_STEPS`."""
     for step in range(MAX_SETTLING_STEPS):
         world.step()
         speeds = [np.linalg.norm(world.client.getBaseVelocity(body)[0]) for body in bodies]
-        if (step >= MIN_SETTLING_STEPS and max(speeds, default=0.0) < MAX_REST_SPEED) or enough():
+        if (step >= MIN_SETTLING_STEPS and max(speeds, default=0.0) < MAX_REST_SPEED) or is_done():
             return

@@ -1,4 +1,4 @@
-"""How well a suction cup would seal on what lies under it, and the force that seal bears."""
+"""Contact model of the suction cup: geometry of the contact, and breakaway force of the seal."""
 
 from __future__ import annotations
 
@@ -14,21 +14,20 @@ from executive.cell.config import ToolConfig
 from executive.geometry import Array, Pose
 
 RIM_RAY_COUNT = 16
-"""Rays around the lip; half as many on a ring at half its radius, one at the centre."""
+"""Number of rays at the rim; half as many are on a ring at half the radius, and one at the centre."""
 
 
 @dataclass(frozen=True)
 class CupContact:
-    """How a cup meets the surface under it.
+    """Geometry of the contact between the cup and the surface under it.
 
     Attributes:
         body: The simulator's id of the nearest body under the cup.
-        distance: From the cup's face to the nearest point of that body, along the tool axis [m].
-        gap: Largest distance left between rim and surface once the cup has come down to the first
-            contact and its bellows has leant with the surface [m]; infinite where part of the cup is
-            not over the body.
+        distance: Distance from the face of the cup to the nearest point of the body, along the tool axis [m].
+        gap: Largest distance between rim and surface after the cup has reached the first contact and its
+            bellows has tilted with the surface [m]; infinite if part of the cup is not over the body.
         tilt: Angle between the tool axis and the normal of the plane fitted to the surface under the
-            cup [rad]: how far the bellows had to lean.
+            cup [rad]; the bellows tilts by this angle.
     """
 
     body: int
@@ -40,57 +39,56 @@ class CupContact:
 def measure_contact(
     client: Any, X_WT: Pose, bodies: Collection[int], cup_radius: float, reach: float
 ) -> CupContact | None:
-    """Return how a cup at `X_WT` would seal on the nearest of `bodies`, or None over none of them.
+    """Return the contact of a cup at `X_WT` with the nearest of `bodies`, or None if none is under the cup.
 
-    Rays run along the tool axis against the collision shapes, through every other body. They start
-    `reach` behind the lip, because a cup in contact is a little inside of what it touches, and end
-    `reach` and a cup's width before it: steeper than that no lip can lie.
+    Rays along the tool axis hit the collision shapes of `bodies` and pass through all other bodies. They
+    start `reach` behind the lip, because a cup in contact penetrates the surface a little, and end `reach`
+    plus the diameter of the cup in front of the lip, because no lip can lie on a steeper surface.
 
     Args:
         client: The pybullet client that holds the bodies.
-        X_WT: Pose of the lip's centre, z along the tool axis into the object.
-        bodies: Ids of the bodies that can be sealed on.
+        X_WT: Pose of the centre of the lip, z along the tool axis into the object.
+        bodies: Ids of the bodies to which the cup can seal.
         cup_radius: Radius of the lip [m].
-        reach: Largest distance at which a lip still closes on a surface [m].
+        reach: Largest distance from a surface at which the lip still seals [m].
     """
-    face = _face(cup_radius)
-    hits, heights = _cast(client, X_WT, bodies, face, reach, reach + 2 * cup_radius)
+    face = _sample_face(cup_radius)
+    hits, heights = _cast_rays(client, X_WT, bodies, face, reach, reach + 2 * cup_radius)
     nearest = int(np.argmin(heights))
     if not math.isfinite(heights[nearest]):
         return None
     body = int(hits[nearest])
-    met = hits == body
-    points = np.column_stack([face[met], np.ones(np.count_nonzero(met))])
-    (slope_x, slope_y, level), *_ = np.linalg.lstsq(points, heights[met], rcond=None)
+    is_hit = hits == body
+    points = np.column_stack([face[is_hit], np.ones(np.count_nonzero(is_hit))])
+    (slope_x, slope_y, level), *_ = np.linalg.lstsq(points, heights[is_hit], rcond=None)
     tilt = math.atan(math.hypot(slope_x, slope_y))
     gap = math.inf
-    if met.all():
+    if is_hit.all():
         residual = (heights - points @ (slope_x, slope_y, level)) * math.cos(tilt)
         gap = float(residual[-RIM_RAY_COUNT:].max() - residual.min())
     return CupContact(body, float(heights[nearest]), gap, tilt)
 
 
 def breakaway_force(seal: CupContact | None, tool: ToolConfig) -> float:
-    """Return the pull at which the seal lets go [N]; 0 where none forms.
+    """Return the pull at which the seal breaks [N]; 0 if none forms.
 
     `force * (1 - gap / gap_max) * (1 - tilt / tilt_max)`, clipped at zero. The full force is vacuum
-    times lip area. A gap is bridged by the lip's compliance, whose contact pressure falls, and whose
-    leak grows, in proportion to how far it must bend: at `gap_max` nothing presses it on. A tilt
-    is taken up by bending the bellows, which loads one side of the lip and peels the other. Both are
-    first-order terms of independent causes, hence linear and multiplied; cup makers publish only the
-    two ends (full force on a flat face, largest bend). Inside a seal the force is continuous, so
-    a slightly worse grasp is slightly weaker and nothing hinges on a threshold in geometry.
+    times lip area. The compliant lip bridges a gap; its contact pressure falls and its leak grows in
+    proportion to its deflection, and at `gap_max` the pressure is zero. The bellows bends to compensate a
+    tilt, which loads one side of the lip and peels the other. Both are first-order terms of independent
+    causes, hence linear and multiplied; manufacturers publish only the two ends (full force on a flat
+    surface, largest bend). The force is continuous: a slightly worse grasp is slightly weaker.
     """
     if seal is None or seal.distance > tool.reach:
         return 0.0
-    bent = max(0.0, 1.0 - seal.gap / tool.gap)
-    leaning = max(0.0, 1.0 - seal.tilt / math.radians(tool.tilt_deg))
-    return tool.force * bent * leaning
+    gap_factor = max(0.0, 1.0 - seal.gap / tool.gap)
+    tilt_factor = max(0.0, 1.0 - seal.tilt / math.radians(tool.tilt_deg))
+    return tool.force * gap_factor * tilt_factor
 
 
 @lru_cache(maxsize=16)
-def _face(cup_radius: float) -> Array:
-    """Return where the rays pass the cup's face `(N, 2)` [m]: the centre, a ring, then the rim."""
+def _sample_face(cup_radius: float) -> Array:
+    """Return the points of the rays on the face of the cup `(N, 2)` [m]: centre, inner ring, rim."""
 
     def ring(radius: float, count: int) -> Array:
         angle = 2 * np.pi * np.arange(count) / count
@@ -101,10 +99,10 @@ def _face(cup_radius: float) -> Array:
     )
 
 
-def _cast(
+def _cast_rays(
     client: Any, X_WT: Pose, bodies: Collection[int], face: Array, behind: float, before: float
 ) -> tuple[Array, Array]:
-    """Return the body `(N,)` (-1 for none) that each ray meets first and its height `(N,)` [m] over it."""
+    """Return the nearest of `bodies` on each ray `(N,)`, or -1, and its distance from the face `(N,)` [m]."""
     count = len(face)
     hits, heights = np.full(count, -1), np.full(count, np.inf)
     starts = X_WT.apply(np.column_stack([face, np.full(count, -behind)]))
@@ -112,8 +110,8 @@ def _cast(
     pending = np.arange(count)
     layer = 0
     while pending.size:
-        # The rays start inside the tool, which they meet first. Starting them anew behind what does not
-        # count would not do: Bullet's rays end at once on a surface less than a millimetre ahead.
+        # The rays start inside the tool and hit it first. Rays that start behind an ignored surface would
+        # not help: Bullet's rays end at once on a surface less than a millimetre ahead.
         answers = client.rayTestBatch(starts[pending].tolist(), ends[pending].tolist(), reportHitNumber=layer)
         for ray, (body, _, fraction, *_) in zip(pending, answers, strict=True):
             height = fraction * (behind + before) - behind

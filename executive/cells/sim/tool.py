@@ -1,4 +1,4 @@
-"""The suction tool in simulation: it holds by a seal whose strength the contact decides."""
+"""Simulated suction tool; the contact determines the breakaway force of its seal."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 
 TOUCH_DISTANCE = 0.001
-"""Distance at which the soft lip already feels a surface [m]."""
+"""Largest distance from a surface at which the soft lip detects it [m]."""
 LIP_LENGTH = 0.002
-"""Length of the tool's end that is lip: contact further back is the shaft's [m]."""
+"""Length of the lip at the end of the tool [m]; contacts further back are contacts of the shaft."""
 PULL_SMOOTHING = 0.25
-"""Weight of the newest step in the pull on the seal.
+"""Weight of the newest step in the low-pass filter of the pull on the seal.
 
-A time constant of 3.5 steps or 14 ms: a seal gives way over milliseconds, while the solver's impact
-forces last a single step.
+The time constant is 3.5 steps or 14 ms: a seal breaks over milliseconds, while impact forces of the solver
+last a single step.
 """
 
 
 @dataclass
 class _Grip:
-    """Something sealed to the cup: its body, the constraint, the pull it bears and the pull on it [N]."""
+    """Body at the cup: its id, its constraint, breakaway force of the seal and filtered pull on it [N]."""
 
     body: int
     constraint: int
@@ -37,15 +37,14 @@ class _Grip:
 
 
 class SuctionTool:
-    """A `Tool` on the arm of a `World`; whoever steps the world calls `advance` after every step.
+    """A `Tool` on the arm of a `World`; `advance` is called after every physics step.
 
-    What is sealed on keeps the pose it had at contact, until the low-passed pull on the seal exceeds
-    its breakaway force. Moments count for nothing. A seal that has given way forms again only after
-    cup and object have parted or the vacuum was off: the object is still within reach at that moment,
-    but moving away.
+    A held body keeps its pose relative to the tool until the filtered pull on the seal exceeds the
+    breakaway force. Moments have no effect. A broken seal forms again only after cup and object have
+    separated or the vacuum was off, because right after the break the object is still within reach.
 
     Attributes:
-        fallen: Bodies whose last seal gave way: the truth, as `held_body`.
+        fallen: Bodies whose last seal broke; ground truth, as `held_body`.
     """
 
     def __init__(self, world: World, config: ToolConfig) -> None:
@@ -59,75 +58,75 @@ class SuctionTool:
 
     @property
     def touching(self) -> bool:
-        """True while the lip is within 1 mm of anything, as of the last physics step."""
+        """True if the lip was within 1 mm of any body after the last physics step."""
         step, felt = self._felt
         if step != self._world.steps:
-            felt = any(True for _ in self._near(TOUCH_DISTANCE))
+            felt = any(True for _ in self._find_near(TOUCH_DISTANCE))
             self._felt = (self._world.steps, felt)
         return felt
 
     @property
     def holding(self) -> bool:
-        """True while the vacuum says that something is sealed to the cup."""
+        """True while the vacuum indicates a held object."""
         return self._grip is not None
 
     @property
     def bears(self) -> float:
-        """The pull that the seal bears, as the vacuum gauge tells [N]; 0 while nothing is held."""
+        """Breakaway force of the seal, from the vacuum gauge [N]; 0 while nothing is held."""
         return 0.0 if self._grip is None else self._grip.bears
 
     @property
     def held_body(self) -> int | None:
-        """The simulator's id of what is held: the truth, for tests and the audit, never for skills."""
+        """The simulator's id of the held body or None; ground truth for tests and audit, never for skills."""
         return None if self._grip is None else self._grip.body
 
     @property
     def pull(self) -> float:
-        """The low-passed pull on the seal [N], 0 when nothing is held; the truth, as `held_body`."""
+        """Filtered pull on the seal [N], 0 while nothing is held; ground truth, as `held_body`."""
         return 0.0 if self._grip is None else float(np.linalg.norm(self._grip.pull))
 
     def close(self) -> None:
-        """Switch the vacuum on: what is within reach is sealed on if the seal bears enough."""
+        """Switch the vacuum on, and hold a body within reach if its seal is strong enough."""
         self._world.log.note(command_log.CLOSE)
         self._vacuum = True
         if self._grip is None:
             self._seal()
 
     def open(self) -> None:
-        """Let go and switch the vacuum off."""
+        """Release the held body and switch the vacuum off."""
         self._world.log.note(command_log.OPEN)
         self._vacuum = False
         self._parting = None
         if self._grip is not None:
             body = self._grip.body
             self._world.stood.setdefault(body, []).append(self._world.object_pose(body).position)
-        self._let_go()
+        self._release()
 
     def part(self) -> None:
-        """Let the seal give way, as it does under too much pull; what hung there falls."""
+        """Break the seal, as too large a pull does; the held body falls."""
         self._world.log.note(command_log.PART)
         if self._grip is not None:
             self._parting = self._grip.body
             self.fallen.add(self._grip.body)
-            self._let_go()
+            self._release()
 
     def advance(self) -> None:
-        """Bring the seal up to date with the physics step just made."""
+        """Update the seal after a physics step."""
         if self._grip is not None:
-            self._bear(self._grip)
+            self._check_pull(self._grip)
         elif self._vacuum:
             self._seal()
 
-    def _bear(self, grip: _Grip) -> None:
-        """Low-pass the pull on the seal, and part when it is more than the seal bears."""
+    def _check_pull(self, grip: _Grip) -> None:
+        """Filter the pull on the seal, and break the seal if the pull exceeds the breakaway force."""
         force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
         grip.pull += PULL_SMOOTHING * (force - grip.pull)
         if float(np.linalg.norm(grip.pull)) > grip.bears:
             self.part()
 
     def _seal(self) -> None:
-        """Seal the cup to what is within reach, if anything is and the seal bears enough."""
-        near = set(self._near(self._config.reach))
+        """Hold a body within reach if its seal is strong enough."""
+        near = set(self._find_near(self._config.reach))
         if self._parting not in near:
             self._parting = None
         movable = near & self._world.bodies.keys() - {self._parting}
@@ -139,11 +138,11 @@ class SuctionTool:
         if seal is not None and bears >= config.least_force:
             self.fallen.discard(seal.body)
             self._grip = _Grip(seal.body, self._attach(seal.body), bears)
-            # Held a hair's breadth inside the cup, the pair would push against the constraint.
-            self._collide(seal.body, False)
+            # Cup and body overlap slightly; their contact forces would act against the constraint.
+            self._set_collision(seal.body, False)
 
     def _attach(self, body: int) -> int:
-        """Fix the body to the tool where it is; the frames of a constraint are those of the CoMs."""
+        """Fix the body to the tool at its current pose; frames of constraints lie in the centres of mass."""
         world = self._world
         X_WI = Pose.of(*world.client.getLinkState(world.arm, world.tool, computeForwardKinematics=True)[:2])
         X_IB = X_WI.inverse() @ Pose.of(*world.client.getBasePositionAndOrientation(body))
@@ -154,20 +153,20 @@ class SuctionTool:
             )
         )  # fmt: skip
 
-    def _let_go(self) -> None:
+    def _release(self) -> None:
         if self._grip is None:
             return
         self._world.client.removeConstraint(self._grip.constraint)
-        self._collide(self._grip.body, True)
+        self._set_collision(self._grip.body, True)
         self._grip = None
 
-    def _collide(self, body: int, enabled: bool) -> None:
+    def _set_collision(self, body: int, enabled: bool) -> None:
         self._world.client.setCollisionFilterPair(self._world.arm, body, self._world.tool, -1, int(enabled))
 
-    def _near(self, distance: float) -> Iterator[int]:
-        """Yield every body but the arm that is within `distance` [m] of the lip.
+    def _find_near(self, distance: float) -> Iterator[int]:
+        """Yield every body except the arm within `distance` [m] of the lip.
 
-        The broad phase answers first (3 us), so a tool in the air costs next to nothing.
+        The broad phase runs first (3 us), so the call is cheap while the tool is in the air.
         """
         world = self._world
         low, high = world.client.getAABB(world.arm, world.tool)

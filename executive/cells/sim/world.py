@@ -1,7 +1,7 @@
 """The simulated world of a cell: arm with tool, table, bins and loose objects in PyBullet.
 
-The world frame W stands at the foot of the arm, on the table top. Rebuilding a world from the same
-cell file and adding the same objects in the same order gives the same bits.
+The world frame W is at the base of the arm, on the table top. The same cell file and the same objects in
+the same order give bitwise the same world.
 """
 
 from __future__ import annotations
@@ -26,41 +26,41 @@ from executive.cells.sim.table_top import TableTop
 from executive.geometry import Array, Pose
 
 TABLE_HEIGHT = 0.625
-"""Height of the top of pybullet_data's table over its feet [m]."""
+"""Height of the table top of pybullet_data's table above its feet [m]."""
 TABLE_CENTRE = (0.40, 0.0)
 """Centre of the table top [m]; it is 1.0 m long along x and 1.5 m along y."""
 CYLINDER_MARGIN = 0.001
-"""What Bullet adds all around a URDF's cylinder when it collides [m]."""
+"""Collision margin that Bullet adds on all sides to a cylinder of a URDF [m]."""
 TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
 RAY_LENGTH, RAY_STEP = 5.0, 1e-4
-"""Length of a ray, and the distance behind the arm's surface at which it goes on [m]."""
+"""Length of a ray, and distance behind a surface of the arm at which the ray continues [m]."""
 
 
 class World:
-    """A PyBullet world with everything a cell file describes, arm at `home`, no objects yet.
+    """A PyBullet world with the content of a cell file, the arm at `home`, without objects.
 
     Args:
         config: The cell file.
-        gui: Show it in a window.
-        visuals: Load what is to be seen; without it a world is made in half the time, and no camera sees it.
+        gui: True shows the world in a window.
+        visuals: False loads no visual shapes, which halves the loading time; cameras then see nothing.
 
     Attributes:
         client: The connection to the physics server.
         arm: Body of the arm, fixed at the origin.
         robot: Model of the arm.
         flange: Index of the link with the flange.
-        tool: Index of the tool's link, whose frame is the flange's.
-        table, plane: Bodies of the table and of the floor under it.
+        tool: Index of the link of the tool, whose frame is that of the flange.
+        table, plane: Bodies of the table and of the floor under the table.
         table_top: The surface of the table.
         bins: Bodies of each bin.
         bodies: Label of every loose object, by body.
         models: Model of every loose object, by body.
-        steps: Physics steps made so far.
-        log: Where all that is done to it is noted, before it is done.
-        idle: True while it is stepped for nobody's run.
-        stood: Where loose objects `(3,)` [m] were put or released after they had been added, by body.
-        removed: Class and last position `(3,)` [m] of each object that somebody took away, by body.
+        steps: Number of physics steps.
+        log: Log of the commands to the world; each is appended before its execution.
+        idle: True while physics steps belong to no run.
+        stood: Positions `(3,)` [m] at which loose objects were placed or released after creation, by body.
+        removed: Class and last position `(3,)` [m] of each removed object, by body.
     """
 
     def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
@@ -95,9 +95,9 @@ class World:
     def add_object(
         self, label: str, X_WO: Pose, colour: Sequence[float], model: ObjectConfig | None = None
     ) -> int:
-        """Put an object of class `label` at `X_WO` (z up as it stands) and return its body.
+        """Add an object of class `label` at `X_WO` (z up if it stands upright) and return its body.
 
-        By default its model is that of the cell file.
+        The default model is that of the cell file.
         """
         model = model or self.config.objects[label]
         body = add_body(self.client, model, X_WO)
@@ -106,25 +106,25 @@ class World:
         return body
 
     def remove_object(self, body: int) -> None:
-        """Take a loose object out of the world."""
+        """Remove a loose object from the world."""
         self.log.note(command_log.REMOVE, body)
         self.removed[body] = self.bodies[body], self.object_pose(body).position
         del self.bodies[body], self.models[body]
         self.client.removeBody(body)
 
-    def name_of(self, body: int) -> str:
-        """Return what a body is, for the text of an error."""
+    def name_body(self, body: int) -> str:
+        """Return the name of a body for messages."""
         for name, bodies in {"the table": (self.table,), "the floor": (self.plane,), **self.bins}.items():
             if body in bodies:
                 return name
         return f"a {self.bodies[body]}" if body in self.bodies else "the arm"
 
-    def part_of(self, link: int) -> str:
-        """Return which part of the arm a link is, by its index, for the text of an error."""
+    def name_link(self, link: int) -> str:
+        """Return the name of a link of the arm for messages, by its index."""
         return "the tool" if link == self.tool else f"link {link + 1}"
 
     def object_pose(self, body: int) -> Pose:
-        """Return `X_WO` of a loose object, the frame that `add_object` takes."""
+        """Return the pose `X_WO` of a loose object, in the frame of `add_object`."""
         X_WI = Pose.of(*self.client.getBasePositionAndOrientation(body))
         X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
         return X_WI @ X_LI.inverse() @ upright(self.models[body]).inverse()
@@ -138,14 +138,14 @@ class World:
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
 
     def set_arm(self, q: Sequence[float] | Array) -> None:
-        """Put the arm at joint positions `q` `(n,)` [rad], at rest, whatever is in the way."""
+        """Set the joint positions to `q` `(n,)` [rad] at rest, without collision checks."""
         for joint, angle in enumerate(q):
             self.client.resetJointState(self.arm, joint, angle)
 
     def command_arm(self, q: Array, time: float = 0.0) -> None:
-        """Have the arm's motors go to joint positions `q` `(n,)` [rad], `time` [s] on the path of its motion.
+        """Command joint positions `q` `(n,)` [rad] at `time` [s] of the motion.
 
-        Full position gain and no velocity: sent before every step, it follows a path to 0.0005°.
+        With full position gain and zero velocity, a command before every step follows a path to 0.0005°.
         """
         self.log.note(command_log.JOINTS_TO, time, *q)
         self.client.setJointMotorControlArray(
@@ -163,11 +163,11 @@ class World:
         return Pose.of(*state[4:6]) @ Pose.of([0, 0, self.robot.flange_offset])
 
     def tool_pose(self) -> Pose:
-        """Return `X_WT`, the pose of the tool centre point: the middle of the cup's lip."""
+        """Return `X_WT`, the pose of the tool centre point, which is the centre of the lip of the cup."""
         return self.flange_pose() @ Pose.of([0, 0, self.config.tool.length])
 
     def cast_ray(self, origin: Array, direction: Array) -> Array | None:
-        """Return the first point `(3,)` [m] that a ray hits, the arm and its tool being air, or None."""
+        """Return the first hit of a ray `(3,)` [m] on a body other than arm and tool, or None."""
         end = origin + RAY_LENGTH * direction / np.linalg.norm(direction)
         start = origin
         while True:
@@ -183,14 +183,14 @@ class World:
         self.steps += 1
 
     def close(self) -> None:
-        """Give the physics server back; the world cannot be used afterwards."""
+        """Disconnect from the physics server; the world cannot be used afterwards."""
         self.log.close()
         self.client.disconnect()
 
     def _load_arm(self, flags: int) -> int:
-        """Load the arm with the tool as one more fixed link: no constraint whose error could drift.
+        """Load the arm with the tool as an additional fixed link, because errors of a constraint could drift.
 
-        Bodies do not collide with themselves (PyBullet's default), so the tool never fights the wrist.
+        Bodies do not collide with themselves (PyBullet's default), so tool and wrist may overlap.
         """
         path = find_model(self.config.arm.urdf)
         text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
@@ -202,13 +202,13 @@ class World:
             return int(self.client.loadURDF(str(generated), useFixedBase=True, flags=flags))
 
 
-def held_part(label: str) -> str:
-    """Return what an object of class `label` is while it hangs at the tool, for the text of an error."""
+def name_held(label: str) -> str:
+    """Return the name of a held object of class `label` for messages."""
     return f"the held {label}"
 
 
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
-    """Build floor and walls as one static body standing at the bin's position, and return it."""
+    """Create a static body with floor and walls of a bin at its position, and return it."""
     halves, places = map(list, zip(*bin_walls(bin.size), strict=True))
     shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(halves), "halfExtents": halves}
     return int(
@@ -224,16 +224,16 @@ def add_bin(client: BulletClient, bin: BinConfig) -> int:
 
 
 def _tool_link(length: float, cup_radius: float, robot: RobotModel) -> str:
-    """Return the URDF text of the tool, from the flange to the lip, and the closing tag."""
+    """Return the URDF text of the tool, from the flange to the lip, with the closing tag of the robot."""
     body = length - NECK_LENGTH
     parts = [(body, TOOL_RADIUS, body / 2), (NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2)]
     shapes = "".join(
         f'<{kind}><origin xyz="0 0 {z}"/><geometry>'
-        f'<cylinder length="{size - 2 * less}" radius="{radius - less}"/></geometry>'
+        f'<cylinder length="{size - 2 * margin}" radius="{radius - margin}"/></geometry>'
         + ('<material name="Grey"/>' if kind == "visual" else "")
         + f"</{kind}>"
         for size, radius, z in parts
-        for kind, less in (("visual", 0.0), ("collision", CYLINDER_MARGIN))
+        for kind, margin in (("visual", 0.0), ("collision", CYLINDER_MARGIN))
     )
     return f"""
   <link name="tool">

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.world import World, held_part
+from executive.cells.sim.world import World, name_held
 from executive.geometry import Pose, about_z, tool_down
 
 Build = Callable[[CellConfig], World]
@@ -58,7 +58,7 @@ def test_every_body_and_part_has_a_name_for_the_text_of_an_error(build: Build, o
     duck = world.add_object("duck", Pose.of([0.5, 0.1, 0.2]), (1, 1, 1))
     bodies = world.plane, world.table, *world.bins["blue_bin"], duck, world.arm
     names = ["the floor", "the table", "blue_bin", "a duck", "the arm"]
-    assert [world.name_of(body) for body in bodies] == names
-    parts = [world.part_of(link) for link in (-1, 0, world.flange, world.tool)]
+    assert [world.name_body(body) for body in bodies] == names
+    parts = [world.name_link(link) for link in (-1, 0, world.flange, world.tool)]
     assert parts == ["link 0", "link 1", "link 7", "the tool"]
-    assert held_part("duck") == "the held duck"
+    assert name_held("duck") == "the held duck"
