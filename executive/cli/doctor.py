@@ -156,14 +156,14 @@ def check_renderer() -> Iterator[Diagnosed]:
 
 def check_roboflow() -> Iterator[Diagnosed]:
     """Yield whether there is a key, without showing it, and whether Roboflow's own server answers."""
-    from executive.perception.detectors.roboflow.key import VARIABLE, ApiKey
-    from executive.perception.detectors.roboflow.options import HOSTED
+    from executive.perception.detectors.roboflow.key import KEY_VARIABLE, ApiKey
+    from executive.perception.detectors.roboflow.options import HOSTED_URL
 
     fix, is_set = "set it for models that Roboflow hosts", ApiKey(os.environ).is_set
-    yield _make_result(is_set, "key", f"{VARIABLE} is set", "note", f"{VARIABLE} is not set", fix)
-    message = f"{HOSTED} does not answer within {SERVER_TIMEOUT:.0f} s"
+    yield _make_result(is_set, "key", f"{KEY_VARIABLE} is set", "note", f"{KEY_VARIABLE} is not set", fix)
+    message = f"{HOSTED_URL} does not answer within {SERVER_TIMEOUT:.0f} s"
     fix = "check the network; only models that Roboflow hosts need it"
-    yield _make_result(is_reachable(HOSTED), "roboflow", f"{HOSTED} answers", "note", message, fix)
+    yield _make_result(is_reachable(HOSTED_URL), "roboflow", f"{HOSTED_URL} answers", "note", message, fix)
 
 
 def _make_result(is_ok: bool, subject: str, good: str, status: str, bad: str, fix: str) -> Diagnosed:

@@ -1,4 +1,4 @@
-"""Which parts of a frame a detector looks at, and how what it finds there becomes one answer."""
+"""Parts of a frame for a search by a detector, and the merging of the detections of all parts."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ Part = tuple[int, int, int, int]
 """Left, top, right, bottom [pixel] of a part of an image."""
 
 TILE_OVERLAP = 0.25
-"""Share of its side that a tile shares with the next: more than an object, so each is whole in one tile."""
+"""Overlap of neighbouring tiles, as a share of the side; larger than any object."""
 MAX_CUT_DISTANCE = 0.01
-"""A box closer than this share of the tile's side to the next tile may be cut off there."""
+"""Largest distance from a border of the tile, as a share of the side, at which a box may be cut off."""
 MIN_DUPLICATE_IOU = 0.7
-"""Intersection over union above which two boxes are one object seen twice; objects that touch stay below."""
+"""Intersection over union above which two boxes show one object; touching objects stay below this value."""
 MIN_SAME_IOU, MIN_CONTAINED_SHARE = 0.5, 0.7
 """Intersection over union, or over the smaller box, above which boxes of two tiles show one object."""
 
 
 @dataclass(frozen=True)
 class ViewDetection:
-    """A detection and the part of the frame it was found in.
+    """A detection and the searched part of the frame.
 
     Attributes:
-        detection: Its box is in the frame's pixels.
-        part: Where the detector looked.
+        detection: Detection with the box in pixels of the frame.
+        part: Part of the frame that contains the detection.
     """
 
     detection: Detection
@@ -43,8 +43,8 @@ def list_parts(view: str, table_view: Part, size: tuple[int, int]) -> list[Part]
     """Return the parts of a frame to search.
 
     Args:
-        view: `table`, the square that shows the workspace, or `full`, tiles of that size over everything.
-        table_view: That square [pixel].
+        view: `table`, the square that shows the workspace, or `full`, tiles of that size over the frame.
+        table_view: Square that shows the workspace [pixel].
         size: Width and height of the frame [pixel].
 
     Raises:
@@ -55,7 +55,7 @@ def list_parts(view: str, table_view: Part, size: tuple[int, int]) -> list[Part]
     if view != "full":
         raise InputError(f'a frame has no view "{view}"; there are table and full')
     side = table_view[2] - table_view[0]
-    columns, rows = (_starts(length, side) for length in size)
+    columns, rows = (_list_tile_starts(length, side) for length in size)
     return [
         (left, top, min(left + side, size[0]), min(top + side, size[1])) for top in rows for left in columns
     ]
@@ -67,13 +67,13 @@ def search_parts(
     find: Callable[[NDArray[np.uint8]], Iterable[Detection]],
     class_map: Mapping[str, str],
 ) -> list[Detection]:
-    """Return every object in some parts of a frame once, most confident first.
+    """Return the detections in parts of a frame, one per object, most confident first.
 
     Args:
         image: The frame `(H, W, 3)`, RGB.
         parts: The parts to search.
-        find: Returns the objects in a part, their boxes in its pixels.
-        class_map: From the names that `find` gives to the cell's, where they differ.
+        find: Function that returns the detections in a part, with boxes in pixels of the part.
+        class_map: Class names of the cell by class names of `find`, if the names differ.
     """
     findings = []
     for part in parts:
@@ -87,17 +87,17 @@ def search_parts(
 
 
 def merge_findings(findings: Sequence[ViewDetection], size: tuple[int, int]) -> list[Detection]:
-    """Return every object once, most confident first.
+    """Return one detection per object, most confident first.
 
-    Where parts overlap, the box that is whole in its part wins over one that the part's border cuts off,
-    then the more confident one.
+    If parts overlap, a box inside its part takes precedence over a box that the border of the part cuts off,
+    then the more confident box over the less confident box.
 
     Args:
         findings: Detections of all parts.
         size: Width and height of the frame [pixel].
     """
     ranked = sorted(findings, key=lambda finding: (_is_cut(finding, size), -finding.detection.confidence))
-    is_same = _is_same_object([finding.detection.box for finding in ranked])
+    is_same = _find_same_objects([finding.detection.box for finding in ranked])
     kept: list[int] = []
     for number, finding in enumerate(ranked):
         if not any(is_same[number, other] and finding.part != ranked[other].part for other in kept):
@@ -106,19 +106,19 @@ def merge_findings(findings: Sequence[ViewDetection], size: tuple[int, int]) -> 
 
 
 def remove_duplicates(found: Sequence[Detection]) -> list[Detection]:
-    """Return `found`, most confident first, without boxes that lie on a more confident one."""
+    """Return `found`, most confident first, without duplicates of a more confident detection."""
     if len(found) < 2:
         return list(found)
     from supervision import box_non_max_suppression
 
-    # The rank instead of the confidence, so that of equally confident ones the first is kept.
+    # Ranks replace the confidences, so that the first of equally confident detections is kept.
     ranked = np.array([(*detection.box, -rank) for rank, detection in enumerate(found)])
     keep = box_non_max_suppression(ranked, MIN_DUPLICATE_IOU)
     return [detection for detection, is_kept in zip(found, keep, strict=True) if is_kept]
 
 
-def _is_same_object(boxes: Sequence[Box]) -> NDArray[np.bool_]:
-    """Return for every pair of boxes of different parts whether they show one object, cut off or not."""
+def _find_same_objects(boxes: Sequence[Box]) -> NDArray[np.bool_]:
+    """Return an `(N, N)` matrix, True for each pair of boxes that shows one object, cut off or not."""
     if len(boxes) < 2:
         return np.zeros((len(boxes), len(boxes)), dtype=np.bool_)
     from supervision import OverlapMetric, box_iou_batch
@@ -129,7 +129,7 @@ def _is_same_object(boxes: Sequence[Box]) -> NDArray[np.bool_]:
 
 
 def _is_cut(finding: ViewDetection, size: tuple[int, int]) -> bool:
-    """Tell whether a box reaches a border of its part beyond which the frame goes on."""
+    """Return True if a box reaches a border of its part that is not a border of the frame."""
     left, top, right, bottom = finding.detection.box
     part = finding.part
     margin = MAX_CUT_DISTANCE * (part[2] - part[0])
@@ -141,8 +141,8 @@ def _is_cut(finding: ViewDetection, size: tuple[int, int]) -> bool:
     )
 
 
-def _starts(length: int, side: int) -> list[int]:
-    """Return where tiles of `side` begin so that they cover `length` evenly, neighbours overlapping."""
+def _list_tile_starts(length: int, side: int) -> list[int]:
+    """Return the first pixels of evenly spaced, overlapping tiles of width `side` that cover `length`."""
     if length <= side:
         return [0]
     count = math.ceil((length - TILE_OVERLAP * side) / (side * (1 - TILE_OVERLAP)))

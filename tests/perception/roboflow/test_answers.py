@@ -12,7 +12,7 @@ from executive.perception.detectors.roboflow.complaints import (
     describe_delay,
     describe_failure,
     describe_invalid_answer,
-    one_line,
+    shorten_to_line,
 )
 from executive.perception.detectors.roboflow.options import RoboflowOptions
 
@@ -144,8 +144,8 @@ WORKFLOW = RoboflowOptions(api="workflow", workspace="acme", workflow_id="sortin
 
 
 def test_somebody_elses_words_become_one_short_line():
-    assert one_line("<html>\n\x1b[31m  red\x00 </html>") == "<html> [31m red </html>"
-    assert one_line("a" * 1000) == "a" * 100 + "..."
+    assert shorten_to_line("<html>\n\x1b[31m  red\x00 </html>") == "<html> [31m red </html>"
+    assert shorten_to_line("a" * 1000) == "a" * 100 + "..."
 
 
 def test_a_sentence_says_what_where_and_what_to_look_at():

@@ -135,7 +135,7 @@ def test_stopping_it_ends_a_call_under_way(start):
 
 
 def test_what_the_sdk_prints_is_no_line_of_the_programs():
-    noise = "from {} import _mouth; say = _mouth(); print('noise', flush=True); say(a=1)"
+    noise = "from {} import _open_output; say = _open_output(); print('noise', flush=True); say(a=1)"
     ended = subprocess.run(
         [sys.executable, "-c", noise.format(f"{module.PROGRAM}.__main__")], capture_output=True, text=True
     )

@@ -1,9 +1,9 @@
-"""The program that talks to a Roboflow inference server: `python -m executive.perception.detectors.roboflow`.
+"""Client program of a Roboflow inference server: `python -m executive.perception.detectors.roboflow`.
 
-Its argument is JSON: which server, model or workflow, and confidence. On its standard input it gets for every
-image a line of JSON with width and height, and the pixels. On its standard output it says a line of JSON for
-each, and one when it is ready. The key comes through the environment. It ends with its input, whatever it is
-doing.
+The argument is JSON with the server, the model or workflow, and the confidence. The standard input carries,
+for each image, a line of JSON with width and height, then the pixels. The standard output carries a line of
+JSON when the program is ready, and one for each image. An environment variable holds the API key. The program
+exits at the end of its input, even during a request.
 """
 
 from __future__ import annotations
@@ -20,54 +20,54 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.perception.detectors.roboflow.key import VARIABLE
+from executive.perception.detectors.roboflow.key import KEY_VARIABLE
 
 if TYPE_CHECKING:
     from inference_sdk import InferenceHTTPClient
 
-LONGEST = 1 << 20
-"""Characters of an answer that are handed on; 300 predictions take a twentieth of it."""
+MAX_ANSWER_LENGTH = 1 << 20
+"""Largest number of characters of an answer; 300 predictions need a twentieth of this number."""
 
-Say = Callable[..., None]
-"""Says one line of JSON."""
+Write = Callable[..., None]
+"""Writes its keyword arguments as one line of JSON."""
 
 
-class NoOutput(Exception):
-    """A workflow has no output of the name that is asked for; the text names its outputs."""
+class MissingOutput(Exception):
+    """A workflow lacks the requested output; the text names its outputs."""
 
 
 def main() -> None:
-    """Answer until the input ends."""
-    say = _mouth()
+    """Answer each image of the standard input until the input ends."""
+    write = _open_output()
     images: queue.Queue[NDArray[np.uint8]] = queue.Queue()
-    threading.Thread(target=_read, args=(sys.stdin.buffer, images), daemon=True).start()
+    threading.Thread(target=_read_images, args=(sys.stdin.buffer, images), daemon=True).start()
     try:
-        infer = _client(json.loads(sys.argv[1]))
+        infer = _make_client(json.loads(sys.argv[1]))
     except Exception as error:
-        say(unusable=f"{type(error).__name__}: {error}")
-        # The thread that reads the input holds its lock: a regular exit would abort the interpreter.
+        write(unusable=f"{type(error).__name__}: {error}")
+        # The reading thread holds the lock of the input, so that a regular exit would abort the interpreter.
         os._exit(0)
-    logging.getLogger("backoff").addHandler(_Repeats(say))
+    logging.getLogger("backoff").addHandler(_RetryHandler(write))
     logging.getLogger("backoff").setLevel(logging.DEBUG)
-    say(ready=True)
+    write(ready=True)
     while True:
-        _answer(infer, images.get(), say)
+        _answer(infer, images.get(), write)
 
 
-def _mouth() -> Say:
-    """Return what says lines; whatever else is printed goes to the standard error from now on."""
+def _open_output() -> Write:
+    """Return a function that writes to the standard output, and redirect all prints to the standard error."""
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
 
-    def say(**message: Any) -> None:
+    def write(**message: Any) -> None:
         out.write(json.dumps(message) + "\n")
         out.flush()
 
-    return say
+    return write
 
 
-def _read(pipe: BinaryIO, images: queue.Queue[NDArray[np.uint8]]) -> None:
-    """Put every image into `images`; end the process with the input, though its server may hang."""
+def _read_images(pipe: BinaryIO, images: queue.Queue[NDArray[np.uint8]]) -> None:
+    """Put each image into `images`, and exit at the end of the input, even if the server hangs."""
     while header := pipe.readline():
         size = json.loads(header)
         shape = size["height"], size["width"], 3
@@ -78,52 +78,53 @@ def _read(pipe: BinaryIO, images: queue.Queue[NDArray[np.uint8]]) -> None:
     os._exit(0)
 
 
-def _client(setup: dict[str, Any]) -> Callable[[NDArray[np.uint8]], Any]:
-    """Return what sends an RGB image to the model or workflow and returns its answer."""
+def _make_client(settings: dict[str, Any]) -> Callable[[NDArray[np.uint8]], Any]:
+    """Return a function that sends an RGB image to the model or workflow and returns the answer."""
     from inference_sdk import InferenceConfiguration, InferenceHTTPClient
 
-    client = InferenceHTTPClient(setup["url"].rstrip("/"), os.environ.get(VARIABLE, "").strip() or None)
-    # The default puts the key into addresses, and those into errors.
+    key = os.environ.get(KEY_VARIABLE, "").strip() or None
+    client = InferenceHTTPClient(settings["url"].rstrip("/"), key)
+    # By default, inference-sdk puts the key into URLs, and the URLs into error messages.
     client.configure(
-        InferenceConfiguration(confidence_threshold=setup["confidence"], api_key_transport="header")
+        InferenceConfiguration(confidence_threshold=settings["confidence"], api_key_transport="header")
     )
-    if setup["api"] == "v0":
+    if settings["api"] == "v0":
         client.select_api_v0()
-    elif setup["api"] == "v1":
+    elif settings["api"] == "v1":
         client.select_api_v1()
-    # It takes arrays as OpenCV has them: BGR.
-    if setup["api"] == "workflow":
-        return lambda image: _run_workflow(client, setup, image[..., ::-1])
-    return lambda image: client.infer(image[..., ::-1], model_id=setup["model_id"])
+    # inference-sdk expects the channel order of OpenCV: BGR.
+    if settings["api"] == "workflow":
+        return lambda image: _run_workflow(client, settings, image[..., ::-1])
+    return lambda image: client.infer(image[..., ::-1], model_id=settings["model_id"])
 
 
-def _run_workflow(client: InferenceHTTPClient, setup: dict[str, Any], image: NDArray[np.uint8]) -> Any:
-    """Return the output of a workflow that holds the predictions for a BGR image."""
-    images = {setup["workflow_input"]: image}
-    (outputs,) = client.run_workflow(setup["workspace"], setup["workflow_id"], images=images)
-    if setup["workflow_output"] not in outputs:
-        raise NoOutput(f"it has: {', '.join(outputs)}")
-    return outputs[setup["workflow_output"]]
+def _run_workflow(client: InferenceHTTPClient, settings: dict[str, Any], image: NDArray[np.uint8]) -> Any:
+    """Run the workflow on a BGR image, and return the output with the predictions."""
+    images = {settings["workflow_input"]: image}
+    (outputs,) = client.run_workflow(settings["workspace"], settings["workflow_id"], images=images)
+    if settings["workflow_output"] not in outputs:
+        raise MissingOutput(f"it has: {', '.join(outputs)}")
+    return outputs[settings["workflow_output"]]
 
 
-def _answer(infer: Callable[[NDArray[np.uint8]], Any], image: NDArray[np.uint8], say: Say) -> None:
-    """Say what the server says of an image, or why it says nothing."""
+def _answer(infer: Callable[[NDArray[np.uint8]], Any], image: NDArray[np.uint8], write: Write) -> None:
+    """Write the answer of the server to an image, or the reason for a missing answer."""
     try:
         answer = infer(image)
         if isinstance(answer, dict):
             answer = {key: answer[key] for key in ("image", "predictions") if key in answer}
         text = json.dumps(answer)
     except Exception as error:
-        say(**_failure(error))
+        write(**_describe_error(error))
         return
-    if len(text) > LONGEST:
-        say(failure="garbled", said=f"an answer of {len(text)} characters")
+    if len(text) > MAX_ANSWER_LENGTH:
+        write(failure="garbled", said=f"an answer of {len(text)} characters")
     else:
-        say(answer=answer)
+        write(answer=answer)
 
 
-def _failure(error: Exception) -> dict[str, Any]:
-    """Return what kind of failure the SDK's exception stands for, and what was said."""
+def _describe_error(error: Exception) -> dict[str, Any]:
+    """Return the kind of failure that an exception of the SDK means, and its text."""
     import socket
     import ssl
 
@@ -132,7 +133,7 @@ def _failure(error: Exception) -> dict[str, Any]:
 
     if isinstance(error, sdk.HTTPCallErrorError):
         return {"failure": "status", "status": error.status_code, "said": str(error.api_message or "")}
-    if isinstance(error, NoOutput):
+    if isinstance(error, MissingOutput):
         return {"failure": "no output", "said": str(error)}
     kinds: tuple[tuple[str, tuple[type[BaseException], ...]], ...] = (
         ("no key", (sdk.APIKeyNotProvided,)),
@@ -145,14 +146,14 @@ def _failure(error: Exception) -> dict[str, Any]:
         ("lost", (OSError, requests.RequestException, sdk.HTTPClientError)),
     )
     for kind, types in kinds:
-        found = next((cause for cause in _causes(error) if isinstance(cause, types)), None)
+        found = next((cause for cause in _iterate_causes(error) if isinstance(cause, types)), None)
         if found is not None:
             return {"failure": kind, "said": f"{type(found).__name__}: {found}"}
     return {"failure": "other", "said": f"{type(error).__name__}: {error}"}
 
 
-def _causes(error: BaseException | None) -> Iterator[BaseException]:
-    """Yield an exception and those that led to it, latest first."""
+def _iterate_causes(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an exception and its chain of causes, latest first."""
     seen: set[int] = set()
     while error is not None and id(error) not in seen:
         seen.add(id(error))
@@ -160,17 +161,17 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
         error = error.__cause__ or error.__context__
 
 
-class _Repeats(logging.Handler):
-    """Says that a server gave no answer and is asked again, which inference-sdk does by itself."""
+class _RetryHandler(logging.Handler):
+    """Reports each retry of a request, from the log of inference-sdk."""
 
-    def __init__(self, say: Say) -> None:
+    def __init__(self, write: Write) -> None:
         super().__init__()
-        self._say = say
+        self._write = write
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Say the status it answered with, None for no connection: the last argument of backoff's record."""
+        """Write the status that caused a retry, None for no connection: the last argument of the record."""
         last = record.args[-1] if isinstance(record.args, tuple) else None
-        self._say(again=getattr(last, "status_code", None))
+        self._write(again=getattr(last, "status_code", None))
 
 
 if __name__ == "__main__":

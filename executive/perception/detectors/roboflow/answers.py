@@ -1,6 +1,6 @@
-"""What a server said, checked before anybody believes it.
+"""Validation of the answers of an inference server.
 
-inference-sdk hands on whatever comes: a server that answers `{"foo": 1}` has answered, as far as it cares.
+inference-sdk does not validate answers: it returns any JSON, for instance `{"foo": 1}`.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from executive.cell.detection import Detection
 
 MAX_PREDICTIONS = 300
-"""Predictions in one answer; RF-DETR has 300 queries."""
+"""Largest number of predictions in one answer; RF-DETR has 300 queries."""
 MAX_OVERHANG = 0.1
-"""Share of the image's side that a box may stick out by; it is cut off there."""
+"""Largest overhang of a box beyond the image, as a share of the side; boxes are clipped to the image."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Extent = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class _Prediction(BaseModel):
-    """A box by centre and size [pixel] of the image sent."""
+    """A box by centre and size [pixel of the sent image], its class and confidence."""
 
     model_config = ConfigDict(strict=True)
 
@@ -45,41 +45,41 @@ class _Answer(BaseModel):
 
 
 def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
-    """Return the detections that a server's answer holds, in its order.
+    """Return the detections in an answer of a server, in the order of the answer.
 
     Args:
-        answer: Its JSON.
-        size: Width and height of the image it is about [pixel].
+        answer: Decoded JSON of the answer.
+        size: Width and height of the sent image [pixel].
 
     Raises:
-        ValueError: It holds something that cannot be; the text says what.
+        ValueError: The answer is invalid; the text names the place and the problem.
     """
     if not isinstance(answer, dict):
         raise ValueError(f"it is of type {type(answer).__name__}, not an object with predictions")
     try:
-        read = _Answer.model_validate(answer)
+        validated = _Answer.model_validate(answer)
     except ValidationError as error:
-        raise ValueError(_first(error)) from None
-    if read.image is not None and (read.image.width, read.image.height) != size:
+        raise ValueError(_describe_first_error(error)) from None
+    if validated.image is not None and (validated.image.width, validated.image.height) != size:
         raise ValueError(
-            f"it is about an image of {read.image.width:g} x {read.image.height:g} pixels, "
+            f"it is about an image of {validated.image.width:g} x {validated.image.height:g} pixels, "
             f"and {size[0]} x {size[1]} were sent"
         )
-    return list(_detections(read.predictions, size))
+    return list(_convert_predictions(validated.predictions, size))
 
 
 def read_output(output: Any, size: tuple[int, int]) -> list[Detection]:
-    """Return the detections in an output of a workflow, in its order.
+    """Return the detections in an output of a workflow, in the order of the output.
 
-    An output is an answer, the predictions of an answer alone, or all outputs of a step (`$steps.model.*`),
-    in which the answer stands under `predictions`. Without predictions the size of the image is null.
+    An output is an answer, the list of predictions of an answer, or all outputs of a step (`$steps.model.*`)
+    with the answer under the key `predictions`. If there are no predictions, the size of the image is null.
 
     Args:
-        output: Its JSON.
-        size: Width and height of the image that was sent [pixel].
+        output: Decoded JSON of the output.
+        size: Width and height of the sent image [pixel].
 
     Raises:
-        ValueError: It holds something that cannot be; the text says what.
+        ValueError: The output is invalid; the text names the place and the problem.
     """
     if isinstance(output, dict) and isinstance(output.get("predictions"), dict):
         output = output["predictions"]
@@ -90,29 +90,29 @@ def read_output(output: Any, size: tuple[int, int]) -> list[Detection]:
     return read_answer(output, size)
 
 
-def _detections(predictions: list[_Prediction], size: tuple[int, int]) -> Iterator[Detection]:
-    """Yield the predictions with their boxes cut off at the border of the image."""
+def _convert_predictions(predictions: list[_Prediction], size: tuple[int, int]) -> Iterator[Detection]:
+    """Yield the predictions as detections, with boxes clipped to the image."""
     width, height = size
-    for index, found in enumerate(predictions):
-        left, right = found.x - found.width / 2, found.x + found.width / 2
-        top, bottom = found.y - found.height / 2, found.y + found.height / 2
+    for index, prediction in enumerate(predictions):
+        left, right = prediction.x - prediction.width / 2, prediction.x + prediction.width / 2
+        top, bottom = prediction.y - prediction.height / 2, prediction.y + prediction.height / 2
         if (
             min(left / width, top / height) < -MAX_OVERHANG
             or max(right / width, bottom / height) > 1 + MAX_OVERHANG
-            or not (0 <= found.x <= width and 0 <= found.y <= height)
+            or not (0 <= prediction.x <= width and 0 <= prediction.y <= height)
         ):
             raise ValueError(
                 f"predictions[{index}] is a box from ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}) "
                 f"in an image of {width} x {height} pixels"
             )
         box = max(left, 0.0), max(top, 0.0), min(right, float(width)), min(bottom, float(height))
-        yield Detection(found.label, found.confidence, box)
+        yield Detection(prediction.label, prediction.confidence, box)
 
 
-def _first(error: ValidationError) -> str:
-    """Return the first of what is wrong with an answer, with its place and without its values."""
+def _describe_first_error(error: ValidationError) -> str:
+    """Return the place and the message of the first error in an answer, without values of the answer."""
     problem = error.errors(include_url=False, include_input=False)[0]
     place = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in problem["loc"])
-    # Which class of ours it might be an instance of is nothing to a server.
-    wrong = problem["msg"].partition(" or instance of")[0]
-    return f"{place.removeprefix('.')}: {wrong[0].lower()}{wrong[1:]}"
+    # The names of this module's classes mean nothing to the owner of a server.
+    message = problem["msg"].partition(" or instance of")[0]
+    return f"{place.removeprefix('.')}: {message[0].lower()}{message[1:]}"

@@ -1,4 +1,4 @@
-"""A model behind a Roboflow inference server as a detector."""
+"""Detector that sends images to a Roboflow inference server."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from executive.perception.detectors.views import Part, remove_duplicates, search
 
 
 class RoboflowDetector(ThreadedDetector):
-    """Has a server search frames, hosted or one's own; implements `executive.cell.protocols.Detector`.
+    """Searches frames with a hosted or self-hosted server; implements `executive.cell.protocols.Detector`.
 
     Args:
         config: Threshold, floor and latency.
-        options: Which server and model.
-        setting: What it is built into.
-        key: What the server knows its user by.
+        options: Server and model.
+        setting: Parts of the cell and of the run that the detector uses.
+        key: API key of the user.
     """
 
     def __init__(
@@ -51,24 +51,24 @@ class RoboflowDetector(ThreadedDetector):
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> RoboflowDetector:
-        """Return the detector that a cell file describes; nobody is asked yet, and no key is needed for it.
+        """Return the detector of a cell file, without a request and without need of an API key.
 
         Raises:
-            InputError: An option is missing, unknown or wrong.
+            InputError: An option is missing, unknown or invalid.
         """
-        for _, sentence in find_wrong_roboflow_options(config):
-            raise InputError(sentence)
+        for _, message in find_wrong_roboflow_options(config):
+            raise InputError(message)
         return cls(config, RoboflowOptions.model_validate(config.options), setting, ApiKey())
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
-        """Yield every option because of which the detector could not be built, with a sentence."""
+        """Yield each invalid option, with a message."""
         del base, others
         yield from find_wrong_roboflow_options(config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
-        """Return the classes it finds, by the cell's names; None where its options do not say."""
+        """Return the names in the cell of the detectable classes; None if the options do not list them."""
         del base
         if any(True for _ in find_wrong_roboflow_options(config)):
             return None
@@ -80,27 +80,27 @@ class RoboflowDetector(ThreadedDetector):
         return [(0, 0, size[0], size[1])] if is_whole else super()._parts(view, size)
 
     def close(self) -> None:
-        """End the helper process and the thread, whatever they are waiting for."""
+        """Stop the helper process and the thread, also during a request."""
         self._helper.stop()
         super().close()
         self._helper.close()
 
     def _search(self, image: NDArray[np.uint8], parts: Sequence[Part]) -> list[Detection]:
         self._helper.wait_until_ready()
-        until = time.monotonic() + self._options.deadline
-        return search_parts(image, parts, lambda crop: self._find(crop, until), self._options.class_map)
+        deadline = time.monotonic() + self._options.deadline
+        return search_parts(image, parts, lambda crop: self._find(crop, deadline), self._options.class_map)
 
-    def _find(self, crop: NDArray[np.uint8], until: float) -> list[Detection]:
-        """Return what the server finds in a part of a frame, in that part's pixels."""
+    def _find(self, crop: NDArray[np.uint8], deadline: float) -> list[Detection]:
+        """Return the detections of the server in a part of a frame, in pixels of the part."""
         try:
-            message = self._helper.ask(crop, until)
+            message = self._helper.ask(crop, deadline)
         except NoAnswer as error:
-            raise DeadlinePassed(describe_delay(error.repeats, self._options)) from None
+            raise DeadlinePassed(describe_delay(error.retry_causes, self._options)) from None
         if "failure" in message:
             raise Unavailable(describe_failure(message, self._options))
         try:
             answer = self._read(message["answer"], (crop.shape[1], crop.shape[0]))
         except ValueError as error:
             raise Unavailable(describe_invalid_answer(str(error), self._options)) from None
-        found = [one for one in answer if one.confidence >= self._config.floor]
-        return remove_duplicates(sorted(found, key=lambda one: -one.confidence))
+        found = [detection for detection in answer if detection.confidence >= self._config.floor]
+        return remove_duplicates(sorted(found, key=lambda detection: -detection.confidence))

@@ -1,4 +1,4 @@
-"""Helper process that runs inference-sdk, as the detector sees it: replaced whenever it gives no answer."""
+"""Helper process that runs inference-sdk, and is replaced after a passed deadline."""
 
 from __future__ import annotations
 
@@ -24,55 +24,54 @@ from executive.processes import build_command
 
 PROGRAM = "executive.perception.detectors.roboflow"
 STARTUP_TIMEOUT = 30.0
-"""Longest time to import inference-sdk [s]; measured: 2 s, and 6 s with the cores shared."""
+"""Longest time for the import of inference-sdk [s]; measured: 2 s, and 6 s on shared cores."""
 EXIT_TIMEOUT = 1.0
-"""Longest time from the end of the program's output to its own end [s]."""
+"""Longest time from the end of the program's output to the exit of the program [s]."""
 MAX_STDERR = 2000
-"""Bytes of the program's standard error in which its last line is sought."""
+"""Largest number of bytes at the end of the standard error in which the last line is searched."""
 
 
 class NoAnswer(Exception):
-    """The time for an answer is over.
+    """The deadline of an answer has passed.
 
     Attributes:
-        repeats: Reasons for which the server has been asked again meanwhile: statuses of HTTP, None for no
-            connection.
+        retry_causes: Causes of the retries before the deadline: HTTP statuses, None for no connection.
     """
 
-    def __init__(self, repeats: Sequence[int | None]) -> None:
+    def __init__(self, retry_causes: Sequence[int | None]) -> None:
         super().__init__()
-        self.repeats = tuple(repeats)
+        self.retry_causes = tuple(retry_causes)
 
 
 class Helper:
-    """Runs inference-sdk in a process of its own, from now until it is closed.
+    """Runs inference-sdk in a separate process, from the construction of the object until `close`.
 
-    No call waits longer than it is allowed to: a process that has not answered by then is killed, and the
-    next one is started. One thread asks; another one may stop the helper.
+    Each call has a deadline: a process that has not answered by the deadline is killed, and a new process is
+    started. One thread sends requests; another thread may stop the helper.
 
     Args:
-        setup: Server and model, as the program wants them.
-        key: Key by which the server knows its user.
+        settings: Server and model, in the format of the program's argument.
+        key: API key of the user.
     """
 
-    def __init__(self, setup: Mapping[str, Any], key: ApiKey) -> None:
-        self._command = build_command(PROGRAM, json.dumps(setup))
+    def __init__(self, settings: Mapping[str, Any], key: ApiKey) -> None:
+        self._command = build_command(PROGRAM, json.dumps(settings))
         self._key = key
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 It lives as long as the helper.
-        self._guard = threading.Lock()
+        self._lock = threading.Lock()
         self._is_stopped = False
         self._process: subprocess.Popen[bytes] | None = None
         self._problem = ""
         self._is_ready = False
-        self._ready_by = 0.0
+        self._startup_deadline = 0.0
         self._start()
 
     def wait_until_ready(self) -> None:
-        """Return once the process has imported its packages.
+        """Wait until the process has imported its packages.
 
         Raises:
-            Unavailable: It could not be started, or takes too long.
-            Fault: It ended by itself.
+            Unavailable: The process could not be started, or was not ready in time.
+            Fault: The process exited.
         """
         if self._process is None:
             self._start()
@@ -81,7 +80,7 @@ class Helper:
         if self._is_ready:
             return
         try:
-            message = self._converse(b"", self._ready_by)
+            message = self._exchange(b"", self._startup_deadline)
         except TimeoutError:
             raise Unavailable(f"its helper process was not ready within {STARTUP_TIMEOUT:.0f} s") from None
         if "unusable" in message:
@@ -91,56 +90,56 @@ class Helper:
             )
         self._is_ready = True
 
-    def ask(self, image: NDArray[np.uint8], until: float) -> Mapping[str, Any]:
-        """Return the `answer` to an image, or a `failure` with what was `said`; the process must be ready.
+    def ask(self, image: NDArray[np.uint8], deadline: float) -> Mapping[str, Any]:
+        """Return the `answer` to an image, or a `failure` and its text, `said`; the process must be ready.
 
         Args:
             image: `(H, W, 3)` RGB.
-            until: Time at which to give up, by `time.monotonic` [s].
+            deadline: Latest time of the answer, on the clock `time.monotonic` [s].
 
         Raises:
-            NoAnswer: There was none by then.
-            Unavailable: The process was killed from outside.
-            Fault: It ended by itself.
+            NoAnswer: The deadline passed without an answer.
+            Unavailable: Another process killed the helper process.
+            Fault: The process exited.
         """
         height, width = image.shape[:2]
         data = json.dumps({"width": width, "height": height}).encode() + b"\n" + image.tobytes()
-        repeats: list[int | None] = []
+        retry_causes: list[int | None] = []
         while True:
             try:
-                message = self._converse(data, until)
+                message = self._exchange(data, deadline)
             except TimeoutError:
-                raise NoAnswer(repeats) from None
+                raise NoAnswer(retry_causes) from None
             if "again" not in message:
                 return message
-            repeats.append(message["again"])
+            retry_causes.append(message["again"])
             data = b""
 
     def stop(self) -> None:
-        """End the process at once; a call under way raises `Unavailable`."""
-        with self._guard:
+        """Kill the process; a concurrent call of `ask` or `wait_until_ready` raises `Unavailable`."""
+        with self._lock:
             self._is_stopped = True
             if self._process is not None:
                 _kill(self._process)
 
     def close(self) -> None:
-        """Give everything back; no call may be under way."""
+        """Release all resources; no other call may be active."""
         self.stop()
         self._end()
         self._stderr.close()
 
-    def _converse(self, data: bytes, until: float) -> Mapping[str, Any]:
-        """Send `data` and return the next message; without one there is a new process when this raises."""
+    def _exchange(self, data: bytes, deadline: float) -> Mapping[str, Any]:
+        """Send `data` and return the next message; replace the process before an exception is raised."""
         process = self._process
         assert process is not None and process.stdin and process.stdout
         is_late = threading.Event()
 
-        def give_up() -> None:
+        def kill_late_process() -> None:
             is_late.set()
             _kill(process)
 
-        # A killed process takes no data and says nothing more, so that neither call below waits for ever.
-        timer = threading.Timer(max(until - time.monotonic(), 0.0), give_up)
+        # A killed process closes its pipes, so that neither `write` nor `readline` below waits forever.
+        timer = threading.Timer(max(deadline - time.monotonic(), 0.0), kill_late_process)
         timer.start()
         try:
             with contextlib.suppress(BrokenPipeError):
@@ -154,16 +153,16 @@ class Helper:
             self._restart()
             raise TimeoutError
         if not line.endswith(b"\n"):
-            self._raise_end(process)
+            self._raise_exit(process)
         try:
             message: Mapping[str, Any] = json.loads(self._key.redact(line.decode()))
         except RecursionError:
-            # The helper could just read and write it again; for this stack it may be too deep.
+            # The helper process parsed the answer with a shallower stack than the stack of this thread.
             return {"failure": "garbled", "said": "it is nested too deeply"}
         return message
 
-    def _raise_end(self, process: subprocess.Popen[bytes]) -> None:
-        """Replace a process that has closed its output, and raise the reason for its end."""
+    def _raise_exit(self, process: subprocess.Popen[bytes]) -> None:
+        """Replace a process that has closed its output, and raise an exception with the cause of the exit."""
         try:
             status = process.wait(EXIT_TIMEOUT)
         except subprocess.TimeoutExpired:
@@ -182,8 +181,8 @@ class Helper:
         self._start()
 
     def _start(self) -> None:
-        """Start a process, unless the helper is stopped; the process gets ready in the background."""
-        with self._guard:
+        """Start a process in the background, unless the helper is stopped."""
+        with self._lock:
             if self._is_stopped:
                 self._problem = "the detector is closed"
                 return
@@ -193,25 +192,25 @@ class Helper:
                 self._process = subprocess.Popen(
                     self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._stderr,
                     env=self._key.environment,
-                    # -m looks for modules here first: in the user's folder it could find others.
+                    # `-m` searches the working folder first; the user's folder could contain other modules.
                     cwd=Path(executive.__file__).parent.parent,
-                    start_new_session=True,  # Out of reach of Ctrl-C.
+                    start_new_session=True,  # Ctrl-C does not interrupt the process.
                 )  # fmt: skip
             except OSError as error:
                 self._problem = (error.strerror or str(error)).lower()
                 return
-            self._ready_by = time.monotonic() + STARTUP_TIMEOUT
+            self._startup_deadline = time.monotonic() + STARTUP_TIMEOUT
             self._is_ready = False
 
     def _end(self) -> None:
-        with self._guard:
+        with self._lock:
             process, self._process = self._process, None
         if process is None:
             return
         _kill(process)
         process.wait()
         for pipe in (process.stdin, process.stdout):
-            with contextlib.suppress(OSError):  # Data that the process did not take.
+            with contextlib.suppress(OSError):  # The pipe holds data that the process did not read.
                 assert pipe is not None
                 pipe.close()
 

@@ -1,4 +1,4 @@
-"""The secret that the hosted service knows a user by."""
+"""API key of a user of the hosted service."""
 
 from __future__ import annotations
 
@@ -6,24 +6,25 @@ import json
 import os
 from collections.abc import Mapping
 
-VARIABLE = "ROBOFLOW_API_KEY"
-"""The environment variable that holds it; it is read from nowhere else."""
+KEY_VARIABLE = "ROBOFLOW_API_KEY"
+"""Environment variable that holds the API key, its only source."""
 MIN_KEY_LENGTH = 8
-"""Shorter ones are stand-ins for servers that want some key, whatever it is; no secrets."""
+"""Smallest length of a secret key; shorter keys are placeholders for servers that accept any key."""
 HIDDEN = "***"
+"""Replacement of the key in texts."""
 
 
 class ApiKey:
-    """The key as the environment has it; its text comes out nowhere but in `environment`."""
+    """API key from the environment; only the attribute `environment` reveals the text of the key."""
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
         self.environment = dict(environment)
-        """What the process that uses the key gets."""
-        self._key = environment.get(VARIABLE, "").strip()
+        """Environment variables of the process that uses the key."""
+        self._key = environment.get(KEY_VARIABLE, "").strip()
 
     @property
     def is_set(self) -> bool:
-        """Tell whether there is one."""
+        """Return True if the environment contains a key."""
         return bool(self._key)
 
     def redact(self, text: str) -> str:

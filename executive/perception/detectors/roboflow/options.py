@@ -1,4 +1,4 @@
-"""What a model behind a Roboflow inference server needs to know, and what is wrong with it."""
+"""Options of the detector kind `roboflow`, and their validation."""
 
 from __future__ import annotations
 
@@ -8,92 +8,92 @@ from urllib.parse import urlsplit
 from pydantic import Field
 
 from executive.cell.config import DetectorConfig, Section
-from executive.perception.detectors.roboflow.key import VARIABLE
+from executive.perception.detectors.roboflow.key import KEY_VARIABLE
 from executive.perception.detectors.setting import OptionFaults, find_wrong_class_map, find_wrong_options
 
-HOSTED = "https://serverless.roboflow.com"
-"""Where Roboflow serves models itself."""
+HOSTED_URL = "https://serverless.roboflow.com"
+"""Address of the server of Roboflow."""
 SECRET_WORDS = ("key", "token", "secret", "password", "authorization")
-"""Parts of the names of options that somebody may have put a secret into."""
+"""Parts of the names of unknown options that suggest a secret."""
 WORKFLOW_OPTIONS = ("workspace", "workflow_id", "workflow_input", "workflow_output")
-"""Options that are used by `api: workflow` alone."""
+"""Options that only `api: workflow` uses."""
 FORBIDDEN_CHARACTERS = "?&#= "
-"""Characters that would change the address of a request."""
+"""Characters that would change the URL of a request."""
 
 
 class RoboflowOptions(Section):
-    """What a detector of kind `roboflow` has to know beside what every detector has."""
+    """Options of a detector of kind `roboflow`, in addition to the options of all detectors."""
 
     model_id: str = ""
-    """The model, as the server knows it: `project/version`, or a name of inference-sdk's: `rfdetr-nano`. Not
-    used by `api: workflow`."""
-    url: str = HOSTED
-    """Where the inference server is."""
+    """Model id on the server: `project/version`, or an alias of inference-sdk such as `rfdetr-nano`. Not used
+    by `api: workflow`."""
+    url: str = HOSTED_URL
+    """Address of the inference server."""
     api: Literal["auto", "v0", "v1", "workflow"] = "auto"
-    """How to talk to it: `v0`, one request to `/project/version`; `v1`, as servers of one's own do; `auto`,
-    one of these two, as inference-sdk decides by the address; `workflow`, a workflow of a workspace."""
+    """API of the server: `v0`, one request to `/project/version`; `v1`, the API of self-hosted servers;
+    `auto`, `v0` or `v1` by the choice of inference-sdk; `workflow`, a workflow of a workspace."""
     workspace: str = ""
-    """Workspace of the workflow, as in its address."""
+    """Name of the workflow's workspace, as in the URL of the workflow."""
     workflow_id: str = ""
-    """The workflow, as in its address."""
+    """Name of the workflow, as in the URL of the workflow."""
     workflow_input: str = Field("image", min_length=1)
-    """The input of the workflow that takes an image."""
+    """Name of the workflow's input for the image."""
     workflow_output: str = Field("predictions", min_length=1)
-    """The output of the workflow that holds the predictions of an object detection model."""
+    """Name of the workflow's output with the predictions of an object detection model."""
     class_map: dict[str, str] = Field(default_factory=dict)
-    """From the model's class names to the cell's, where they differ."""
+    """Class names of the cell by class names of the model, if the names differ."""
     labels: tuple[str, ...] = ()
-    """The model's class names, so that `check` can tell which classes it does not know."""
+    """Class names of the model, for a check of the classes that a mission requests."""
     deadline: float = Field(1.0, gt=0, le=60)
-    """Longest time for all answers about one frame, by the wall clock and the run's [s]. The deadline covers
-    the requests for every image, and those that inference-sdk repeats after the statuses 429, 503 and 504."""
+    """Longest time for all answers about one frame, on the wall clock and on the clock of the run [s]. The
+    deadline covers all requests, and the retries of inference-sdk after the statuses 429, 503 and 504."""
     full: Literal["whole", "tiles"] = "whole"
-    """Images of a look at everything that the camera sees: `whole`, the frame; `tiles`, one after the other,
-    pieces of the table view's size that overlap by a quarter or more (9 in a frame of 640 x 480 pixels with a
-    table view of 256 x 256). A look at the table is one image. An image takes one request with `v0` and
-    `workflow`. It takes two with `v1` (the list of loaded models; the image), and three as long as the server
-    has not loaded the model."""
+    """Images for the view `full`: `whole`, the frame; `tiles`, one after the other, tiles of the size of the
+    table view that overlap by a quarter or more (9 in a frame of 640 x 480 pixels with a table view of
+    256 x 256). The view `table` is one image. An image takes one request with `v0` and `workflow`, two
+    requests with `v1` (the list of loaded models; the image), and three requests with `v1` until the server
+    has loaded the model."""
 
     @property
     def host(self) -> str:
-        """The server, without whatever else an address may hold."""
+        """Scheme, host and port of the server's address."""
         parts = urlsplit(self.url)
         return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"
 
     @property
     def subject(self) -> str:
-        """The model or the workflow, for sentences."""
+        """Kind and name of the model or the workflow, for messages."""
         if self.api == "workflow":
             return f"workflow {self.workspace}/{self.workflow_id}"
         return f"model {self.model_id}"
 
     @property
     def subject_options(self) -> str:
-        """The options that name the model or the workflow, for sentences."""
+        """Names of the options that select the model or the workflow, for messages."""
         return "workspace and workflow_id" if self.api == "workflow" else "model_id"
 
 
 def find_wrong_roboflow_options(config: DetectorConfig) -> OptionFaults:
-    """Yield every option because of which the detector could not be built, with a sentence."""
+    """Yield each invalid option, with a message."""
     wrong = list(find_wrong_options(RoboflowOptions, config))
-    for option, sentence in wrong:
+    for option, message in wrong:
         if any(part in option.lower() for part in SECRET_WORDS):
-            sentence = (
+            message = (
                 f'"{option}" does not belong in a cell file, where everybody may read it; '
-                f"delete it there and set the environment variable {VARIABLE}"
+                f"delete it there and set the environment variable {KEY_VARIABLE}"
             )
-        yield option, sentence
+        yield option, message
     if wrong:
         return
     options = RoboflowOptions.model_validate(config.options)
-    yield from _wrong_url(options.url)
-    yield from _wrong_workflow(options) if options.api == "workflow" else _wrong_model(options)
+    yield from _check_url(options.url)
+    yield from _check_workflow(options) if options.api == "workflow" else _check_model(options)
     if options.labels:
         yield from find_wrong_class_map(config, options.class_map, options.labels)
 
 
-def _wrong_model(options: RoboflowOptions) -> OptionFaults:
-    """Yield the option because of which no model can be asked, with a sentence."""
+def _check_model(options: RoboflowOptions) -> OptionFaults:
+    """Yield the option that prevents requests to a model, with a message."""
     given = [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]
     parts = options.model_id.split("/")
     if given:
@@ -101,7 +101,7 @@ def _wrong_model(options: RoboflowOptions) -> OptionFaults:
         yield given[0], f"api: {options.api} does not use {names}; write api: workflow, or delete {names}"
     elif not options.model_id:
         yield "model_id", f"api: {options.api} needs model_id: project/version, or a name such as rfdetr-nano"
-    elif any(mark in options.model_id for mark in FORBIDDEN_CHARACTERS):
+    elif any(character in options.model_id for character in FORBIDDEN_CHARACTERS):
         yield "model_id", "model_id must be a name or project/version alone, without ?, &, #, = or a space"
     elif options.api == "v0" and (len(parts) > 2 or not all(parts)):
         yield (
@@ -111,24 +111,24 @@ def _wrong_model(options: RoboflowOptions) -> OptionFaults:
         )
 
 
-def _wrong_workflow(options: RoboflowOptions) -> OptionFaults:
-    """Yield the option because of which no workflow can be run, with a sentence."""
+def _check_workflow(options: RoboflowOptions) -> OptionFaults:
+    """Yield each option that prevents requests to a workflow, with a message."""
     names = {"workspace": options.workspace, "workflow_id": options.workflow_id}
     for option, name in names.items():
         if not name:
             yield option, f"api: workflow needs workspace and workflow_id; {option} is missing"
-        elif any(mark in name for mark in f"{FORBIDDEN_CHARACTERS}/"):
+        elif any(character in name for character in f"{FORBIDDEN_CHARACTERS}/"):
             yield option, f"{option} must be a name alone, without /, ?, &, #, = or a space"
 
 
-def _wrong_url(url: str) -> OptionFaults:
-    """Yield a sentence if `url` is no address of a server alone."""
+def _check_url(url: str) -> OptionFaults:
+    """Yield the option `url`, with a message, if the value is not exactly the address of a server."""
     try:
         parts = urlsplit(url)
-        known = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+        is_server_address = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
     except ValueError:
-        known = False
-    if not known:
+        is_server_address = False
+    if not is_server_address:
         yield "url", "url must be an address such as http://127.0.0.1:9001 or https://serverless.roboflow.com"
     elif "@" in parts.netloc or parts.query or parts.fragment:
-        yield "url", f"url must hold no user, query or fragment; a key goes into the variable {VARIABLE}"
+        yield "url", f"url must hold no user, query or fragment; put a key into the variable {KEY_VARIABLE}"
