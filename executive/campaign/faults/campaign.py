@@ -95,7 +95,7 @@ class Campaign:
         numbers = [
             number
             for number, fault in enumerate(self.faults, 1)
-            if not (fault.behind or fault.instead_of or fault.ends_run)
+            if not (fault.is_conditional or fault.replaced or fault.ends_run)
         ]
         generator, pairs = random.Random(self.subject.seed), dict[Numbers, None]()
         while len(pairs) < min(count, math.comb(len(numbers), 2)):
@@ -118,9 +118,9 @@ class Campaign:
         for number, fault in enumerate(self.faults, 1):
             if number in tried:
                 continue
-            if fault.instead_of and (fault.instead_of not in tried or tried[fault.instead_of].raised):
+            if fault.replaced and (fault.replaced not in tried or tried[fault.replaced].raised):
                 continue
-            required = triggers.get(fault.about) if fault.behind else ()
+            required = triggers.get(fault.affected) if fault.is_conditional else ()
             if required is not None and len(required) < MAX_FAULTS_PER_RUN:
                 untried.append((*required, number))
         return untried

@@ -28,14 +28,14 @@ class SkillFault:
 
     Attributes:
         node: Path of its node.
-        how: The skill fails, raises an error, or raises an error when it is halted.
+        kind: The skill fails, raises an error, or raises an error when it is halted.
         reason: Reason of the failure; "" for an error.
         starts: Activations in which it misbehaves, counted from 1; empty: all activations.
         after: Number of control steps of the skill before the error.
     """
 
     node: str
-    how: Literal["fails", "raises", "raises when halted"]
+    kind: Literal["fails", "raises", "raises when halted"]
     reason: str = ""
     starts: tuple[int, ...] = ()
     after: int = 0
@@ -46,42 +46,41 @@ class PlannedFault:
     """A fault that is injected into a run; a value that can be sent to another process.
 
     Attributes:
-        about: Path of the affected node, or the affected part: `detector`, `object`, `tool`.
-        name: Label or skill of the node, or the same as `about`.
+        affected: Path of the affected node, or the affected part: `detector`, `object`, `tool`.
+        name: Label or skill of the node, or the same as `affected`.
         place: File and line of the node in the mission; "" for a part.
         what: Reason with which the node must fail, or a description of the fault.
         when: Time of the fault in the run.
-        means: Description of the cause.
+        cause: Description of the cause.
         cell_faults: Faults of the cell that cause the fault.
         skill_faults: Misbehaviour of skills that causes the fault.
-        reason: True if `what` is a reason of the node.
+        is_reason: True if `what` is a reason of the node.
         leads_to: Reason with which skills fail because of a fault of a part; "" if there is none.
-        behind: True if the node runs only after another fault.
-        instead_of: Number of the fault that this one replaces if that fault did not provoke its reason; 0 if
-            none.
+        is_conditional: True if the node runs only after another fault.
+        replaced: Number of the fault that this one replaces if that one did not provoke its reason; 0: none.
     """
 
-    about: str
+    affected: str
     name: str
     place: str
     what: str
     when: When
-    means: str
+    cause: str
     cell_faults: tuple[ScheduledFault, ...] = ()
     skill_faults: tuple[SkillFault, ...] = ()
-    reason: bool = False
+    is_reason: bool = False
     leads_to: str = ""
-    behind: bool = False
-    instead_of: int = 0
+    is_conditional: bool = False
+    replaced: int = 0
 
     @property
     def ends_run(self) -> bool:
         """True if the run ends with the status FAULT, as after any bug."""
-        return any(skill_fault.how != "fails" for skill_fault in self.skill_faults)
+        return any(skill_fault.kind != "fails" for skill_fault in self.skill_faults)
 
     def __str__(self) -> str:
         """Return a description of the fault."""
-        return f"{self.about} {self.what}, {self.when}: {self.means}"
+        return f"{self.affected} {self.what}, {self.when}: {self.cause}"
 
 
 def make_substitutes(
@@ -92,9 +91,9 @@ def make_substitutes(
     for fault in skill_faults:
         skill = substitutes.get(fault.node, skills[fault.node])
         error = InjectedError("a bug that the campaign injected")
-        if fault.how == "fails":
+        if fault.kind == "fails":
             broken = _make_failing(skill, fault.reason)
-        elif fault.how == "raises":
+        elif fault.kind == "raises":
             broken = make_raising(skill, error, after=fault.after)
         else:
             broken = make_raising_when_halted(skill, error)

@@ -38,7 +38,7 @@ def check_end(
 ) -> Iterator[str]:
     """Yield the problems with the end of a run; `raised` is True if an injected bug was raised."""
     if outcome.status == "FAULT":
-        nodes = [fault.about for fault in faults if fault.ends_run]
+        nodes = [fault.affected for fault in faults if fault.ends_run]
         if not raised or InjectedError.__name__ not in outcome.message:
             yield f"it ended as FAULT at {outcome.node or 'no node'}: {outcome.message}"
         elif not any(node == outcome.node or outcome.message.startswith(f"{node}: ") for node in nodes):
@@ -143,7 +143,7 @@ def describe_other_reason(outcome: RunEnded, faults: Sequence[PlannedFault]) -> 
     """Return a sentence if the run failed for another reason than those of the faults, or ""."""
     if outcome.status != "FAILURE" or outcome.reason == "lost":
         return ""
-    reasons = [fault.what if fault.reason else fault.leads_to for fault in faults]
+    reasons = [fault.what if fault.is_reason else fault.leads_to for fault in faults]
     intended = [reason for reason in reasons if reason]
     if outcome.reason.rpartition(".")[2] in intended:
         return ""

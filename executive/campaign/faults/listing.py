@@ -35,14 +35,14 @@ class Cause:
 
     Attributes:
         effect: Effect of the fault.
-        means: Description of the effect.
+        description: Description of the effect.
         needs: Property of the skills that it affects: `moves`, `senses`, or the name of a part that they use;
             "" for all skills.
         lasts: True if it may last until the end; False: a campaign limits the number of activations.
     """
 
     effect: Effect
-    means: str
+    description: str
     needs: str = ""
     lasts: bool = True
 
@@ -88,8 +88,7 @@ def list_faults(subject: Subject, rehearsal: Rehearsal) -> tuple[PlannedFault, .
     ]
     # A fault that replaces another one follows it.
     return tuple(
-        replace(fault, instead_of=number) if fault.instead_of else fault
-        for number, fault in enumerate(faults)
+        replace(fault, replaced=number) if fault.replaced else fault for number, fault in enumerate(faults)
     )
 
 
@@ -112,13 +111,13 @@ class _Listing:
         for reason in skill.reasons:
             cause = self._causes.get(reason)
             for when, nth in starts:
-                base = self._plan(node, reason, when, reason=True)
+                base = self._plan(node, reason, when, is_reason=True)
                 skill_fault = SkillFault(node.path, "fails", reason, nth or LASTING)
-                failure = replace(base, means="the skill says so", skill_faults=(skill_fault,))
+                failure = replace(base, cause="the skill fails by itself", skill_faults=(skill_fault,))
                 if cause is not None and cause.is_affecting(skill):
                     cell_fault = during(node.path, cause.effect, nth=nth or (() if cause.lasts else LASTING))
-                    yield replace(base, means=cause.means, cell_faults=(cell_fault,))
-                    failure = replace(failure, instead_of=-1)
+                    yield replace(base, cause=cause.description, cell_faults=(cell_fault,))
+                    failure = replace(failure, replaced=-1)
                 yield failure
 
     def list_errors(self, node: nodes.SkillNode) -> Iterator[PlannedFault]:
@@ -127,14 +126,16 @@ class _Listing:
         start, longest = max(enumerate(ticks, 1), key=lambda one: one[1], default=(1, 0))
         half = longest // 2
         first = SkillFault(node.path, "raises", starts=(1,))
-        yield self._plan(node, "raises", "first", means="its code raises 0 ticks on", skill_faults=(first,))
+        cause = "its code raises an error at the start"
+        yield self._plan(node, "raises", "first", cause=cause, skill_faults=(first,))
         if longest >= 2:
-            later, means = replace(first, starts=(start,), after=half), f"its code raises {half} ticks on"
-            yield self._plan(node, "raises", "middle", means=means, skill_faults=(later,))
+            later = replace(first, starts=(start,), after=half)
+            cause = f"its code raises an error after {half} ticks"
+            yield self._plan(node, "raises", "middle", cause=cause, skill_faults=(later,))
         if longest >= 2 or not ticks:
             halted = SkillFault(node.path, "raises when halted", starts=(start,), after=half)
-            means = f"its code raises when it is halted {half} ticks on"
-            yield self._plan(node, "halted", "middle", means=means, skill_faults=(halted,))
+            cause = f"its code raises an error at a halt after {half} ticks"
+            yield self._plan(node, "halted", "middle", cause=cause, skill_faults=(halted,))
 
     def list_detector_faults(self) -> Iterator[PlannedFault]:
         """Yield slow, hanging, unsure and dead detectors, from the start and from half of the run on."""
@@ -167,7 +168,7 @@ class _Listing:
                 bumped = effects.object_bumped(x, y, "node", share)
                 for what, effect in (("target taken", taken), ("target bumped", bumped)):
                     cell_fault = during(node.path, effect, nth=nth)
-                    yield self._plan(node, what, when, means=f"at {share:g}", cell_faults=(cell_fault,))
+                    yield self._plan(node, what, when, cause=f"at {share:g}", cell_faults=(cell_fault,))
 
     def list_tool_faults(self) -> Iterator[PlannedFault]:
         """Yield seals that break during a transport, and seals that fail."""
@@ -177,9 +178,9 @@ class _Listing:
                 continue
             for when, share in TRANSPORT_SHARES:
                 cell_fault = during(node.path, effects.seal_breaks(share), nth=1)
-                yield self._plan(node, "lets go", when, means=f"at {share:g}", cell_faults=(cell_fault,))
+                yield self._plan(node, "lets go", when, cause=f"at {share:g}", cell_faults=(cell_fault,))
             over, what = during(node.path, effects.seal_breaks_over_wrong_bin()), "lets go over another bin"
-            yield self._plan(node, what, "lasting", means="every time", cell_faults=(over,))
+            yield self._plan(node, what, "lasting", cause="every time", cell_faults=(over,))
         half = self._rehearsal.robot_time / 2
         for duration in (SHORT, LONG):
             fails = between(half, half + duration, effects.seal_fails())
@@ -191,7 +192,7 @@ class _Listing:
     def _plan(self, node: nodes.SkillNode, what: str, when: When, **more: object) -> PlannedFault:
         place = f"{node.mark.source.path}:{node.mark.line}"
         fault = PlannedFault(
-            node.path, node.label or node.skill, place, what, when, "", behind=not self._has_run(node)
+            node.path, node.label or node.skill, place, what, when, "", is_conditional=not self._has_run(node)
         )
         return replace(fault, **more)  # type: ignore[arg-type]
 

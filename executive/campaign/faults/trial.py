@@ -142,7 +142,7 @@ class _TrialRun:
             start = self._activations.starts.get(skill_fault.node)
             is_intended = self._activations.counts[skill_fault.node] in skill_fault.starts
             is_due = start is not None and self.run.tick >= start + skill_fault.after
-            if skill_fault.how == "raises when halted" and is_intended and is_due:
+            if skill_fault.kind == "raises when halted" and is_intended and is_due:
                 self._stopped = True
                 self.run.control.stop()
 
@@ -160,11 +160,11 @@ class _TrialRun:
     def _has_raised(self, fault: PlannedFault) -> bool:
         """Return True if the node of a fault ended as intended; True for a fault without a node."""
         ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
-        node_ends = [end for end in ends if end.node == fault.about]
+        node_ends = [end for end in ends if end.node == fault.affected]
         if fault.ends_run:
             return any(end.status == "INVALID" and InjectedError.__name__ in end.message for end in node_ends)
         failures = [end for end in node_ends if (end.status, end.reason) == ("FAILURE", fault.what)]
         messages = [end.message for end in failures]
-        return not fault.reason or any(
+        return not fault.is_reason or any(
             not fault.skill_faults or message == INJECTED_FAILURE for message in messages
         )

@@ -75,7 +75,7 @@ def test_every_fault_is_tried_once_in_the_order_of_the_list(figures: FaultFigure
     # Only what the cell brought about already is not said by the skill, too.
     raised = {trial.numbers[-1] for trial in figures.trials if trial.raised}
     assert left_out
-    assert all(faults[number - 1].instead_of in raised for number in left_out)
+    assert all(faults[number - 1].replaced in raised for number in left_out)
     assert (figures.complete, figures.listed) == (True, len(faults))
 
 

@@ -27,7 +27,7 @@ from executive.testing.faults.world_access import TrueObject
 BUG = PlannedFault(
     "tree/Grasp", "Grasp", "", "raises", "first", "", skill_faults=(SkillFault("tree/Grasp", "raises"),)
 )
-MISS = PlannedFault("tree/Grasp", "Grasp", "", "missed", "first", "", reason=True)
+MISS = PlannedFault("tree/Grasp", "Grasp", "", "missed", "first", "", is_reason=True)
 ENDINGS = (Ending("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "skipped": 0, "lost": 0, "phantom": 0}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}

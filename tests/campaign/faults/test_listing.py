@@ -19,7 +19,7 @@ from executive.plugins import discover
 )
 def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in_each(mission: str) -> None:
     subject = Subject(load_mission(mission, discover()), discover(), FakeCell, "fake", 0)
-    listed = {(fault.about, fault.what, fault.when) for fault in Campaign(subject).faults}
+    listed = {(fault.affected, fault.what, fault.when) for fault in Campaign(subject).faults}
     nodes = skill_nodes(subject)
     assert len(nodes) >= 20
     for node in nodes:
@@ -30,14 +30,14 @@ def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in
 
 def test_a_node_that_runs_often_goes_wrong_in_the_middle_too(campaign: Campaign) -> None:
     middle = {
-        (fault.name, fault.what) for fault in campaign.faults if fault.when == "middle" and fault.reason
+        (fault.name, fault.what) for fault in campaign.faults if fault.when == "middle" and fault.is_reason
     }
     assert {("Grasp", "missed"), ("Transit", "dropped"), ("Approach", "no_contact")} <= middle
 
 
 def test_detectors_objects_and_the_tool_go_wrong_too(campaign: Campaign) -> None:
     def told(name: str) -> set[str]:
-        return {fault.what for fault in campaign.faults if fault.name == name and not fault.reason}
+        return {fault.what for fault in campaign.faults if fault.name == name and not fault.is_reason}
 
     ways = ("hangs", "dead", "unsure")
     lasting = {f"{way} for {time}" for way in ways for time in ("0.5 s", "5 s")}
@@ -51,18 +51,19 @@ def test_detectors_objects_and_the_tool_go_wrong_too(campaign: Campaign) -> None
 
 def test_a_reason_is_brought_about_in_the_cell_and_else_said_by_the_skill(campaign: Campaign) -> None:
     for number, fault in enumerate(campaign.faults, 1):
-        if fault.instead_of:
-            physical = campaign.faults[fault.instead_of - 1]
-            assert fault.instead_of == number - 1
-            assert (physical.about, physical.what, physical.when) == (fault.about, fault.what, fault.when)
+        if fault.replaced:
+            physical = campaign.faults[fault.replaced - 1]
+            assert fault.replaced == number - 1
+            assert (physical.affected, physical.what) == (fault.affected, fault.what)
+            assert physical.when == fault.when
             assert physical.cell_faults
             assert fault.skill_faults
-    of = {fault.what: fault for fault in campaign.faults if fault.reason and not fault.instead_of}
-    assert (of["missed"].means, of["doubtful"].means) == ("nothing seals", "the skill says so")
+    of = {fault.what: fault for fault in campaign.faults if fault.is_reason and not fault.replaced}
+    assert (of["missed"].cause, of["doubtful"].cause) == ("nothing seals", "the skill fails by itself")
 
 
 def test_what_runs_only_after_something_else_is_marked(campaign: Campaign) -> None:
-    behind = {fault.name for fault in campaign.faults if fault.behind}
+    behind = {fault.name for fault in campaign.faults if fault.is_conditional}
     always = {fault.name for fault in campaign.faults} - behind
     assert {"PutDown", "RejectTarget"} <= behind
     assert {"Grasp", "Transit", "Release"} <= always

@@ -23,8 +23,8 @@ def number_of(campaign: Campaign, name: str, what: str, when: str = "first", *, 
     return next(
         number
         for number, fault in enumerate(campaign.faults, 1)
-        if (fault.name, fault.what, fault.when, fault.behind) == (name, what, when, behind)
-        and not fault.instead_of
+        if (fault.name, fault.what, fault.when, fault.is_conditional) == (name, what, when, behind)
+        and not fault.replaced
     )
 
 
@@ -73,7 +73,7 @@ def test_a_bug_ends_the_run_as_a_fault_of_its_node(
     trial = tried(campaign, number)
     assert (trial.status, trial.happened, trial.problems) == ("FAULT", True, ())
     assert "InjectedError" in trial.message
-    assert campaign.faults[number - 1].about in (trial.node, trial.message.partition(": ")[0])
+    assert campaign.faults[number - 1].affected in (trial.node, trial.message.partition(": ")[0])
 
 
 def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campaign) -> None:
@@ -82,7 +82,7 @@ def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campai
     assert (alone.verdict, alone.status) == ("-", "SUCCESS")
     both = tried(campaign, number_of(campaign, "Transit", "unreachable"), behind)
     assert (both.verdict, both.raised, both.problems) == ("ok", True, ())
-    assert campaign.faults[behind - 1].about in both.entered
+    assert campaign.faults[behind - 1].affected in both.entered
     assert both.label.endswith(f"+{behind}")
 
 
