@@ -44,20 +44,20 @@ def command(
     with stdout_kept_clean():
         from pydantic_core import to_json
 
-        from executive.view.tree.dot import dot
-        from executive.view.tree.outline import draw, fold_subtrees
-        from executive.view.tree.svg import svg
+        from executive.view.tree.dot import draw_dot
+        from executive.view.tree.outline import draw_outline, fold_subtrees
+        from executive.view.tree.svg import draw_svg
 
         name, nodes = _outline_of(mission, overrides)
         nodes = fold_subtrees(nodes) if fold else nodes
         if as_svg:
-            shown = svg(nodes, name)
+            shown = draw_svg(nodes, name)
         elif as_dot:
-            shown = dot(nodes, name)
+            shown = draw_dot(nodes, name)
         elif as_json:
             shown = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
         else:
-            shown = draw(nodes, ports=ports, reasons=reasons)
+            shown = draw_outline(nodes, ports=ports, reasons=reasons)
     (print_json if as_json else click.echo)(shown)
 
 

@@ -23,8 +23,8 @@ _DEFAULT_ADVANCE = 0.64
 _BOLD_FACTOR = 1.12
 
 
-def extent(text: str, size: float, *, bold: bool = False) -> float:
-    """Return an upper estimate of the length of a text in a sans-serif font of this size."""
+def measure_text(text: str, size: float, *, bold: bool = False) -> float:
+    """Return an upper bound of the length [pixel] of a text in a sans-serif font of this size [pixel]."""
     advances = sum(
         1.05 if unicodedata.east_asian_width(character) in "WF" else _ADVANCE.get(character, _DEFAULT_ADVANCE)
         for character in text
@@ -32,7 +32,7 @@ def extent(text: str, size: float, *, bold: bool = False) -> float:
     return advances * size * (_BOLD_FACTOR if bold else 1.0)
 
 
-def fitted(text: str, columns: int, lines: int = 1) -> tuple[str, ...]:
+def fit_text(text: str, columns: int, lines: int = 1) -> tuple[str, ...]:
     """Return a text in at most `lines` lines of `columns` characters, preferably broken after a comma.
 
     The rest of a longer text is replaced by `…`.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.view.text import extent, fitted, replace_invalid
+from executive.view.text import fit_text, measure_text, replace_invalid
 
 
 @pytest.mark.parametrize(
@@ -19,16 +19,16 @@ from executive.view.text import extent, fitted, replace_invalid
     ],
 )
 def test_text_is_cut_behind_a_comma_where_it_can_be(text, rows):
-    assert fitted(text, 11, 2) == rows
+    assert fit_text(text, 11, 2) == rows
 
 
 def test_long_text_gets_a_longer_box():
     assert (
-        extent("SelectTarget", 13)
-        < extent("SelectTarget", 13, bold=True)
-        < extent("SelectTargets", 13, bold=True)
+        measure_text("SelectTarget", 13)
+        < measure_text("SelectTarget", 13, bold=True)
+        < measure_text("SelectTargets", 13, bold=True)
     )
-    assert extent("日本", 10) > extent("ab", 10)
+    assert measure_text("日本", 10) > measure_text("ab", 10)
 
 
 def test_what_xml_cannot_hold_is_replaced():

@@ -23,10 +23,8 @@ def _list_parts(detector: str, evaluation: Evaluation) -> Iterator[RenderableTyp
     yield f"  {evaluation.objects} objects on {evaluation.images} images, threshold {evaluation.threshold:g}"
     if evaluation.unavailable:
         share = evaluation.unavailable / evaluation.images
-        yield (
-            f"  unavailable for {evaluation.unavailable} of {evaluation.images} images ({share:.1%}), "
-            f"at last: {evaluation.why}"
-        )
+        count = f"{evaluation.unavailable} of {evaluation.images} images ({share:.1%})"
+        yield f"  unavailable for {count}, last reason: {evaluation.why}"
     if not evaluation.answered_by:
         return
     if set(evaluation.answered_by) != {detector}:

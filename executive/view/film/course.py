@@ -9,7 +9,7 @@ from executive.events import FaultRaised, NodeEnded, RunHalted, RunResumed, Time
 from executive.mission.outline import OutlineNode
 from executive.record.timeline.activation import Activation, skill_name
 from executive.record.timeline.timeline import Timeline
-from executive.view.tree.outline import skills
+from executive.view.tree.outline import find_skill_names
 
 FAILURE_TIME = 1.6
 """Time for which a failure is shown [s]."""
@@ -37,7 +37,7 @@ class FilmCourse:
         self.clock = 0.0
         self._events = list(events)[::-1]
         self._pictures = sorted(pictures, reverse=True)
-        self._skills = skills(nodes)
+        self._skills = find_skill_names(nodes)
         self._failure: tuple[float, str] = (-FAILURE_TIME, "")
 
     @property

@@ -11,7 +11,7 @@ BACK, RULE = "#14181D", "#2E3742"
 INK, DIM, FAINT = "#F3F6F8", "#9AA6B2", "#66727F"
 """Colours of important text, of other text, and of nodes that do not run."""
 RUNNING, SUCCESS, FAILURE = "#F2A71B", "#45BD70", "#F0685C"
-"""Colours of a status: those of `executive.view.tree.style`, adapted to a dark background."""
+"""Colours of a status: those of `view/tree/tree.svg`, adapted to a dark background."""
 STATUS = {"RUNNING": RUNNING, "SUCCESS": SUCCESS, "FAILURE": FAILURE}
 """Colour by status; any other status is drawn as `FAINT`."""
 

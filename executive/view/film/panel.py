@@ -12,7 +12,7 @@ from executive.mission.outline import OutlineNode
 from executive.view.film import ink
 from executive.view.film.course import FilmCourse
 from executive.view.film.ink import DIM, FAILURE, FAINT, INK, RULE, RUNNING, STATUS, SUCCESS
-from executive.view.tree.outline import branches, open_running
+from executive.view.tree.outline import draw_branches, select_open
 
 TEXT_SIZE, HEADING_SIZE, MARK_SIZE = 14, 12, 11
 """Sizes of text, of column headings and of status marks [pixel]."""
@@ -21,7 +21,7 @@ NODE_ROW, ITEM_ROW, INDENT = 18, 20, 17
 MAX_ITEM_ROWS = 9
 """Largest number of rows for items."""
 _CHARACTERS_PER_LEVEL = 3
-"""Number of characters that `branches` returns per level of the tree."""
+"""Number of characters that `draw_branches` returns per level of the tree."""
 _COLUMNS = {"item": 0.0, "class": 0.32, "state": 0.53, "bin": 0.74}
 """Left ends of the columns [share of the width]."""
 _STATES = {"placed": SUCCESS, "rejected": FAILURE, "lost": FAILURE, "held": RUNNING, "dropped": RUNNING}
@@ -41,7 +41,7 @@ def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], cour
     left, top, right, bottom = box
     shown = select_nodes(nodes, course, int((bottom - top) // NODE_ROW))
     draw = ImageDraw.Draw(image)
-    for row, (node, branch) in enumerate(zip(shown, branches(shown), strict=True)):
+    for row, (node, branch) in enumerate(zip(shown, draw_branches(shown), strict=True)):
         middle = top + NODE_ROW * (row + 0.5)
         _draw_lines(draw, branch, left, middle)
         last = course.timeline.current(node.path)
@@ -65,7 +65,7 @@ def select_nodes(nodes: Sequence[OutlineNode], course: FilmCourse, rows: int) ->
     Nodes that never ran are left out first, then nodes that do not run; the last of the tree first.
     """
     open_paths = course.open_paths
-    shown = open_running(nodes, open_paths)
+    shown = select_open(nodes, open_paths)
 
     def rank(index: int) -> tuple[bool, bool, int]:
         path = shown[index].path

@@ -33,7 +33,7 @@ from executive.view.live.messages import (
     SceneChange,
     encode_poses,
 )
-from executive.view.tree.svg import Note, svg
+from executive.view.tree.svg import Note, draw_svg
 
 LOOPBACK = "127.0.0.1"
 POSE_PERIOD = 1 / 10
@@ -111,7 +111,7 @@ class LivePage:
         blank = {node.path: Note("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(SceneChange(shapes=shapes))
-        self._enqueue(Change(tree=svg(nodes, mission, blank)))
+        self._enqueue(Change(tree=draw_svg(nodes, mission, blank)))
         run.control.between_ticks(self._send_state)
         self._send_state()
 

@@ -1,4 +1,4 @@
-"""Facts about a run for its report, from its directory."""
+"""Facts about a run for its report, read from the run directory."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from executive.record.recorded_mission import read_tree
 from executive.record.result import ENDED, list_requests, read_result
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
-from executive.view.report.pictures import pictures
-from executive.view.report.shares import shares
+from executive.view.report.pictures import collect_pictures
+from executive.view.report.shares import compute_shares
 from executive.view.terminal.summary import repeat_command
 
 CUT_OFF = "CUT OFF"
-"""Status of a run whose record has no end: the run was killed, or still goes on."""
+"""Status of a run whose record has no end: the run was killed, or is still running."""
 
 
 class ReportFacts:
@@ -40,10 +40,10 @@ class ReportFacts:
         requests: Requests of the operator.
         repeat: The command that repeats the run.
         resume: The command that resumes the run, or "" if the run cannot be resumed.
-        replay: The command that replays it.
+        replay: The command that replays the run.
 
     Raises:
-        InputError: The directory lacks the journal or the tree, or its run never started.
+        InputError: The directory lacks the journal or the tree, or the run never started.
     """
 
     def __init__(self, path: Path) -> None:
@@ -58,8 +58,8 @@ class ReportFacts:
         self.timeline = Timeline.of(events)
         items = self.timeline.items.now()
         self.objects = [item for item in items if item.state != "phantom"]
-        self.shares = shares(self.timeline, self.nodes)
-        self.pictures = pictures(directory.frames, [item.item for item in items])
+        self.shares = compute_shares(self.timeline, self.nodes)
+        self.pictures = collect_pictures(directory.frames, [item.item for item in items])
         self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
         mission = file.stem if file.parent == shipped_folder() else str(file)

@@ -23,14 +23,14 @@ from executive.view.report.lanes import draw_lanes
 from executive.view.report.shares import LOOK, RETRY, WAITING
 from executive.view.terminal.summary import place_on_table
 from executive.view.text import render
-from executive.view.tree.svg import Note, svg
+from executive.view.tree.svg import Note, draw_svg
 
 COLOURS = {LOOK: "#56B4E9", RETRY: "#D55E00", WAITING: "#9aa5b4"}
 """Colours of activities without a skill; skills have the other colours of the palette, in order."""
 
 
 def leave_report(run: str) -> tuple[str, str]:
-    """Write the report of the run in a directory; return its file and "", or "" and the error.
+    """Write the report of the run in a directory; return its file or "", and an error message or "".
 
     Errors of the report do not change the result of the run.
     """
@@ -41,19 +41,19 @@ def leave_report(run: str) -> tuple[str, str]:
     except Exception as error:
         return "", (
             f"no report was written: {type(error).__name__}: {error}; "
-            f"`executive --debug report {run}` shows where"
+            f"`executive --debug report {run}` shows the place of the error"
         )
 
 
 def write_report(path: Path) -> Path:
-    """Write the report of the run in a directory completely or not at all, and return its file.
+    """Write the report of the run in a directory atomically, and return its file.
 
     Raises:
-        InputError: The directory lacks journal or tree, or cannot be written to.
+        InputError: The directory lacks the journal or the tree, or is not writable.
     """
     file = RunDirectory(path).report
     page = render_report(ReportFacts(path))
-    remedy = "copy the run directory to where you may write, and have the report of the copy made"
+    remedy = "copy the run directory to a writable folder, and make the report of the copy"
     with convert_os_errors(f'write the report "{file}"', remedy):
         write_atomically(file, page)
     return file
@@ -77,28 +77,26 @@ def render_report(facts: ReportFacts) -> str:
         unknown=describe_unknown({} if result is None else result.unknown),
         story=story,
         story_facts=[] if story is None else list(text.facts(story)),
-        last_picture=next(
-            (picture for picture in facts.pictures if story and picture.file == story.picture), None
-        ),
+        last_picture=next((each for each in facts.pictures if story and each.file == story.picture), None),
         titles={node.path: node.title for node in facts.nodes},
         place=place_on_table,
         colours=_choose_colours(facts.shares.activities),
-        sums={item: sum(spent.values()) for item, spent in rows.items()},
-        tree=Markup(svg(facts.nodes, facts.start.mission, _make_notes(facts))),
+        totals={item: sum(times.values()) for item, times in rows.items()},
+        tree=Markup(draw_svg(facts.nodes, facts.start.mission, _make_notes(facts))),
         lanes=Markup(draw_lanes(timeline, facts.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
-        other=[picture for picture in facts.pictures if picture.reason and picture.item not in items],
+        other_pictures=[each for each in facts.pictures if each.reason and each.item not in items],
     )
 
 
 def _find_reason(facts: ReportFacts) -> str:
-    """Return the reason of the end, if the status does not say it already."""
+    """Return the reason of the end, or "" if it is the status."""
     reason = "" if facts.end is None else facts.end.reason
     return "" if reason.upper() == facts.status else reason
 
 
 def _describe_end(facts: ReportFacts) -> str:
-    """Return the end of the run in one sentence."""
+    """Return a sentence about the end of the run, after a warning if ledger and audit disagree."""
     warning = "" if facts.result is None else disagreement(facts.result)
     return ". ".join(filter(None, (warning, _describe_status(facts))))
 
@@ -106,30 +104,30 @@ def _describe_end(facts: ReportFacts) -> str:
 def _describe_status(facts: ReportFacts) -> str:
     result, end = facts.result, facts.end
     if end is None:
-        return "The record has no end: the run was killed, or goes on."
+        return "The record has no end: the run was killed, or is still running."
     if result is not None and result.story is not None:
         return result.story.verdict
     if end.message:
         return end.message
     if result is None:
-        return "The run has ended; its result file is missing."
+        return "The run ended, but there is no result.json of it."
     items = result.items
     if not items.seen:
         return "The mission succeeded; no object was seen."
-    left = {"rejected": items.rejected, "skipped": items.skipped, "lost": items.lost}
-    others = "".join(f", {number} {state}" for state, number in left.items() if number)
+    other_ends = {"rejected": items.rejected, "skipped": items.skipped, "lost": items.lost}
+    others = "".join(f", {number} {state}" for state, number in other_ends.items() if number)
     return f"{items.placed} of {items.seen} objects are in their bins{others}."
 
 
 def _choose_colours(activities: Sequence[str]) -> dict[str, str]:
     """Return the colour of each activity."""
-    free = cycle(colour for colour in PALETTE if colour not in COLOURS.values())
-    return {activity: COLOURS.get(activity) or next(free) for activity in activities}
+    free_colours = cycle(colour for colour in PALETTE if colour not in COLOURS.values())
+    return {activity: COLOURS.get(activity) or next(free_colours) for activity in activities}
 
 
 def _make_notes(facts: ReportFacts) -> dict[str, Note]:
     """Return the note of each node in the drawing of the tree."""
     return {
-        path: Note(ran[-1].status, tuple(filter(None, (count_ends(ran), find_last_failure(ran)))))
-        for path, ran in group_by_node(facts.timeline.activations).items()
+        path: Note(runs[-1].status, tuple(filter(None, (count_ends(runs), find_last_failure(runs)))))
+        for path, runs in group_by_node(facts.timeline.activations).items()
     }

@@ -1,4 +1,4 @@
-"""Images of decisions and failures of a run, for the report."""
+"""Pictures of a run, embedded in a page or linked."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from pathlib import Path
 from urllib.parse import quote
 
 MAX_EMBEDDED_SIZE = 3_000_000
-"""Total size of embedded images, small enough for an e-mail [bytes]; further images are linked."""
+"""Largest total size of the embedded pictures of a page, which can then be sent by mail [bytes]."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One image of a run.
+    """Picture of a run.
 
     Attributes:
-        source: Source of an `img` element: the embedded image, or a link to its file.
-        file: Its path below the run directory.
-        tick: Control step of the image.
-        item: Object of the decision or failure, or "".
-        reason: Reason of the failure, or "".
+        source: Source for an `img`: the embedded picture, or a link to its file.
+        file: Path of the file in the run directory.
+        tick: Control step of the picture.
+        item: Object in the picture, or "".
+        reason: Failure reason, or "" for a decision.
     """
 
     source: str
@@ -31,30 +31,30 @@ class Picture:
     reason: str
 
 
-def pictures(folder: Path, items: Collection[str]) -> list[Picture]:
-    """Return the images in the folder `frames` of a run.
+def collect_pictures(folder: Path, items: Collection[str]) -> list[Picture]:
+    """Return the pictures in the folder `frames` of a run.
 
-    First come the images of the last decision for each object, which have no reason and are embedded first,
-    then those of failures in their order.
+    The pictures of the last decision for each object come first and are embedded first; the pictures of
+    failures follow in the order of time.
     """
     parsed = sorted(
-        (_parse_name(file, items) for file in folder.glob("*.jpg")), key=lambda entry: (entry[1], entry[0])
+        (_parse_name(file, items) for file in folder.glob("*.jpg")), key=lambda each: (each[1], each[0])
     )
-    decided = {item: (file, tick, item, "") for file, tick, item, reason in parsed if item and not reason}
+    decisions = {item: (file, tick, item, "") for file, tick, item, reason in parsed if item and not reason}
     free_size = MAX_EMBEDDED_SIZE
-    found = []
-    for file, tick, item, reason in [*decided.values(), *(entry for entry in parsed if entry[3])]:
+    pictures = []
+    for file, tick, item, reason in [*decisions.values(), *(each for each in parsed if each[3])]:
         path = f"{file.parent.name}/{file.name}"
         source = quote(path)
         if 4 * file.stat().st_size / 3 <= free_size:
             source = "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
             free_size -= len(source)
-        found.append(Picture(source, path, tick, item, reason))
-    return found
+        pictures.append(Picture(source, path, tick, item, reason))
+    return pictures
 
 
 def _parse_name(file: Path, items: Collection[str]) -> tuple[Path, int, str, str]:
-    """Return a file with the parts of its name: tick, object and reason."""
+    """Return a file, and control step, object and reason from its name `<tick>_<item>_<reason>`."""
     tick, _, rest = file.stem.partition("_")
     number = int(tick) if tick.isdecimal() else 0
     for item in sorted(items, key=len, reverse=True):

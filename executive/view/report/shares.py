@@ -13,29 +13,33 @@ from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 
 LOOK, RETRY, WAITING = "look", "retry", "waiting"
-"""Activities without a skill: search for the next object, failed attempts with recovery, and other time."""
+"""Activities besides the skills: search for the next object; failed attempts and the preparation of the next
+attempt; all other time."""
 
-NO_ITEM = ""
-"""Item of the time that led to no object, such as the last look at an empty table."""
+Interval = tuple[float, float, list[Activation]]
+"""Start and end of an interval [s], and its running skills in the order of their start."""
+
+NO_OBJECT = ""
+"""Row of the time that led to no object, such as the last look at an empty table."""
 
 
 @dataclass(frozen=True)
 class Shares:
-    """Time of a run by item and activity [s].
+    """Time of a run by object and activity [s].
 
     Attributes:
-        activities: Activities with a share of the time, in the order of a pick.
-        rows: Time by object, then by activity; `NO_ITEM` is last. The sum is the time of the run.
+        activities: Activities that took time, in the order of a pick.
+        rows: Time by object, then by activity; `NO_OBJECT` is last. The sum is the duration of the run.
     """
 
     activities: tuple[str, ...]
     rows: Mapping[str, Mapping[str, float]]
 
 
-def shares(timeline: Timeline, nodes: Sequence[OutlineNode]) -> Shares:
+def compute_shares(timeline: Timeline, nodes: Sequence[OutlineNode]) -> Shares:
     """Return the shares of the time from the start of a run to the last event of its timeline.
 
-    Time of parallel skills counts for the skill that started first among those with an object.
+    Time of concurrent skills belongs to the skill that started first among those with an object.
 
     Args:
         timeline: Timeline of the run, with its history.
@@ -47,56 +51,48 @@ def shares(timeline: Timeline, nodes: Sequence[OutlineNode]) -> Shares:
     times: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     skill_activities: dict[str, None] = {}
     retries = _find_retries(activations, skills, decisions)
-    for start, end, running in _slice_time(activations, timeline.clock):
-        item_skill = next((activation for activation in running if activation.item), None)
-        if item_skill is not None:
-            item, activity = item_skill.item, skills[item_skill.node].skill.lower()
+    for start, end, running in _split_time(activations, timeline.clock):
+        main = next((activation for activation in running if activation.item), None)
+        if main is not None:
+            item, activity = main.item, skills[main.node].skill.lower()
         else:
-            item, activity = _find_next_item(decisions, end), _classify(running, skills)
+            item, activity = _find_next_item(decisions, end), _classify_pause(running, skills)
         first, last = retries.get(item, (0.0, 0.0))
         if first <= start and end <= last:
             activity = RETRY
-        elif item_skill is not None:
+        elif main is not None:
             skill_activities[activity] = None
         times[item][activity] += end - start
     # A skill may have the name of another activity.
-    known = dict.fromkeys([LOOK, *skill_activities, RETRY, WAITING])
+    names = dict.fromkeys([LOOK, *skill_activities, RETRY, WAITING])
     used = {activity for row in times.values() for activity in row}
-    order = sorted(times, key=lambda item: item == NO_ITEM)
-    return Shares(tuple(name for name in known if name in used), {item: dict(times[item]) for item in order})
+    order = sorted(times, key=lambda item: item == NO_OBJECT)
+    return Shares(tuple(name for name in names if name in used), {item: dict(times[item]) for item in order})
 
 
-def _slice_time(
-    activations: Sequence[Activation], run_end: float
-) -> Iterator[tuple[float, float, list[Activation]]]:
-    """Yield start and end of each interval between changes, and its skills in order of their start."""
-    upcoming = deque(
-        sorted(
-            (activation for activation in activations if activation.end > activation.start),
-            key=lambda activation: activation.start,
-        )
-    )
-    times = sorted(
-        {0.0, run_end, *(time for activation in activations for time in (activation.start, activation.end))}
-    )
+def _split_time(activations: Sequence[Activation], end: float) -> Iterator[Interval]:
+    """Yield the intervals between successive starts and ends of skills, until the end of the run [s]."""
+    lasting = [activation for activation in activations if activation.end > activation.start]
+    waiting = deque(sorted(lasting, key=lambda activation: activation.start))
+    times = sorted({0.0, end, *(time for each in activations for time in (each.start, each.end))})
     running: list[Activation] = []
-    for start, end in pairwise(times):
+    for start, stop in pairwise(times):
         running = [activation for activation in running if activation.end > start]
-        while upcoming and upcoming[0].start <= start:
-            running.append(upcoming.popleft())
-        yield start, end, running
+        while waiting and waiting[0].start <= start:
+            running.append(waiting.popleft())
+        yield start, stop, running
 
 
-def _classify(running: Sequence[Activation], skills: Mapping[str, OutlineNode]) -> str:
-    """Return the activity while no running skill has an object."""
+def _classify_pause(running: Sequence[Activation], skills: Mapping[str, OutlineNode]) -> str:
+    """Return the activity of running skills without an object."""
     nodes = [skills[activation.node] for activation in running]
     return LOOK if any(node.senses or "arm" in node.uses for node in nodes) else WAITING
 
 
-def _find_next_item(decisions: Sequence[tuple[float, str]], now: float) -> str:
-    """Return the object of the first decision at or after a time [s]."""
-    place = bisect_left(decisions, (now, ""))
-    return decisions[place][1] if place < len(decisions) else NO_ITEM
+def _find_next_item(decisions: Sequence[tuple[float, str]], time: float) -> str:
+    """Return the object of the first decision from a time [s] on, or `NO_OBJECT`."""
+    index = bisect_left(decisions, (time, ""))
+    return decisions[index][1] if index < len(decisions) else NO_OBJECT
 
 
 def _find_retries(
@@ -104,19 +100,17 @@ def _find_retries(
     skills: Mapping[str, OutlineNode],
     decisions: Sequence[tuple[float, str]],
 ) -> dict[str, tuple[float, float]]:
-    """Return start and end of the failed attempts [s], by item."""
-    failed = {
+    """Return start and end of the failed attempts [s] of each object with a failed attempt."""
+    last_failures = {
         activation.item: activation.end
         for activation in activations
         if activation.item and activation.status == "FAILURE"
         if skills[activation.node].uses and not skills[activation.node].senses
     }
     retries = {}
-    for item, last in failed.items():
+    for item, last in last_failures.items():
         decided = [time for time, name in decisions if name == item]
-        first = min(
-            decided, default=min(activation.start for activation in activations if activation.item == item)
-        )
-        # Looks that led to the next attempt are the price of the failed one.
+        first = min(decided, default=min(each.start for each in activations if each.item == item))
+        # Looks before the next attempt count as part of the failed attempt.
         retries[item] = first, next((time for time in decided if time > last), last)
     return retries

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TextIO
 from executive import events
 from executive.mission.outline import outline
 from executive.record.timeline.timeline import Timeline
-from executive.view.tree.outline import skills
+from executive.view.tree.outline import find_skill_names
 
 if TYPE_CHECKING:
     from executive.run.run import Run
@@ -35,7 +35,7 @@ class Lines:
         """Read the names of the nodes."""
         nodes = outline(run.root)
         self._names = {node.path: node.name for node in nodes}
-        self._skills = skills(nodes)
+        self._skills = find_skill_names(nodes)
 
     def __call__(self, timed: events.TimedEvent) -> None:
         """Write the line of an event, if it has one."""

@@ -1,1 +1,1 @@
-"""Representations of a tree: text, SVG, Graphviz."""
+"""Views of a tree: text, picture and Graphviz text."""

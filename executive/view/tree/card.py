@@ -1,4 +1,4 @@
-"""Texts of one node in a drawing of a tree."""
+"""Texts of a node in a picture of a tree."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from dataclasses import dataclass
 
 from executive.mission.outline import OutlineNode
 from executive.tree.node import ControlNode
-from executive.view.text import fitted
-from executive.view.tree.outline import describe_inputs, describe_outputs, failure_reasons
+from executive.view.text import fit_text
+from executive.view.tree.outline import describe_reads, describe_reasons, describe_writes
 
 COLUMNS = 28
-"""Length of a node's lines [characters]."""
+"""Largest length of a line in a node [characters]."""
 
 
 @dataclass(frozen=True)
 class Card:
-    """Texts of a node in a drawing.
+    """Texts of a node in a picture.
 
     Attributes:
         symbol: Symbol before the title of a control node; "" for a skill.
-        title: Its name.
-        lines: Its condition and its details in the mission, shortened.
-        tooltip: All facts about it, one per line.
+        title: Name of the node, shortened.
+        lines: Condition and params from the mission, shortened.
+        tooltip: All facts about the node, one per line.
     """
 
     symbol: str
@@ -30,25 +30,25 @@ class Card:
     tooltip: str
 
 
-def card(node: OutlineNode) -> Card:
+def make_card(node: OutlineNode) -> Card:
     """Return the texts of a node."""
     symbol = "" if node.kind == "skill" else node.symbol or ControlNode.symbol
-    title = "".join(fitted(node.title, COLUMNS))
-    lines = fitted(node.when, COLUMNS, 2) + fitted(node.detail, COLUMNS, 3 if symbol else 2)
+    title = "".join(fit_text(node.title, COLUMNS))
+    lines = fit_text(node.when, COLUMNS, 2) + fit_text(node.detail, COLUMNS, 3 if symbol else 2)
     return Card(symbol, title, lines, "\n".join(_list_facts(node)))
 
 
 def _list_facts(node: OutlineNode) -> list[str]:
     """Return all facts about a node, the most important first."""
-    word = node.skill or node.kind
+    type_name = node.skill or node.kind
     facts = (
-        node.title if node.title == word else f"{node.title}: {word}",
+        node.title if node.title == type_name else f"{node.title}: {type_name}",
         node.doc,
         node.when,
         node.detail,
-        describe_inputs(node),
-        describe_outputs(node),
-        failure_reasons(node),
+        describe_reads(node),
+        describe_writes(node),
+        describe_reasons(node),
         f"subtree {node.subtree}" if node.subtrees else "",
         node.path,
     )

@@ -7,40 +7,38 @@ from collections.abc import Sequence
 from executive.mission.outline import OutlineNode, children
 from executive.tree.node import ControlNode
 from executive.view.text import replace_invalid
-from executive.view.tree.card import card
+from executive.view.tree.card import make_card
 
 
-def dot(nodes: Sequence[OutlineNode], name: str) -> str:
-    """Return a tree as a Graphviz digraph; each subtree is a cluster with its name."""
-    child_indices = children(nodes)
+def draw_dot(nodes: Sequence[OutlineNode], name: str) -> str:
+    """Return a tree as a Graphviz digraph, in which each subtree is a cluster with its name."""
+    child_lists = children(nodes)
     lines = [
         f"digraph {_quote(name)} {{",
         '  ordering=out; nodesep=0.15; fontname="sans-serif"; fontsize=11;',
         '  node [fontname="sans-serif", fontsize=11]; edge [fontname="sans-serif", fontsize=9];',
-        *(f"  {line}" for line in _list_branch(0, nodes, child_indices)),
+        *(f"  {line}" for line in _list_lines(0, nodes, child_lists)),
         "}",
     ]
     return "\n".join(lines)
 
 
-def _list_branch(
-    index: int, nodes: Sequence[OutlineNode], child_indices: Sequence[Sequence[int]]
-) -> list[str]:
+def _list_lines(index: int, nodes: Sequence[OutlineNode], child_lists: Sequence[Sequence[int]]) -> list[str]:
     """Return the lines of a node and its descendants."""
     node = nodes[index]
-    lines = [_format_node(node)]
-    for child in child_indices[index]:
+    lines = [_describe_node(node)]
+    for child in child_lists[index]:
         slot = f" [label={_quote(nodes[child].slot)}]" if nodes[child].slot else ""
         edge = f"{_quote(node.path)} -> {_quote(nodes[child].path)}{slot};"
-        lines += [*_list_branch(child, nodes, child_indices), edge]
+        lines += [*_list_lines(child, nodes, child_lists), edge]
     if node.subtrees:
         head = f"subgraph {_quote(f'cluster {node.path}')} {{"
         lines = [head, f"label={_quote(node.subtree)}; style=dashed; color=gray;", *lines, "}"]
     return lines
 
 
-def _format_node(node: OutlineNode) -> str:
-    shown = card(node)
+def _describe_node(node: OutlineNode) -> str:
+    shown = make_card(node)
     label = "\n".join([f"{shown.symbol} {shown.title}".strip(), *shown.lines])
     shape = "box" if node.kind == "skill" else node.shape or ControlNode.shape
     style = ', style="rounded"' if node.kind == "skill" else ""
@@ -49,7 +47,7 @@ def _format_node(node: OutlineNode) -> str:
 
 
 def _quote(text: str) -> str:
-    """Return a text as a quoted string of Graphviz, with escaped backslashes and HTML entities."""
+    """Return a text as a quoted string, with escapes for backslashes and HTML entities."""
     text = replace_invalid(text).replace("&", "&amp;")
     for plain, escaped in (("\\", "\\\\"), ('"', '\\"'), ("\n", "\\n")):
         text = text.replace(plain, escaped)

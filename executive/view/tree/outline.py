@@ -1,4 +1,4 @@
-"""Text of a tree for a terminal."""
+"""A tree as text for a terminal."""
 
 from __future__ import annotations
 
@@ -9,50 +9,48 @@ from executive.mission.model.grammar import USE
 from executive.mission.outline import Connection, OutlineNode, children
 
 WIDTH = 100
-"""Line length [columns]."""
+"""Largest length of a line [characters]."""
 
 _MIN_TEXT_WIDTH = 40
 
 
-def draw(nodes: Sequence[OutlineNode], *, ports: bool = False, reasons: bool = False) -> str:
-    """Return an outline as text, one line per node unless it is too long.
+def draw_outline(nodes: Sequence[OutlineNode], *, ports: bool = False, reasons: bool = False) -> str:
+    """Return an outline as text, with one line per node unless it is too long.
 
     Args:
         nodes: The outline.
-        ports: True to list the inputs and outputs of every skill below it.
-        reasons: True to list the failure reasons of every skill, and those that every catch handles.
+        ports: Write the variables that a skill reads and writes below the skill.
+        reasons: Write the failure reasons of a skill and of a catch below the node.
     """
     lines = []
-    for node, branch, below in zip(nodes, branches(nodes), children(nodes), strict=True):
+    for node, branch, below in zip(nodes, draw_branches(nodes), children(nodes), strict=True):
         margin = branch.replace("├─", "│ ").replace("└─", "  ") + ("│  " if below else "   ")
         detail = f"  ({node.detail})" if node.detail else ""
-        lines += _wrap(f"{node.name}{detail}", branch, margin)
-        for sentence in _list_details(node, ports, reasons):
-            lines += _wrap(sentence, margin, margin)
+        lines += _wrap_line(f"{node.name}{detail}", branch, margin)
+        for sentence in _describe_below(node, ports, reasons):
+            lines += _wrap_line(sentence, margin, margin)
     return "\n".join(lines)
 
 
-def describe_inputs(node: OutlineNode) -> str:
+def describe_reads(node: OutlineNode) -> str:
     """Return the variables that a skill reads, with `?` for one that may be unset; "" if none."""
-    return "reads " + ", ".join(_format_connection(wire, "<-") for wire in node.reads) if node.reads else ""
+    return _describe_connections("reads", node.reads, "<-")
 
 
-def describe_outputs(node: OutlineNode) -> str:
+def describe_writes(node: OutlineNode) -> str:
     """Return the variables that a skill writes; "" if none."""
-    return (
-        "writes " + ", ".join(_format_connection(wire, "->") for wire in node.writes) if node.writes else ""
-    )
+    return _describe_connections("writes", node.writes, "->")
 
 
-def failure_reasons(node: OutlineNode) -> str:
-    """Return the failure reasons of a skill; "" if it cannot fail."""
+def describe_reasons(node: OutlineNode) -> str:
+    """Return the failure reasons of a skill; "" if none."""
     return f"may fail: {', '.join(node.reasons)}" if node.reasons else ""
 
 
-def branches(nodes: Sequence[OutlineNode]) -> list[str]:
-    """Return the characters before each node that draw the lines to its parent."""
+def draw_branches(nodes: Sequence[OutlineNode]) -> list[str]:
+    """Return the lines from the root to each node, as text before the node."""
     joints = []
-    # From the last node up: depths at which a later node has the same parent.
+    # Depths at which a later node has the same parent; the nodes are visited from the last to the first.
     more_follow: set[int] = set()
     for node in reversed(nodes):
         more_follow = {depth for depth in more_follow if depth <= node.depth}
@@ -63,17 +61,14 @@ def branches(nodes: Sequence[OutlineNode]) -> list[str]:
     return joints[::-1]
 
 
-def skills(nodes: Sequence[OutlineNode]) -> dict[str, str]:
-    """Return the names of the leaves by path: the skills, which have no node below them.
-
-    The role of a skill in its parent (`recover: Grasp`) is left out.
-    """
+def find_skill_names(nodes: Sequence[OutlineNode]) -> dict[str, str]:
+    """Return the names of the skills by path, without their role (`recover` in `recover: Grasp`)."""
     leaves = (node for node, below in zip(nodes, children(nodes), strict=True) if not below)
     return {node.path: node.name.rpartition(": ")[2] for node in leaves}
 
 
 def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
-    """Return an outline with every subtree once; each further use is a node with the name of the subtree."""
+    """Return an outline with the first use of each subtree, and a node with its name for each other use."""
     shown: list[OutlineNode] = []
     first: dict[str, list[tuple[int, str, str]]] = {}
     index = 0
@@ -94,51 +89,55 @@ def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
     return shown
 
 
-def open_running(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[OutlineNode]:
-    """Return the root, the running nodes and their children."""
+def select_open(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[OutlineNode]:
+    """Return the root and the children of running nodes."""
     shown = []
-    # True for each depth at which the last node is running.
-    runs: list[bool] = []
+    # Whether the last node at each depth is running.
+    ancestors_running: list[bool] = []
     for node in nodes:
-        del runs[node.depth :]
-        if all(runs):
+        del ancestors_running[node.depth :]
+        if all(ancestors_running):
             shown.append(node)
-        runs.append(node.path in running)
+        ancestors_running.append(node.path in running)
     return shown
 
 
-def _wrap(text: str, first: str, other: str) -> list[str]:
-    """Return a wrapped text, with prefixes for the first and for the other lines."""
+def _wrap_line(text: str, first: str, other: str) -> list[str]:
+    """Return a text in lines of limited length, with a prefix for the first line and for the others."""
     return textwrap.wrap(
         text, max(WIDTH, len(other) + _MIN_TEXT_WIDTH), initial_indent=first, subsequent_indent=f"{other}  ",
         break_long_words=False, break_on_hyphens=False,
     )  # fmt: skip
 
 
-def _list_details(node: OutlineNode, ports: bool, reasons: bool) -> Iterator[str]:
-    """Yield the lines below a node."""
+def _describe_below(node: OutlineNode, ports: bool, reasons: bool) -> Iterator[str]:
+    """Yield the sentences below a node."""
     if reasons and node.when:
         yield node.when
-    if ports and (flow := "; ".join(filter(None, (describe_inputs(node), describe_outputs(node))))):
+    if ports and (flow := "; ".join(filter(None, (describe_reads(node), describe_writes(node))))):
         yield flow
     if reasons and node.reasons:
-        yield failure_reasons(node)
+        yield describe_reasons(node)
 
 
-def _format_connection(wire: Connection, arrow: str) -> str:
-    variable = f"${wire.variable}" + ("" if wire.required else "?")
-    return variable if wire.port == wire.variable else f"{wire.port} {arrow} {variable}"
+def _describe_connections(verb: str, connections: Sequence[Connection], arrow: str) -> str:
+    texts = []
+    for connection in connections:
+        variable = f"${connection.variable}" + ("" if connection.required else "?")
+        has_same_name = connection.port == connection.variable
+        texts.append(variable if has_same_name else f"{connection.port} {arrow} {variable}")
+    return f"{verb} {', '.join(texts)}" if texts else ""
 
 
 def _list_content(branch: Sequence[OutlineNode]) -> list[tuple[int, str, str]]:
-    """Return depth, title and detail of each node, by which two uses of a subtree are compared."""
+    """Return depths, titles and details of a branch, in which two uses of a subtree may differ."""
     return [(node.depth - branch[0].depth, node.title, node.detail) for node in branch]
 
 
 def _make_use(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
-    """Return the node that replaces a repeated subtree; the subtrees around it remain."""
-    around = node.subtrees[: node.subtrees.index(subtree)]
+    """Return a node that replaces a subtree by its name, and keeps the names of the subtrees around it."""
+    outer = node.subtrees[: node.subtrees.index(subtree)]
     return OutlineNode(
-        node.path, node.name, node.depth, detail, USE, subtree, node.slot, node.when, around, symbol="…",
+        node.path, node.name, node.depth, detail, USE, subtree, node.slot, node.when, outer, symbol="…",
         shape="ellipse",
     )  # fmt: skip

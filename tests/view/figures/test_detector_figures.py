@@ -56,4 +56,4 @@ def test_a_detector_that_never_answered_has_nothing_but_its_excuse(printed):
         threshold=0.5, images=4, objects=0, precision=0, recall=0, map50=0, map50_95=0,
         unavailable=4, why="the server is gone",
     )  # fmt: skip
-    assert printed(silent)[-1] == "unavailable for 4 of 4 images (100.0%), at last: the server is gone"
+    assert printed(silent)[-1] == "unavailable for 4 of 4 images (100.0%), last reason: the server is gone"

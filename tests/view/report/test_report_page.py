@@ -50,17 +50,14 @@ def test_the_verdict_comes_first_and_then_why_objects_timeline_and_tree(failed):
     )
     for section, words in (
         ("header", "trial , seed 3, 1.4 s on the robot's clock"),
-        (
-            "story",
-            "Why no node of the mission handled the failure, from the root down: retry all 2 attempts failed",
-        ),
+        ("story", "Nodes that did not handle the failure, from the root down: retry all 2 attempts failed"),
         ("story", "tree/5:retry/do/Grasp"),
         ("story", "left to do 2: sphere-1"),
         ("tree", "2 failed missed: no seal on"),
         ("timeline", "Grasp Grasp of sphere-1: FAILURE"),
     ):
         assert words in found.texts[section]
-    assert "The last image before the end" in [attributes.get("alt") for _, attributes in found.elements]
+    assert "Last picture before the end" in [attributes.get("alt") for _, attributes in found.elements]
     assert {"timeline", "behaviour-tree"} <= {attributes.get("class") for _, attributes in found.elements}
 
 
@@ -78,7 +75,7 @@ def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_
     assert "2 seen, 0 placed, 2 rejected" in told
     assert "0.81 s Grasp.missed no seal on sphere-1" in told
     alts = [attributes["alt"] for tag, attributes in found.elements if tag == "img"]
-    assert alts.count("Image on which the decision for sphere-1 is based") == 1
+    assert alts.count("Image for the decision about sphere-1") == 1
     assert alts.count("sphere-1: missed") == 2
 
 
@@ -113,7 +110,9 @@ def test_params_versions_and_the_commands_that_repeat_it_are_there(failed):
 def test_a_run_that_was_killed_is_told_as_far_as_it_came_with_the_command_that_goes_on(killed):
     assert not (killed / "result.json").exists()
     found = page(killed)
-    assert found.texts["header"].startswith("CUT OFF The record has no end: the run was killed, or goes on.")
+    assert found.texts["header"].startswith(
+        "CUT OFF The record has no end: the run was killed, or is still running."
+    )
     assert f"resume executive run --resume {shlex.quote(str(killed))}" in found.texts["again"]
     assert "Transit Transit of sphere-1: RUNNING" in found.texts["timeline"]
     assert "sphere-1 held" in found.texts["objects"]
@@ -127,7 +126,7 @@ def test_a_run_whose_result_is_gone_has_the_verdict_of_its_journal(failed, done,
     change(
         run / "journal.jsonl", lambda entry: entry | ({"message": ""} if entry["kind"] == "RunEnded" else {})
     )
-    assert "The run has ended; its result file is missing." in page(run).texts["header"]
+    assert "The run ended, but there is no result.json of it." in page(run).texts["header"]
 
 
 def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(failed, copy):
@@ -141,7 +140,7 @@ def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(
     )
     found = page(run)
     assert "sphere-1 missed at step 325" in found.texts["objects"]
-    assert "Image on which the decision for sphere-1 is based" not in found.texts["objects"]
+    assert "Image for the decision about sphere-1" not in found.texts["objects"]
     table, _ = found.texts["objects"].split(" look: ")
     assert "sphere-1" in table
 

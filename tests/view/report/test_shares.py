@@ -12,8 +12,7 @@ from made_up_runs import TREE, ran, skill
 from executive.mission.outline import OutlineNode
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
-from executive.view.report.shares import LOOK, NO_ITEM, RETRY, WAITING, Shares
-from executive.view.report.shares import shares as shares_of
+from executive.view.report.shares import LOOK, NO_OBJECT, RETRY, WAITING, Shares, compute_shares
 
 ITEMS = ("cube-1", "duck-1", "big_duck-2")
 
@@ -22,7 +21,7 @@ def shares(
     course: list[Activation], nodes: Sequence[OutlineNode], decisions: list[tuple[float, str]], end: float
 ) -> Shares:
     """Return the shares of activations and selections up to a time."""
-    return shares_of(Timeline(activations=course, selections=decisions, clock=end), nodes)
+    return compute_shares(Timeline(activations=course, selections=decisions, clock=end), nodes)
 
 
 def near(row: dict[str, float]) -> object:
@@ -41,12 +40,12 @@ def test_a_failed_attempt_a_look_ahead_and_a_wait_are_told_apart():
         ran("Wait", 7.1, 8.1), ran("Detect", 8.1, 8.2),
     ]  # fmt: skip
     told = shares(course, TREE, [(1.1, "cube-1"), (2.3, "cube-1"), (4.1, "duck-1")], 8.5)
-    assert list(told.rows) == ["cube-1", "duck-1", NO_ITEM]
+    assert list(told.rows) == ["cube-1", "duck-1", NO_OBJECT]
     assert told.rows["cube-1"] == near(
         {LOOK: 1.1, RETRY: 1.2, "approach": 0.7, "grasp": 0.1, "transit": 1.9, "release": 0.1}
     )
     assert told.rows["duck-1"] == near({"approach": 0.9, "grasp": 0.1, "transit": 0.9, "release": 0.1})
-    assert told.rows[NO_ITEM] == near({WAITING: 1.3, LOOK: 0.1})
+    assert told.rows[NO_OBJECT] == near({WAITING: 1.3, LOOK: 0.1})
     assert told.activities == (LOOK, "approach", "grasp", "transit", "release", RETRY, WAITING)
 
 
@@ -65,19 +64,19 @@ def test_an_attempt_that_was_the_last_was_in_vain_up_to_its_end():
         ran("Detect", 1.2, 1.3),
     ]  # fmt: skip
     told = shares(course, TREE, [(0.5, "cube-1")], 1.3)
-    assert told.rows == {"cube-1": near({WAITING: 0.5, RETRY: 0.7}), NO_ITEM: near({LOOK: 0.1})}
+    assert told.rows == {"cube-1": near({WAITING: 0.5, RETRY: 0.7}), NO_OBJECT: near({LOOK: 0.1})}
 
 
 def test_the_time_before_the_first_skill_and_after_the_last_belongs_to_the_run():
     told = shares([ran("Transit", 1.0, 2.0, "cube-1", "INVALID")], TREE, [(1.0, "cube-1")], 2.4)
-    assert told.rows == {"cube-1": near({WAITING: 1.0, "transit": 1.0}), NO_ITEM: near({WAITING: 0.4})}
+    assert told.rows == {"cube-1": near({WAITING: 1.0, "transit": 1.0}), NO_OBJECT: near({WAITING: 0.4})}
 
 
 def test_a_skill_that_is_called_like_another_activity_has_no_column_of_its_own():
     tree = [*TREE, skill("Look", "arm")]
     told = shares([ran("Look", 0.0, 1.0, "cube-1"), ran("Detect", 1.0, 2.0)], tree, [], 2.0)
     assert told.activities == (LOOK,)
-    assert told.rows == {"cube-1": near({LOOK: 1.0}), NO_ITEM: near({LOOK: 1.0})}
+    assert told.rows == {"cube-1": near({LOOK: 1.0}), NO_OBJECT: near({LOOK: 1.0})}
 
 
 TIMES = st.integers(0, 240).map(lambda ticks: ticks / 24)
@@ -105,8 +104,8 @@ def test_every_instant_belongs_to_one_object_and_one_activity(course, decisions,
     assert all(seconds > 0 for seconds in spent)
     assert list(told.activities) == list(dict.fromkeys(told.activities))
     assert {activity for row in told.rows.values() for activity in row} == set(told.activities)
-    assert NO_ITEM not in list(told.rows)[:-1]
+    assert NO_OBJECT not in list(told.rows)[:-1]
     for item, row in told.rows.items():
         # Nobody's time is spent on an object that was never decided for nor handled.
-        assert item == NO_ITEM or item in {span.item for span in course} | {name for _, name in decisions}
+        assert item == NO_OBJECT or item in {span.item for span in course} | {name for _, name in decisions}
         assert RETRY not in row or any(span.item == item and span.status == "FAILURE" for span in course)

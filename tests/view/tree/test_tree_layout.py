@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from executive.view.tree.layout import Rectangle, Size, layout
+from executive.view.tree.layout import Rectangle, Size, compute_layout
 
 
 def drawn_by_chance(seed: int) -> tuple[list[int], list[Size]]:
@@ -56,7 +56,7 @@ def contains(outer: Rectangle, inner: Rectangle) -> bool:
 
 def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_first_child(tree):
     depths, nodes = tree
-    plan = layout(depths, below(depths), nodes)
+    plan = compute_layout(depths, below(depths), nodes)
     assert not any(overlap(one, other) for one, other in itertools.combinations(plan.boxes, 2))
     for parent, among in enumerate(below(depths)):
         middles = [plan.boxes[child].middle for child in among]
@@ -72,7 +72,7 @@ def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_fir
 
 def test_a_frame_holds_its_subtree_and_nothing_else(tree):
     depths, nodes = tree
-    plan = layout(depths, below(depths), nodes)
+    plan = compute_layout(depths, below(depths), nodes)
     assert set(plan.frames) == {index for index, size in enumerate(nodes) if size.name}
     for index, frame in plan.frames.items():
         within = inside(index, depths)
@@ -85,7 +85,7 @@ def test_a_frame_holds_its_subtree_and_nothing_else(tree):
 
 def test_a_small_tree_stands_exactly_there():
     sizes = [Size(60, 28), Size(50, 28, slot=20), Size(40, 42, name=90), Size(30, 28)]
-    plan = layout([0, 1, 1, 2], [[1, 2], [], [3], []], sizes)
+    plan = compute_layout([0, 1, 1, 2], [[1, 2], [], [3], []], sizes)
     assert plan.boxes == (
         Rectangle(16, 16, 60, 28), Rectangle(137, 16, 50, 28), Rectangle(137, 74, 40, 42),
         Rectangle(219, 81, 30, 28),

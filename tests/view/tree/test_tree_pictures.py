@@ -11,9 +11,9 @@ from executive.mission.outline import Connection, OutlineNode
 from executive.tree.node import ControlNode
 from executive.tree.registry import control_nodes
 from executive.view.text import replace_invalid
-from executive.view.tree.card import card
-from executive.view.tree.dot import dot
-from executive.view.tree.svg import Note, identifier, svg
+from executive.view.tree.card import make_card
+from executive.view.tree.dot import draw_dot
+from executive.view.tree.svg import Note, draw_svg, make_id
 
 NASTY = """<b onload="x">&amp; 'quoted' "twice" \\ ]]> --> größer ≥ 日本 \x00\x1b \ud800"""
 RETRY = "up to 3 attempts, on Grasp.missed, Grasp.blocked"
@@ -48,7 +48,7 @@ NODES = [
 
 def parsed(nodes: list[OutlineNode], name: str = "sort", **notes: Note) -> Element:
     return ElementTree.fromstring(
-        svg(nodes, name, {node.path: notes.get(node.title, Note()) for node in nodes})
+        draw_svg(nodes, name, {node.path: notes.get(node.title, Note()) for node in nodes})
     )
 
 
@@ -93,7 +93,7 @@ def test_every_node_is_a_group_with_its_symbol_title_and_short_lines_and_a_subtr
 
 def test_an_id_says_its_path_and_no_two_are_alike():
     paths = ["a/b", "a-b", "a_b", "a:b", "a.b", "a b", "a/ü", "a/:b", 'a"b']
-    found = [identifier(path) for path in paths]
+    found = [make_id(path) for path in paths]
     assert len(set(found)) == len(paths)
     assert all(re.fullmatch(r"node-[A-Za-z0-9_-]+", each) for each in found)
 
@@ -114,11 +114,11 @@ def test_a_word_that_nobody_knows_is_drawn_like_any_other():
     node = control("tree/dance", 0, "dance")
     (group,) = groups(parsed([node])).values()
     assert (texts(group, "symbol"), texts(group, "title")) == ([ControlNode.symbol], ["dance"])
-    assert "shape=ellipse" in dot([node], "x")
+    assert "shape=ellipse" in draw_dot([node], "x")
 
 
 def test_the_picture_needs_nothing_else_and_its_colours_come_from_the_style_sheet_alone():
-    picture, text = parsed(NODES), svg(NODES, "sort")
+    picture, text = parsed(NODES), draw_svg(NODES, "sort")
     elements = {element.tag.removeprefix(SVG) for element in picture.iter()}
     assert elements == {"svg", "title", "style", "g", "rect", "text", "path"}
     assert not re.search(r"href|url\(|@import|http(?!://www\.w3\.org/2000/svg)", text)
@@ -135,11 +135,11 @@ def test_text_from_a_mission_cannot_leave_its_place_in_the_svg():
     assert picture.findtext(f"{SVG}title") == replace_invalid(NASTY)
     assert texts(group, "slot") == [replace_invalid(NASTY)]
     assert NASTY[:24] in tooltip(group)
-    svg([node], NASTY).encode()
+    draw_svg([node], NASTY).encode()
 
 
 def test_text_from_a_mission_cannot_leave_its_place_in_the_dot():
-    text = dot([skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, subtrees=(NASTY,))], NASTY)
+    text = draw_dot([skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, subtrees=(NASTY,))], NASTY)
     text.encode()
     outside = re.sub(r'"(?:[^"\\]|\\.)*"', "_", text).splitlines()
     assert (outside[0], outside[3:]) == (
@@ -151,7 +151,7 @@ def test_text_from_a_mission_cannot_leave_its_place_in_the_dot():
 
 
 def test_the_dot_has_every_node_and_every_line():
-    assert [re.sub(r", tooltip=.*", "", line.strip()) for line in dot(NODES, "sort").splitlines()] == [
+    assert [re.sub(r", tooltip=.*", "", line.strip()) for line in draw_dot(NODES, "sort").splitlines()] == [
         'digraph "sort" {',
         'ordering=out; nodesep=0.15; fontname="sans-serif"; fontsize=11;',
         'node [fontname="sans-serif", fontsize=11]; edge [fontname="sans-serif", fontsize=9];',
@@ -175,8 +175,8 @@ def test_the_dot_has_every_node_and_every_line():
 def test_a_skill_has_two_lines_of_params_at_most():
     detail = ", ".join(f"param_{number}: {number}" for number in range(9))
     lines = ("param_0: 0, param_1: 1,", "param_2: 2, param_3: 3, …")
-    assert card(skill("tree/A", 0, "A", detail=detail)).lines == lines
-    assert card(skill("tree/A", 0, "A", detail="x" * 100)).lines == ("x" * 28, "x" * 27 + "…")
+    assert make_card(skill("tree/A", 0, "A", detail=detail)).lines == lines
+    assert make_card(skill("tree/A", 0, "A", detail="x" * 100)).lines == ("x" * 28, "x" * 27 + "…")
 
 
 def test_a_note_stands_below_what_the_mission_says_in_a_box_with_room_for_it():
