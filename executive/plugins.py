@@ -41,7 +41,7 @@ def discover() -> dict[str, type[Skill]]:
             pyproject.toml of the working directory's project is invalid.
     """
     found: dict[str, type[Skill]] = {}
-    for name, entry in registered(SKILLS, "skill").items():
+    for name, entry in list_entries(SKILLS, "skill").items():
         loaded = entry.load()
         if not (isinstance(loaded, type) and issubclass(loaded, Skill)):
             raise InputError(f'the entry point "{name}" ({entry.value}) is not a Skill subclass')
@@ -55,7 +55,7 @@ def cell_kind(name: str) -> CellKind:
     Raises:
         InputError: No package registers this kind, or its class cannot be loaded.
     """
-    entries = registered(CELL_KINDS, "kind of cell")
+    entries = list_entries(CELL_KINDS, "kind of cell")
     if name not in entries:
         raise InputError(
             f'no installed package offers cells of kind "{name}"; '
@@ -96,7 +96,7 @@ class PluginEntry:
             ) from error
 
 
-def registered(group: str, kind: str) -> dict[str, PluginEntry]:
+def list_entries(group: str, kind: str) -> dict[str, PluginEntry]:
     """Return the entries of a group by name, sorted by name, without loading their classes.
 
     The project of the working directory (`project_here`) need not be installed: afterwards its folder is the

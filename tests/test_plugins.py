@@ -10,7 +10,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.perception.detectors.registry import find_detector_kinds
-from executive.plugins import cell_kind, discover, registered
+from executive.plugins import cell_kind, discover, list_entries
 
 Write = Callable[..., Path]
 Install = Callable[[str, str], None]
@@ -65,10 +65,10 @@ def test_a_skill_of_the_project_is_found_beside_the_installed_ones(project: Writ
 
 def test_its_folder_is_the_last_place_where_modules_are_looked_for(project: Write) -> None:
     file = project("hall_two", WAVE, skills='Wave = "hall_two.part:Wave"')
-    registered("executive.cells", "kind of cell")
+    list_entries("executive.cells", "kind of cell")
     assert str(file.parent) not in sys.path, "it registers none of these"
     for _ in range(2):
-        registered("executive.skills", "skill")
+        list_entries("executive.skills", "skill")
     assert (sys.path[-1], sys.path.count(str(file.parent))) == (str(file.parent), 1)
 
 
@@ -115,7 +115,7 @@ def test_one_name_is_registered_once(project: Write, packages: Install) -> None:
 def test_of_a_project_that_is_installed_its_file_counts(project: Write, packages: Install) -> None:
     project("hall_seven", WAVE, name="Hall.Seven", skills='Wave = "hall_seven.part:Wave"')
     packages("hall-seven", "Wave = hall_seven.old:Wave\nGone = hall_seven.gone:Gone")
-    found = registered("executive.skills", "skill")
+    found = list_entries("executive.skills", "skill")
     assert found["Wave"].value == "hall_seven.part:Wave"
     assert "Gone" not in found
 

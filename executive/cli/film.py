@@ -39,15 +39,15 @@ def command(
         from executive.cli.progress import bar
         from executive.record.run_directory import RunDirectory, find_run
         from executive.view.film.film import END_DURATION, film
-        from executive.view.film.formats import file_for, format_of
+        from executive.view.film.formats import choose_format, prepare_file
         from executive.view.film.source import FilmSource
 
         directory = RunDirectory(find_run(run, runs))
-        format = format_of(output, gif)
+        format = choose_format(output, gif)
         file = output or directory.path / f"film{format.suffix}"
         source = FilmSource(directory)
         speed = speed or format.speed
-        with file_for(file, force=force) as partial_file:
+        with prepare_file(file, force=force) as partial_file:
             if not quiet:
                 seconds = source.events[-1].clock / speed + END_DURATION
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)

@@ -49,7 +49,7 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
             skills = {name: skills[name]}
     if conform:
         ctx.exit(0 if _check_conformance(skills, as_json) else 1)
-    known = [declared(key, skill) for key, skill in skills.items()]
+    known = [collect_declarations(key, skill) for key, skill in skills.items()]
     if as_json:
         print_json(known if name is None else known[0])
     else:
@@ -75,7 +75,7 @@ def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool
     return all(verdict.status == "ok" for verdict in verdicts)
 
 
-def declared(name: str, skill: type[Skill]) -> Declaration:
+def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
     """Return the declarations of a skill as plain JSON values."""
     from pydantic_core import to_json
 

@@ -9,7 +9,7 @@ from typing import TypeAlias, cast
 
 from executive.cell.protocols import Clock
 from executive.errors import InputError
-from executive.plugins import PluginEntry, registered
+from executive.plugins import PluginEntry, list_entries
 from executive.tree.blackboard import Blackboard
 from executive.tree.node import ControlNode, NodeContext
 
@@ -26,7 +26,7 @@ def control_nodes() -> ControlNodes:
     Raises:
         InputError: Two packages register one keyword, or a class cannot be loaded or lacks a declaration.
     """
-    return _load(tuple(registered(ENTRY_POINT_GROUP, "control node").values()))
+    return _load(tuple(list_entries(ENTRY_POINT_GROUP, "control node").values()))
 
 
 @cache

@@ -31,7 +31,7 @@ from executive.record.run_directory import LATEST, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.view.film.film import film
-from executive.view.film.formats import format_of
+from executive.view.film.formats import choose_format
 from executive.view.film.source import FilmSource
 from executive.view.report.page import write_report
 from tests.benchmarks.damage import BLOCK, copy_run, damage_run
@@ -200,7 +200,7 @@ def _film_first_picture(path: Path) -> None:
     film(
         FilmSource(RunDirectory(path)),
         path / "film.mp4",
-        format_of(None, False),
+        choose_format(None, False),
         speed=1.0,
         workers=1,
         progress=stop,

@@ -10,7 +10,7 @@ from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
 from executive.errors import InputError
 from executive.perception.detectors.setting import ClosableDetector, DetectorSetting
-from executive.plugins import PluginEntry, registered
+from executive.plugins import PluginEntry, list_entries
 
 GROUP = "executive.detectors"
 FAKE_ERROR_RATES = frozenset({"misses", "confused", "invented", "jitter"})
@@ -19,7 +19,7 @@ FAKE_ERROR_RATES = frozenset({"misses", "confused", "invented", "jitter"})
 
 def find_detector_kinds() -> dict[str, PluginEntry]:
     """Return the installed kinds of detectors by name."""
-    return registered(GROUP, "kind of detector")
+    return list_entries(GROUP, "kind of detector")
 
 
 def build_detectors(

@@ -97,7 +97,7 @@ GIF = Format(".gif", 10.0, 2.0, write_gif)
 FORMATS = (MP4, GIF)
 
 
-def format_of(out: Path | None, gif: bool) -> Format:
+def choose_format(out: Path | None, gif: bool) -> Format:
     """Return the format of a film.
 
     Args:
@@ -120,7 +120,7 @@ def format_of(out: Path | None, gif: bool) -> Format:
 
 
 @contextmanager
-def file_for(path: Path, *, force: bool) -> Iterator[Path]:
+def prepare_file(path: Path, *, force: bool) -> Iterator[Path]:
     """Yield a temporary file for a film; move it to `path` if no exception occurred.
 
     Raises:

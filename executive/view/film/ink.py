@@ -31,7 +31,7 @@ def font(size: float) -> ImageFont.FreeTypeFont:
 
 
 @lru_cache(maxsize=4096)
-def clipped(text: str, size: float, width: float) -> str:
+def clip(text: str, size: float, width: float) -> str:
     """Return a text, shortened with an ellipsis to `width` [pixel]."""
     line = " ".join(text.split())
     if font(size).getlength(line) <= width:
@@ -41,7 +41,7 @@ def clipped(text: str, size: float, width: float) -> str:
     return line.rstrip() + _ELLIPSIS if line else ""
 
 
-def wrapped(text: str, size: float, width: float, most: int) -> list[str]:
+def wrap(text: str, size: float, width: float, most: int) -> list[str]:
     """Return a text in at most `most` lines of at most `width` [pixel]."""
     lines: list[str] = []
     words = text.split()
@@ -50,9 +50,9 @@ def wrapped(text: str, size: float, width: float, most: int) -> list[str]:
             (n for n in range(1, len(words) + 1) if font(size).getlength(" ".join(words[:n])) <= width),
             default=1,
         )
-        lines.append(clipped(" ".join(words[:count]), size, width))
+        lines.append(clip(" ".join(words[:count]), size, width))
         words = words[count:]
-    return [*lines, clipped(" ".join(words), size, width)] if words else lines
+    return [*lines, clip(" ".join(words), size, width)] if words else lines
 
 
 def put_mark(image: Image.Image, status: str, centre: tuple[float, float], size: int) -> None:

@@ -15,7 +15,7 @@ from executive.record.pictures.strip import HEIGHT as STRIP
 from executive.record.result import Result
 from executive.view.film import panel
 from executive.view.film.course import FilmCourse
-from executive.view.film.ink import BACK, DIM, FAILURE, INK, RULE, RUNNING, SUCCESS, clipped, font, wrapped
+from executive.view.film.ink import BACK, DIM, FAILURE, INK, RULE, RUNNING, SUCCESS, clip, font, wrap
 from executive.view.film.source import FilmSource
 
 WIDTH, HEIGHT = 1280, 720
@@ -56,7 +56,7 @@ def draw_page(
     page.paste(Image.fromarray(picture), (0, 0))
     _draw_camera(page, course.picture)
     if caption and (course.failure or course.current_action):
-        lines = wrapped(course.failure, _TYPE, CAPTION, 2) or [clipped(course.current_action, _TYPE, CAPTION)]
+        lines = wrap(course.failure, _TYPE, CAPTION, 2) or [clip(course.current_action, _TYPE, CAPTION)]
         _draw_caption(page, lines, FAILURE if course.failure else RUNNING)
     _draw_head(page, source.start.mission, note, course.clock, length)
     top = HEIGHT - _BELOW - panel.height(source.items)
@@ -69,8 +69,8 @@ def draw_page(
 def draw_ending(page: Image.Image, result: Result | RunEnded | None) -> Image.Image:
     """Return a frame with the result of a run over the image of the cell."""
     status, sentence, figures = describe_result(result)
-    lines = wrapped(sentence, _END_TYPE, CARD - 2 * _END_PAD, 4)
-    notes = wrapped(figures, _END_TYPE, CARD - 2 * _END_PAD, 2)
+    lines = wrap(sentence, _END_TYPE, CARD - 2 * _END_PAD, 4)
+    notes = wrap(figures, _END_TYPE, CARD - 2 * _END_PAD, 2)
     height = (
         2 * _END_PAD + _END_STATUS + _END_LINE * (len(lines) + len(notes)) + (10 if lines or notes else 0)
     )
@@ -105,9 +105,9 @@ def _draw_head(page: Image.Image, title: str, note: str, clock: float, length: f
     """Draw the title, the time, and the progress of the run."""
     draw = ImageDraw.Draw(page)
     room = RIGHT - LEFT - font(_TITLE).getlength(f"{length:.1f} s") - 24
-    draw.text((LEFT, 50), clipped(title, _TITLE, room), INK, font(_TITLE), "ls")
+    draw.text((LEFT, 50), clip(title, _TITLE, room), INK, font(_TITLE), "ls")
     draw.text((RIGHT, 50), f"{clock:.1f} s", INK, font(_TITLE), "rs")
-    draw.text((LEFT, 76), clipped(note, _NOTE, RIGHT - LEFT), DIM, font(_NOTE), "ls")
+    draw.text((LEFT, 76), clip(note, _NOTE, RIGHT - LEFT), DIM, font(_NOTE), "ls")
     share = clock / length if length else 1.0
     draw.rectangle((LEFT, 94, RIGHT, 96), RULE)
     draw.rectangle((LEFT, 94, LEFT + round(share * (RIGHT - LEFT)), 96), RUNNING)
@@ -137,7 +137,7 @@ def _draw_camera(page: Image.Image, picture: Path | None) -> None:
     page.paste(inset, (_MARGIN + 4, _MARGIN + 4))
     title = "camera:  " + picture.stem.partition("_")[2].replace("_", " ")
     place = (_MARGIN + 10, _MARGIN + height + 17)
-    draw.text(place, clipped(title, _LABEL, width - 8), DIM, font(_LABEL), "lm")
+    draw.text(place, clip(title, _LABEL, width - 8), DIM, font(_LABEL), "lm")
 
 
 @lru_cache(maxsize=2)

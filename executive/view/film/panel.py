@@ -52,10 +52,10 @@ def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], cour
         colour = DIM if now in ("SUCCESS", "FAILURE") else FAINT
         if now == "RUNNING":
             colour = RUNNING if node.skill else INK
-        name = ink.clipped(node.name, TEXT_SIZE, right - x)
+        name = ink.clip(node.name, TEXT_SIZE, right - x)
         draw.text((x, middle), name, colour, ink.font(TEXT_SIZE), "lm")
         x += ink.font(TEXT_SIZE).getlength(name) + 10
-        why = ink.clipped(last.note if last else "", TEXT_SIZE, right - x)
+        why = ink.clip(last.note if last else "", TEXT_SIZE, right - x)
         draw.text((x, middle), why, FAILURE if now == "FAILURE" else DIM, ink.font(TEXT_SIZE), "lm")
 
 
@@ -102,7 +102,7 @@ def draw_items(image: Image.Image, box: Box, rows: Sequence[ItemChanged], bins: 
         colours = (DIM if row.state in _FINAL_STATES else INK, DIM, _STATES.get(row.state, DIM), DIM)
         shifts = (0, 0, 0, _SWATCH_SIZE + 6)
         for cell, colour, shift, start, end in zip(cells, colours, shifts, starts, ends, strict=True):
-            text = ink.clipped(cell, TEXT_SIZE, end - start - shift)
+            text = ink.clip(cell, TEXT_SIZE, end - start - shift)
             draw.text((start + shift, middle), text, colour, ink.font(TEXT_SIZE), "lm")
         if row.bin:
             x, y = starts[-1], round(middle) - _SWATCH_SIZE // 2

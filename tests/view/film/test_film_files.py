@@ -10,7 +10,7 @@ import pytest
 from PIL import Image, ImageDraw
 
 from executive.errors import InputError
-from executive.view.film.formats import GIF, GIF_SIZE, MP4, file_for, format_of, write_gif, write_mp4
+from executive.view.film.formats import GIF, GIF_SIZE, MP4, choose_format, prepare_file, write_gif, write_mp4
 from executive.view.film.ink import BACK, SUCCESS
 
 
@@ -57,22 +57,22 @@ def test_a_gif_goes_round_and_keeps_its_colours_to_the_end(frames: list[Image.Im
 )  # fmt: skip
 def test_the_name_says_what_a_film_is_and_another_is_refused(out: str | None, gif: bool, found) -> None:
     try:
-        assert format_of(None if out is None else Path(out), gif) is found
+        assert choose_format(None if out is None else Path(out), gif) is found
     except InputError as refused:
         assert str(refused) == found
 
 
 def test_a_file_is_there_whole_or_as_it_was(tmp_path: Path) -> None:
     out = tmp_path / "film.mp4"
-    with file_for(out, force=False) as part:
+    with prepare_file(out, force=False) as part:
         part.write_text("one")
         assert not out.exists()
     assert out.read_text() == "one"
-    with pytest.raises(InputError) as refused, file_for(out, force=False):
+    with pytest.raises(InputError) as refused, prepare_file(out, force=False):
         pytest.fail("it began")
     there = f'"{out}" exists; name another file with -o, or overwrite it with --force'
     assert str(refused.value) == there
-    with pytest.raises(KeyboardInterrupt), file_for(out, force=True) as part:
+    with pytest.raises(KeyboardInterrupt), prepare_file(out, force=True) as part:
         part.write_text("half")
         raise KeyboardInterrupt
     assert [file.name for file in tmp_path.iterdir()] == ["film.mp4"]

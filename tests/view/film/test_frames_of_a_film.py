@@ -14,7 +14,7 @@ from small_tree import NODES, ended, node, started
 from executive.record.result import ItemCounts, Result
 from executive.view.film.course import FilmCourse
 from executive.view.film.film import select_steps
-from executive.view.film.ink import BACK, FAILURE, FAINT, RUNNING, SUCCESS, clipped, font, put_mark, wrapped
+from executive.view.film.ink import BACK, FAILURE, FAINT, RUNNING, SUCCESS, clip, font, put_mark, wrap
 from executive.view.film.page import describe_result, draw_ending, draw_page
 from executive.view.film.panel import (
     MAX_ITEM_ROWS,
@@ -68,15 +68,15 @@ def test_settled_items_give_way_to_those_still_to_do() -> None:
 
 
 def test_lines_are_as_wide_as_they_may_be() -> None:
-    cut = clipped("a word and then another one", 14, 100)
-    assert (clipped("short", 14, 100), cut[-1], clipped("anything", 14, 3)) == ("short", "…", "")
+    cut = clip("a word and then another one", 14, 100)
+    assert (clip("short", 14, 100), cut[-1], clip("anything", 14, 3)) == ("short", "…", "")
     assert font(14).getlength(cut) <= 100
     text = "no seal on sphere-1 0.10 s after contact, and neither the second nor the third went any better"
-    assert " ".join(wrapped(text, 14, 300, 9)) == text
-    first, second = wrapped(text, 14, 300, 2)
+    assert " ".join(wrap(text, 14, 300, 9)) == text
+    first, second = wrap(text, 14, 300, 2)
     assert max(map(font(14).getlength, (first, second))) <= 300
     assert second.endswith("…")
-    assert wrapped("", 14, 300, 2) == []
+    assert wrap("", 14, 300, 2) == []
 
 
 @pytest.mark.parametrize(
