@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from pydantic import ConfigDict
+from pydantic import ConfigDict, Field
 
 from executive.events.event import Event
 
@@ -25,8 +25,8 @@ class DetectedObject:
 
     label: str
     confidence: float
-    box: Sequence[float]
-    position: Sequence[float]
+    box: Annotated[Sequence[float], Field(min_length=4, max_length=4)]
+    position: Annotated[Sequence[float], Field(min_length=3, max_length=3)]
     contradiction: str
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True, extra="forbid")
@@ -73,7 +73,7 @@ class ItemChanged(Event):
     item: str
     label: str
     state: str
-    position: Sequence[float]
+    position: Annotated[Sequence[float], Field(min_length=3, max_length=3)]
     looks: int
     attempts: int
     bin: str

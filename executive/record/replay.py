@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import JsonValue
 
-from executive.errors import InputError, escape_control_characters
+from executive.errors import InputError, escape_control_characters, shorten_quotations
 from executive.events import (
     BranchChosen,
     ItemChanged,
@@ -228,4 +228,4 @@ def _describe(decision: TimedEvent | None) -> str:
     shown = {key: value for key, value in vars(event).items() if value and key not in ("outputs", "skill")}
     values = ", ".join(f"{key} {value}" for key, value in shown.items())
     text = f"at {decision.clock:.3f} s (step {decision.tick}) {type(event).__name__}: {values}"
-    return escape_control_characters(text)
+    return shorten_quotations(escape_control_characters(text))

@@ -13,6 +13,7 @@ from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.errors import Stopped
+from executive.events import ToolCommanded
 from executive.replay.input_log import InputLog, Interruption
 from executive.replay.input_replayer import InputReplayer
 from executive.replay.recorded_cell import MOVING_COMMANDS, RECORDED_ROLES, InputFormat
@@ -42,6 +43,9 @@ class ReplayedCell(CellWrapper):
         self._replayer = InputReplayer(self.log)
         self._is_halted = False
         self._last_command = 0
+        self._tool_steps = {one.tick for one in log.events if isinstance(one.event, ToolCommanded)}
+        self._knows_commands = True
+        self._is_muted = False
         self.is_live = False
         clock = StepClock(self._now, self.log.step)
         self._cell = replace(intercept(inner.cell, self._answer, RECORDED_ROLES), clock=clock)
@@ -96,11 +100,11 @@ class ReplayedCell(CellWrapper):
     @contextmanager
     def mute(self) -> Iterator[None]:
         """Answer with the last recorded answers in the `with` block; commands have no effect there."""
-        is_live, self.is_live = self.is_live, False
+        is_live, self.is_live, self._is_muted = self.is_live, False, True
         try:
             yield
         finally:
-            self.is_live = is_live
+            self.is_live, self._is_muted = is_live, False
 
     def advance(self) -> None:
         """Make one control step.
@@ -135,7 +139,14 @@ class ReplayedCell(CellWrapper):
     def _answer(self, access: Access) -> Any:
         if self.is_live:
             return access.proceed()
-        if access.name in MOVING_COMMANDS and self._steps <= self.log.last_tick:
-            self._last_command = self._steps
+        if access.name in MOVING_COMMANDS and not self._is_muted:
+            self._note_command(access)
         name, codec = InputFormat.find(access)
         return self._replayer.read(name, codec)
+
+    def _note_command(self, access: Access) -> None:
+        """Remember the step of a command that the log contains; later ones count only if it lacks none."""
+        is_recorded = access.role != "tool" or self._steps in self._tool_steps
+        self._knows_commands &= is_recorded and self._steps <= self.log.last_tick
+        if self._knows_commands:
+            self._last_command = self._steps

@@ -253,6 +253,10 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
             encode(at(1, frame_searched(detected("cube")))).replace(b'"label"', b'"name"'),
             '"found.0.label" of Fr',
         ),
+        (
+            encode(at(1, item_changed("cube-1"))).replace(b"[0.5, 0.0, 0.02]", b"[0.5, 0.0]"),
+            '"position" of ItemChanged: ',
+        ),
     ],
 )
 def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):

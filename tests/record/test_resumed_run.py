@@ -16,7 +16,15 @@ import pytest
 from executive.cell.plain import plain
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
-from executive.events import ItemChanged, MotionPlanned, NodeEnded, NodeStarted, RunResumed, TimedEvent
+from executive.events import (
+    ItemChanged,
+    MotionPlanned,
+    NodeEnded,
+    NodeStarted,
+    RunResumed,
+    TimedEvent,
+    ToolCommanded,
+)
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
 from executive.record.journal import read_journal
@@ -267,6 +275,26 @@ def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
     assert redecided(path) == ""
     (note,) = watcher.notes
     assert re.match(r"the journal ends \d+ control steps \([\d.]+ s\) before the log of the world", note)
+
+
+def test_a_scene_is_observed_if_the_journal_lacks_the_last_command_of_the_tool(
+    missions: Path, tmp_path: Path
+) -> None:
+    loaded = load(missions, "sort_overhead")
+    whole = Path(run_of(loaded, tmp_path).run)
+    opened = [
+        one.tick
+        for one in read_journal(whole / "journal.jsonl")
+        if isinstance(one.event, ToolCommanded) and one.event.action == "open"
+    ]
+    path = cut_off(loaded, tmp_path, opened[1] + 1)
+    lines = (path / "journal.jsonl").read_text().splitlines(keepends=True)
+    last = max(number for number, line in enumerate(lines) if '"ToolCommanded"' in line)
+    (path / "journal.jsonl").write_text("".join(lines[:last]))
+    watcher = Watcher()
+    result = resumed(path, views=[watcher])
+    assert (result.status, result.items.placed, result.audit.agrees) == ("SUCCESS", 6, True)
+    assert len(watcher.notes) == 1
 
 
 def test_a_scene_whose_observation_was_interrupted_is_observed_again(missions: Path, tmp_path: Path) -> None:
