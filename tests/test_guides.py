@@ -31,7 +31,7 @@ from executive.mission.findings import CODES, MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.model import grammar
 from executive.mission.parse.cell_file import load_cell
-from executive.mission.parse.control import inner_keys
+from executive.mission.parse.control import find_inner_keys
 from executive.mission.schema.files import mission_schema
 from executive.mission.source import Source
 from executive.mission.text.files import shipped_missions
@@ -244,7 +244,7 @@ def test_every_file_that_a_guide_to_the_code_names_exists(guide: str) -> None:
 def test_the_authors_guide_names_every_control_node_with_its_keys() -> None:
     told = rows("### Control nodes")
     assert {cell.strip("`"): set(in_code(keys)) for cell, (keys, *_) in told.items() if "`" in cell} == {
-        **{word: {*inner_keys(kind), *partners(kind)} for word, kind in control_nodes().items()},
+        **{word: {*find_inner_keys(kind), *partners(kind)} for word, kind in control_nodes().items()},
         grammar.USE: set(grammar.USE_SIBLINGS),
     }
 

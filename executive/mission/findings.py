@@ -1,4 +1,4 @@
-"""What is wrong with a mission: findings with their place, and the error that carries them all."""
+"""Findings in a mission with their places, and the error that contains them."""
 
 from __future__ import annotations
 
@@ -37,22 +37,22 @@ _VALUE_CODES = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",
 })  # fmt: skip
-"""Codes of findings about one value; of those at the same place one is enough."""
+"""Codes of findings about a value; only the first finding of a code is kept at each place."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing wrong in a file.
+    """An error or warning about a place in a file.
 
     Attributes:
-        path: File as the user knows it.
+        path: Path of the file for the user.
         line: Counted from 1; 0 for the file as a whole.
         col: Counted from 1.
         severity: `error` or `warning`.
         code: Short stable name of the kind of finding.
-        message: What is wrong, one sentence.
-        length: How many characters the caret line underlines.
-        hint: What was allowed and what to do next, or "".
+        message: The problem, one sentence.
+        length: Number of characters that the caret line underlines.
+        hint: Allowed values and remedy, or "".
         excerpt: The whole source line, without keys and passwords.
     """
 
@@ -81,7 +81,7 @@ class Finding:
         if self.line and self.excerpt:
             number = f"{self.line:4d}"
             excerpt, before = self.shown_excerpt, self.col - 1 - self._excerpt_start
-            # Tabs stay tabs under the text, so that the caret lines up at any tab width.
+            # Tabs are kept, so that the caret is aligned at any tab width.
             blank = "".join(c if c == "\t" else " " for c in excerpt[:before])
             room = max(1, min(self.length, len(excerpt) - before))
             lines.append(f"{number} | {excerpt}")
@@ -92,15 +92,15 @@ class Finding:
 
 
 class MissionError(InputError):
-    """A mission cannot be run; the text renders every finding, in file order.
+    """A mission cannot be run; the text lists the findings in file order.
 
     Attributes:
-        findings: All of them.
+        findings: All findings.
     """
 
     def __init__(self, findings: Iterable[Finding]) -> None:
         self.findings = tuple(findings)
-        # Without the constructor of InputError: the texts of findings are shortened already.
+        # The constructor of InputError would shorten the texts of the findings again.
         Exception.__init__(self, "\n".join(describe_findings(self.findings)))
 
 
@@ -121,7 +121,7 @@ def error(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
 
 
 def warning(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
-    """Return a warning at `mark`: worth a look, no reason not to run."""
+    """Return a warning at `mark`; the mission can run nevertheless."""
     return _finding("warning", mark, code, message, hint)
 
 
@@ -135,31 +135,31 @@ def _finding(severity: str, mark: Mark, code: str, message: str, hint: str) -> F
 
 @lru_cache(maxsize=64)
 def _without_secrets(line: str) -> str:
-    """Return a line of a file with `***` for keys and passwords: a finding does not repeat them."""
+    """Return a line of a file in which `***` replaces keys and passwords."""
     return _SECRET.sub(r"\1***", line)
 
 
 def in_file_order(findings: Iterable[Finding], first: str) -> tuple[Finding, ...]:
-    """Return the findings, those of the file `first` first, each file top to bottom.
+    """Return the findings in the order of the text, and the findings of the file `first` first.
 
-    One mistake is told once: where several look at the same value, the first that minds it is heard.
+    Of several findings about a value with the same code, only the first is kept.
     """
     unique: dict[tuple[str, int, int, str], Finding] = {}
     for finding in findings:
-        sort = finding.code if finding.code in _VALUE_CODES else str(finding)
-        unique.setdefault((finding.path, finding.line, finding.col, sort), finding)
+        kind = finding.code if finding.code in _VALUE_CODES else str(finding)
+        unique.setdefault((finding.path, finding.line, finding.col, kind), finding)
     return tuple(sorted(unique.values(), key=lambda f: (f.path != first, f.path, f.line, f.col)))
 
 
 def suggest(word: str, known: Iterable[str]) -> str | None:
-    """Return the known word that `word` was probably meant to be, or None."""
+    """Return the known word that is most similar to `word`, or None."""
     by_lower = {name.lower(): name for name in known}
     close = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
     return by_lower[close[0]] if close else None
 
 
 def alternatives(word: str, known: Iterable[str], lead: str) -> str:
-    """Return a hint: the likely meaning of `word`, then `lead` and every known word."""
+    """Return a hint with the most similar known word, `lead` and the known words."""
     known = list(known)
     meant = suggest(word, known)
     more = f" and {len(known) - _MAX_ALTERNATIVES} more" if len(known) > _MAX_ALTERNATIVES else ""

@@ -1,4 +1,4 @@
-"""A mission file and its cell file, read, checked, and ready to be built."""
+"""Loading of missions: the mission file and its cell file are read and checked."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from executive.skill import Skill
 from executive.tree.registry import control_nodes
 
 Kinds = Callable[[str], CellKind]
-"""Finds the installed kind of cells of a name; raises InputError where there is none."""
+"""Function that returns the installed kind of cell with a name, or raises InputError."""
 
 
 @dataclass(frozen=True)
@@ -36,16 +36,16 @@ class LoadedMission:
     """A mission without errors.
 
     Attributes:
-        mission: What the file says, as written.
-        tree: Its tree with subtrees, params and arguments put in.
-        cell_config: The cell it happens in.
-        text: The mission file.
-        path: Where it was found.
-        cell_path: Where the cell file was found.
-        libraries: The text of every library file by its path as the mission writes it.
-        endings: Failures that can still end it.
-        warnings: Findings that are no reason not to run.
-        overrides: Other values for params and keys of the cell, as they were given.
+        mission: Content of the mission file.
+        tree: Tree with expanded subtrees, params and arguments.
+        cell_config: Content of the cell file.
+        text: Text of the mission file.
+        path: Path of the mission file.
+        cell_path: Path of the cell file.
+        libraries: Text of each library file by its path as written in the mission.
+        endings: Unhandled failures, which can end the mission.
+        warnings: Findings that do not prevent a run.
+        overrides: Overridden values of params and keys of the cell, as given.
     """
 
     mission: Mission
@@ -61,12 +61,12 @@ class LoadedMission:
 
     @property
     def params(self) -> dict[str, JsonValue]:
-        """The mission's params as plain values, overrides applied."""
+        """Values of the mission's params, with overrides."""
         return {name: param.value.value for name, param in self.mission.params.items()}
 
     @property
     def routes(self) -> dict[str, tuple[str, ...]]:
-        """For every class label the bins it may go to."""
+        """Permitted bins for each class."""
         return {route.label: tuple(bin.name for bin in route.bins) for route in self.mission.routes}
 
 
@@ -82,37 +82,37 @@ def load_mission(
     Args:
         path: A mission file, or the name of a shipped mission.
         skills: Installed skills by name.
-        overrides: Other values for params by name, and for the cell as `cell.<key>.<key>`.
-        kinds: Finds the kind of the cell, which is asked what it cannot do; None: nobody is asked.
-        cell: The cell to take instead of the one that the mission names, or None.
+        overrides: Values for params by name, and for keys of the cell as `cell.<key>.<key>`.
+        kinds: Finds the kind of the cell, which checks the mission against its abilities; None for no check.
+        cell: Cell that replaces the mission's cell, or None.
 
     Raises:
-        MissionError: Something is wrong with mission or cell; every finding is in it.
-        InputError: There is no such mission.
+        MissionError: Mission or cell have errors; the exception contains every finding.
+        InputError: The mission does not exist.
     """
     file, control = find_mission(path), control_nodes()
     files = read_mission(file, overrides or {}, skills, control, cell)
     mission, config = files.mission, files.cell.config if files.cell else None
     findings = list(files.findings)
-    kind = _kind(files, kinds, findings)
-    labels, least = {}, None
+    kind = _find_kind(files, kinds, findings)
+    labels, min_times = {}, None
     if kind is not None and files.cell is not None and files.cell_path is not None:
         base = files.cell_path.parent
-        wrong = [files.cell.finding(keys, "robot", text) for keys, text in kind.check(config, base)]
-        findings += wrong
+        cell_findings = [files.cell.finding(keys, "robot", text) for keys, text in kind.check(config, base)]
+        findings += cell_findings
         labels = dict(kind.labels(config, base))
-        least = None if wrong else kind.least_times(config)
+        min_times = None if cell_findings else kind.least_times(config)
     expanded = expand(mission, skills)
     tree = with_paths(expanded.tree or UnknownNode(files.source.mark(), ""))
-    case = Case(mission, tree, expanded.unused, skills, control, config, labels, least)
+    case = Case(mission, tree, expanded.unused, skills, control, config, labels, min_times)
     findings += (*expanded.findings, *check(case))
     ordered = in_file_order(findings, files.source.path)
-    is_sound = expanded.tree is not None and all(finding.severity != "error" for finding in findings)
-    if config is None or files.cell_path is None or not is_sound:
+    is_valid = expanded.tree is not None and all(finding.severity != "error" for finding in findings)
+    if config is None or files.cell_path is None or not is_valid:
         raise MissionError(ordered)
     if kind is not None and files.cell is not None:
         ordered = in_file_order(
-            (*ordered, *_unmeasured(files.cell, files.cell_path.parent)), files.source.path
+            (*ordered, *_find_unmeasured(files.cell, files.cell_path.parent)), files.source.path
         )
     return LoadedMission(
         mission, tree, config, files.source.text, file, files.cell_path, files.libraries,
@@ -120,7 +120,7 @@ def load_mission(
     )  # fmt: skip
 
 
-def _unmeasured(cell: CellFile, base: Path) -> Iterator[Finding]:
+def _find_unmeasured(cell: CellFile, base: Path) -> Iterator[Finding]:
     """Yield a warning for each detector of a cell without a measurement that applies to it."""
     assert cell.config is not None
     folders = (base, shipped_folder() / "cells")
@@ -129,8 +129,8 @@ def _unmeasured(cell: CellFile, base: Path) -> Iterator[Finding]:
         yield warning(mark, "not-measured", text)
 
 
-def _kind(files: MissionFiles, kinds: Kinds | None, findings: list[Finding]) -> CellKind | None:
-    """Return the kind of the mission's cell, or None where there is none to ask."""
+def _find_kind(files: MissionFiles, kinds: Kinds | None, findings: list[Finding]) -> CellKind | None:
+    """Return the kind of the mission's cell, or None if it is unknown."""
     if files.cell is None or files.cell.config is None or kinds is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""The shape of a built tree as plain data: what drawings, records and pages of it are made from."""
+"""Outline of a built tree as plain data, for drawings, records and pages."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Connection:
     """A port of a skill and the variable it is connected to.
 
     Attributes:
-        required: False for an input that has a default for when nothing has written the variable.
+        required: False for an input with a default for an unwritten variable.
     """
 
     port: str
@@ -36,22 +36,22 @@ class OutlineNode:
 
     Attributes:
         path: Unique path from the root.
-        name: What it is called, after what it is to its parent: `Grasp`, `recover: look`, `do`.
-        depth: How many nodes are above it.
-        detail: What the mission says about it, in a few words.
+        name: Name with the role under its parent: `Grasp`, `recover: look`, `do`.
+        depth: Number of ancestors.
+        detail: Settings of the node in the mission, in a few words.
         kind: `skill`, or the keyword of a control node.
         symbol, shape: Its symbol and its Graphviz shape in drawings; "" for a skill.
-        title: What it is called without regard to its parent: label, skill or word.
-        slot: What it is to its parent: `do`, `recover`, `catch 1`; "" in a list.
-        when: After which failures it runs, for a catch: `on Grasp.missed`; else "".
-        subtrees: Names of the subtrees that begin with it, the outermost first.
-        skill: Name of the skill; "" for a control node, and so are the fields that follow.
-        doc: What the skill does, one sentence.
-        params: Its constants from the mission.
-        reads, writes: Its connected ports.
-        reasons: Why it may fail.
-        senses: Whether it takes in something new.
-        uses: The parts of the cell that it needs for itself.
+        title: Label, or name of the skill or keyword.
+        slot: Role under its parent: `do`, `recover`, `catch 1`; "" in a list.
+        when: Failures after which a catch runs: `on Grasp.missed`; else "".
+        subtrees: Names of the subtrees with this node as root, the outermost first.
+        skill: Name of the skill; "" for a control node. The fields below are empty for a control node.
+        doc: Description of the skill, one sentence.
+        params: Constants of the skill from the mission.
+        reads, writes: Connected ports.
+        reasons: Reasons for which the skill may fail.
+        senses: True if the skill senses the scene.
+        uses: Parts of the cell that the skill uses exclusively.
     """
 
     path: str
@@ -76,7 +76,7 @@ class OutlineNode:
 
     @property
     def subtree(self) -> str:
-        """The names of its subtrees as one; "" where none begins with it."""
+        """Names of the subtrees with this node as root, separated by " / "."""
         return " / ".join(self.subtrees)
 
 
@@ -86,7 +86,7 @@ def outline(root: Behaviour) -> list[OutlineNode]:
 
 
 def children(nodes: Sequence[OutlineNode]) -> list[list[int]]:
-    """Return for each node where its children stand in the outline."""
+    """Return the indices of the children of each node."""
     found: list[list[int]] = [[] for _ in nodes]
     above: list[int] = []
     for index, node in enumerate(nodes):

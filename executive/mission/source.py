@@ -1,4 +1,4 @@
-"""Where a piece of text stands: the file, the line, the column and how long it is."""
+"""Source texts and places in them: file, line, column and length."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A text and the name it is shown under.
+    """A text and its name in messages.
 
     Attributes:
         path: Name in front of every position, for instance `missions/sort.yaml` or `--set`.
@@ -39,7 +39,7 @@ class Mark:
         source: The text.
         line: Counted from 1; 0 means the text as a whole.
         col: Counted from 1, in characters.
-        length: How many characters the caret line underlines.
+        length: Number of characters that the caret line underlines.
     """
 
     source: Source
@@ -48,5 +48,5 @@ class Mark:
     length: int
 
     def place(self, source: Source) -> str:
-        """Return where this is for who reads `source`: the line, and the file where it is another."""
+        """Return the line, with the path of the file if it is not `source`."""
         return f"line {self.line}" if self.source is source else f"{self.source.path}:{self.line}"

@@ -1,4 +1,4 @@
-"""Findings in our own words: what a value is, and what pydantic found wrong with one."""
+"""Descriptions of values and of pydantic's errors for findings."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _BOUNDS = {
 
 
 def describe(value: object) -> str:
-    """Return what a plain value is, for the end of a sentence."""
+    """Return a description of a plain value, for the end of a sentence."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -50,11 +50,11 @@ def describe(value: object) -> str:
 
 
 def violation(problem: ErrorDetails) -> str:
-    """Return what one of pydantic's errors says, to follow the name of the value."""
+    """Return the message of an error of pydantic, without the name of the value."""
     kind, given = problem["type"], problem["input"]
     context = problem.get("ctx", {})
     if kind in _TYPE_PHRASES:
-        return f"must be {_TYPE_PHRASES[kind]}, not {describe(given)}{_meant(kind, given)}"
+        return f"must be {_TYPE_PHRASES[kind]}, not {describe(given)}{_suggest_correction(kind, given)}"
     if kind in _BOUNDS:
         words, key = _BOUNDS[kind]
         return f"must be {words} {context[key]:g}, not {describe(given)}"
@@ -71,8 +71,8 @@ def violation(problem: ErrorDetails) -> str:
     return f"is not allowed here: {problem['msg'][:1].lower()}{problem['msg'][1:]}"
 
 
-def _meant(kind: str, given: object) -> str:
-    """Return what was probably meant, in brackets, or ""."""
+def _suggest_correction(kind: str, given: object) -> str:
+    """Return a suggested correction in brackets, or ""."""
     if kind == "bool_type" and isinstance(given, str) and given.lower() in _BOOLEAN_WORDS:
         return f" (write {_BOOLEAN_WORDS[given.lower()]})"
     if kind in ("float_type", "int_type") and isinstance(given, str) and _WITH_UNIT.fullmatch(given):

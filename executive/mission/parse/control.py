@@ -1,4 +1,4 @@
-"""Control nodes, read by the keys that their classes declare."""
+"""Parser of control nodes by the keys that their classes declare."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from executive.mission.parse.nodes import NodeParser
 
 
-def unread(mark: Mark) -> model.Node:
-    """Return a node for one that could not be read; a finding says why."""
+def make_unknown_node(mark: Mark) -> model.Node:
+    """Return a placeholder for a node that cannot be read; a finding states the reason."""
     return model.UnknownNode(mark, "")
 
 
-def shorthand_key(kind: type[ControlNode] | type[DeclaredSection]) -> Key | None:
+def find_shorthand_key(kind: type[ControlNode] | type[DeclaredSection]) -> Key | None:
     """Return the key whose value may stand directly under the keyword of a node or section, or None."""
     return next((key for key in kind.keys.values() if key.is_shorthand), None)
 
 
-def inner_keys(kind: type[ControlNode] | type[DeclaredSection]) -> Mapping[str, Key]:
+def find_inner_keys(kind: type[ControlNode] | type[DeclaredSection]) -> Mapping[str, Key]:
     """Return the keys of the mapping under the keyword; none if no mapping may stand there."""
     inner = {name: key for name, key in kind.keys.items() if not key.is_sibling}
     return {} if all(key.is_shorthand for key in inner.values()) else inner
@@ -39,7 +39,7 @@ def inner_keys(kind: type[ControlNode] | type[DeclaredSection]) -> Mapping[str, 
 
 @dataclass(frozen=True)
 class Head:
-    """A control node in the file: its mapping, its word with its place, its label and its value."""
+    """A control node in the file: its mapping, its keyword with place, its label and its value."""
 
     node: yaml.Mapping
     keyword: str
@@ -63,7 +63,7 @@ def read_control(parser: NodeParser, head: Head, kind: type[ControlNode]) -> mod
         parser.refuse(head.mark, "missing-key", f"{head.keyword} needs {listed}{where}")
     missing = [key.kind for name, key in kind.keys.items() if key.is_required and name not in values]
     if Kind.NODES in missing:
-        return unread(head.mark)
+        return make_unknown_node(head.mark)
     if Kind.VARIABLE in missing or Kind.ELEMENTS in missing:
         children = [node for part in values.values() for node in model.nodes_of(part)]
         return model.UnknownNode(head.mark, head.label, tuple(children))
@@ -71,15 +71,15 @@ def read_control(parser: NodeParser, head: Head, kind: type[ControlNode]) -> mod
 
 
 def _is_given(head: Head, name: str) -> bool:
-    inner = head.value.get(name) if isinstance(head.value, yaml.Mapping) else None
-    return inner is not None or head.node.get(name) is not None
+    """Return True if a key stands under the keyword or beside the keyword."""
+    return any(isinstance(node, yaml.Mapping) and name in node.keys for node in (head.value, head.node))
 
 
 class _Reader:
     """Reads the keys of one control node.
 
     Attributes:
-        has_valid_constants: False if the value of the node is no mapping where it must be one.
+        has_valid_constants: False if the value of the node must be a mapping and is not a mapping.
     """
 
     def __init__(self, parser: NodeParser) -> None:
@@ -91,7 +91,7 @@ class _Reader:
     ) -> dict[str, Part]:
         """Return the values of the keys under the keyword of a node or section."""
         values: dict[str, Part] = {}
-        bare, inner = shorthand_key(kind), inner_keys(kind)
+        bare, inner = find_shorthand_key(kind), find_inner_keys(kind)
         is_short = (
             isinstance(value, yaml.YamlSequence) if bare and bare.kind is Kind.NODES else bare is not None
         )
@@ -101,22 +101,22 @@ class _Reader:
             self.read(fields, bare, value, mark, values)
             return values
         fields = Fields(owner, mark, value, inner, self.parser.findings)
-        self.has_valid_constants = self.has_valid_constants and fields.sound
+        self.has_valid_constants = self.has_valid_constants and fields.is_mapping
         for name, key in inner.items():
             found = fields.required(name) if key.is_required else fields.get(name)
             if found is not None:
                 self.read(fields, key, found, fields.key_mark(name), values)
             elif key.kind is Kind.NODE and key.is_required:
-                values[name] = unread(mark)
+                values[name] = make_unknown_node(mark)
         return values
 
     def read(self, fields: Fields, key: Key, value: yaml.Node, mark: Mark, values: dict[str, Part]) -> None:
-        """Read the value of a key into `values`; `mark` is the place of a node that is missing there."""
-        part = self._part(fields, key, value, mark)
+        """Read the value of a key into `values`; `mark` is the place of a missing node."""
+        part = self._read_part(fields, key, value, mark)
         if part is not None:
             values[key.name] = part
 
-    def _part(self, fields: Fields, key: Key, value: yaml.Node, mark: Mark) -> Part | None:
+    def _read_part(self, fields: Fields, key: Key, value: yaml.Node, mark: Mark) -> Part | None:
         match key.kind:
             case Kind.NODE:
                 is_empty = isinstance(value, yaml.Scalar) and value.value is None
@@ -126,18 +126,18 @@ class _Reader:
                     else self.parser.node(value, mark)
                 )
             case Kind.NODES:
-                return self._nodes(fields, key, value)
+                return self._read_nodes(fields, key, value)
             case Kind.REASONS:
-                return fields.matches(key.name)
+                return fields.failure_names(key.name)
             case Kind.VARIABLE:
-                return self._variable(fields, key.name)
+                return self._read_variable(fields, key.name)
             case Kind.SECTION:
-                return self._section(key, value, mark)
+                return self._read_section(key, value, mark)
             case Kind.SECTIONS:
-                return tuple(self._sections(key, value))
+                return tuple(self._read_sections(key, value))
         return value_of(value, self.parser.findings)
 
-    def _nodes(self, fields: Fields, key: Key, value: yaml.Node) -> tuple[model.Node, ...] | None:
+    def _read_nodes(self, fields: Fields, key: Key, value: yaml.Node) -> tuple[model.Node, ...] | None:
         found = self.parser.nodes(value, fields.owner)
         if key.max_count is not None and len(found) > key.max_count:
             message = f"a {fields.owner} has at most {key.max_count} branches, not {len(found)}"
@@ -145,7 +145,7 @@ class _Reader:
             return None
         return found or None
 
-    def _variable(self, fields: Fields, name: str) -> Named | None:
+    def _read_variable(self, fields: Fields, name: str) -> Named | None:
         variable = Named(fields.text(name), fields.value_mark(name))
         if NAME.fullmatch(variable.name):
             return variable
@@ -154,17 +154,13 @@ class _Reader:
         bare = variable.name.removeprefix("$")
         return Named(bare, variable.mark) if NAME.fullmatch(bare) else None
 
-    def _section(self, key: Key, value: yaml.Node, mark: Mark) -> model.SectionNode | None:
+    def _read_section(self, key: Key, value: yaml.Node, mark: Mark) -> model.SectionNode | None:
         values = self.read_inner(key.name, mark, value, key.section)
-        required = (one for one in key.section.keys.values() if one.is_required and one.kind is Kind.CONSTANT)
-        return (
-            None
-            if any(one.name not in values for one in required)
-            else model.SectionNode(key.section, mark, values)
-        )
+        constants = [k.name for k in key.section.keys.values() if k.is_required and k.kind is Kind.CONSTANT]
+        return model.SectionNode(key.section, mark, values) if values.keys() >= set(constants) else None
 
-    def _sections(self, key: Key, value: yaml.Node) -> Iterable[model.SectionNode]:
-        """Yield the sections of a list, or the only one."""
+    def _read_sections(self, key: Key, value: yaml.Node) -> Iterable[model.SectionNode]:
+        """Yield the sections of a list, or a single section."""
         needed = " and ".join(f'"{name}"' for name in key.section.keys)
         if not isinstance(value, yaml.YamlSequence | yaml.Mapping):
             message = f"{key.name} takes {needed}, or a list of them, not {describe(yaml.plain(value))}"
@@ -173,5 +169,5 @@ class _Reader:
         if isinstance(value, yaml.YamlSequence) and not value.items:
             self.parser.refuse(value.mark, "empty-list", f"{key.name} needs at least one {needed}")
         for item in value.items if isinstance(value, yaml.YamlSequence) else (value,):
-            if (section := self._section(key, item, item.mark)) is not None:
+            if (section := self._read_section(key, item, item.mark)) is not None:
                 yield section

@@ -1,4 +1,4 @@
-"""Reading one mapping of a mission file key by key, collecting what is wrong with it."""
+"""Reader for the keys of one mapping of a mission file, which collects findings."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ class Fields:
     """The keys of one mapping.
 
     Attributes:
-        owner: What the mapping belongs to, for sentences.
-        mark: Where the owner stands, for what is missing.
+        owner: Name of the owner of the mapping in messages.
+        mark: Place of the owner, for findings about missing keys.
+        findings: Receives the findings.
     """
 
     def __init__(
@@ -44,8 +45,8 @@ class Fields:
                 self._refuse(entry.key.mark, "unknown-key", message, hint)
 
     @property
-    def sound(self) -> bool:
-        """False where there is no mapping to read."""
+    def is_mapping(self) -> bool:
+        """True if the node is a mapping."""
         return self._node is not None
 
     def get(self, key: str) -> Node | None:
@@ -53,19 +54,19 @@ class Fields:
         return self._node.get(key) if self._node else None
 
     def key_mark(self, key: str) -> Mark:
-        """Return where `key` stands, or the owner where it is missing."""
+        """Return the place of `key`, or of the owner if the key is missing."""
         entry = self._node.entry(key) if self._node else None
         return entry.key.mark if entry else self.mark
 
     def value_mark(self, key: str) -> Mark:
-        """Return where the value of `key` stands, or the owner where it is missing."""
+        """Return the place of the value of `key`, or of the owner if the key is missing."""
         node = self.get(key)
         return node.mark if node else self.mark
 
     def required(self, key: str) -> Node | None:
-        """Return the value of `key`; its absence is a finding."""
+        """Return the value of `key`, or None after adding a finding."""
         node = self.get(key)
-        if node is None and self.sound:
+        if node is None and self.is_mapping:
             self._refuse(self.mark, "missing-key", f'{self.owner} needs the key "{key}"')
         return node
 
@@ -76,15 +77,15 @@ class Fields:
             return default
         if isinstance(node, Scalar) and node.value is not None:
             return node.text
-        return self._wrong(node, f"{self.owner}.{key} must be a text", default)
+        return self._refuse_type(node, f"{self.owner}.{key} must be a text", default)
 
     def value(self, key: str) -> Value | None:
-        """Return a value or `$reference` of `key`, or None where it is not given."""
+        """Return the value or `$reference` of `key`, or None if it is missing or invalid."""
         node = self.get(key)
         return None if node is None else value_of(node, self.findings)
 
-    def matches(self, key: str) -> tuple[FailureName, ...]:
-        """Return the `Skill.reason` names under `key`: one, or a list of them."""
+    def failure_names(self, key: str) -> tuple[FailureName, ...]:
+        """Return the names of failures under `key`, a single `Skill.reason` or a list."""
         node = self.get(key)
         if node is None:
             return ()
@@ -116,9 +117,9 @@ class Fields:
             for entry in node.entries:
                 read(entry.key.text, entry.key.mark, entry.value)
         elif node is not None and not (isinstance(node, Scalar) and node.value is None):
-            self._wrong(node, f"{self.owner}.{key} must be a mapping", "")
+            self._refuse_type(node, f"{self.owner}.{key} must be a mapping", "")
 
-    def _wrong(self, node: Node, sentence: str, default: str) -> str:
+    def _refuse_type(self, node: Node, sentence: str, default: str) -> str:
         self._refuse(node.mark, "wrong-type", f"{sentence}, not {describe(plain(node))}")
         return default
 
@@ -127,9 +128,9 @@ class Fields:
 
 
 def settings_of(node: Node, owner: str, findings: list[Finding], example: str = "name") -> dict[str, Setting]:
-    """Return a mapping of values; nothing at all counts as an empty one.
+    """Return the values of a mapping; an empty value is an empty mapping.
 
-    `example` is a key that a value without one may have been meant for.
+    `example` is a key that the hint suggests for a value without a key.
     """
     if isinstance(node, Scalar) and node.value is None:
         return {}
@@ -143,25 +144,25 @@ def settings_of(node: Node, owner: str, findings: list[Finding], example: str = 
 
 
 def value_of(node: Node, findings: list[Finding]) -> Value | None:
-    """Return a value: `$name` is a reference, `$$` the character `$`; None where a `$` is misplaced."""
+    """Return a value, in which `$name` is a reference and `$$` is `$`; None if a `$` is misplaced."""
     if isinstance(node, Scalar) and isinstance(node.value, str) and node.value.startswith("$"):
         name = node.value[1:]
         if NAME.fullmatch(name):
             return Reference(name, node.mark)
-    misplaced = list(_misplaced_dollars(node))
+    misplaced = list(_find_misplaced_dollars(node))
     findings += misplaced
     literal = literal_of(node)
-    return None if misplaced else replace(literal, value=_unescaped(literal.value))
+    return None if misplaced else replace(literal, value=_unescape(literal.value))
 
 
 def literal_of(node: Node) -> Literal:
-    """Return a node as a value that knows where it and its elements stand."""
+    """Return a node as a value with its place and the places of its elements."""
     elements = tuple(item.mark for item in node.items) if isinstance(node, YamlSequence) else ()
     return Literal(plain(node), node.mark, elements=elements)
 
 
-def _misplaced_dollars(node: Node) -> Iterator[Finding]:
-    """Find every `$` that would be taken for text: in the wrong form, or inside a text, list or mapping."""
+def _find_misplaced_dollars(node: Node) -> Iterator[Finding]:
+    """Yield a finding for each `$` in the wrong form, or inside a text, list or mapping."""
     for scalar in scalars(node):
         if isinstance(scalar.value, str) and _DOLLAR.search(scalar.value.replace("$$", "")):
             message = f'"{scalar.text}" is no reference: only a whole value can be one, as in key: $name'
@@ -169,10 +170,10 @@ def _misplaced_dollars(node: Node) -> Iterator[Finding]:
             yield error(scalar.mark, "bad-reference", message, hint)
 
 
-def _unescaped(value: JsonValue) -> JsonValue:
-    """Return a plain value with every `$$` in its texts as `$`."""
+def _unescape(value: JsonValue) -> JsonValue:
+    """Return a plain value in which `$` replaces each `$$`."""
     if isinstance(value, str):
         return value.replace("$$", "$")
     if isinstance(value, list):
-        return [_unescaped(item) for item in value]
-    return {key: _unescaped(item) for key, item in value.items()} if isinstance(value, dict) else value
+        return [_unescape(item) for item in value]
+    return {key: _unescape(item) for key, item in value.items()} if isinstance(value, dict) else value

@@ -1,4 +1,4 @@
-"""Mission and library files: from positioned nodes to typed values."""
+"""Parsers of mission and library files from YAML nodes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MISSION_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 def parse_mission(
     root: Node, overrides: Mapped[str, str], skills: Skills, control: ControlNodes
 ) -> tuple[Mission, list[Finding]]:
-    """Return what the file says, as far as it can be read, and what is wrong with its form."""
+    """Return the readable content of a mission file, and the findings."""
     findings: list[Finding] = []
     start = replace(root.mark, length=1)
     fields = Fields("the mission", start, root, grammar.MISSION, findings)
@@ -34,21 +34,21 @@ def parse_mission(
     parser = NodeParser(findings, skills, control)
     tree = fields.get("tree")
     mission = Mission(
-        name=_name(fields),
+        name=_read_name(fields),
         description=fields.text("description"),
-        cell=_cell(fields),
-        libraries=_names(
+        cell=_read_cell(fields),
+        libraries=_read_names(
             fields.items("library"), "library takes the path of a file or a list of them", findings
         ),
         params=parse_params(fields, overrides),
-        routes=_routes(fields),
+        routes=_read_routes(fields),
         tree=None if tree is None else parser.node(tree, fields.key_mark("tree")),
-        trees=_trees(fields, parser),
+        trees=_read_trees(fields, parser),
     )
     return mission, findings
 
 
-def _name(fields: Fields) -> str:
+def _read_name(fields: Fields) -> str:
     name = fields.text("mission")
     if isinstance(fields.get("mission"), Scalar) and not _MISSION_NAME.fullmatch(name):
         message = f'a mission is named by letters, digits, "_" and "-", at most 64, not "{name}"'
@@ -56,29 +56,29 @@ def _name(fields: Fields) -> str:
     return name
 
 
-def _cell(fields: Fields) -> Named:
+def _read_cell(fields: Fields) -> Named:
     cell = Named(fields.text("cell"), fields.value_mark("cell"))
     if isinstance(fields.get("cell"), Scalar) and not cell.name:
         fields.findings.append(error(cell.mark, "bad-name", "cell names no file"))
     return cell
 
 
-def _routes(fields: Fields) -> tuple[Route, ...]:
+def _read_routes(fields: Fields) -> tuple[Route, ...]:
     routes: list[Route] = []
 
     def read(label: str, mark: Mark, node: Node) -> None:
         items = node.items if isinstance(node, YamlSequence) else (node,)
         if not items:
             fields.findings.append(error(node.mark, "empty-list", "a route needs at least one bin"))
-        bins = _names(items, "a route names a bin or a list of bins", fields.findings)
+        bins = _read_names(items, "a route names a bin or a list of bins", fields.findings)
         routes.append(Route(label, mark, bins))
 
     fields.mapping("routes", read)
     return tuple(routes)
 
 
-def _names(items: Iterable[Node], takes: str, findings: list[Finding]) -> tuple[Named, ...]:
-    """Return the texts of a list; anything else is a finding that begins with `takes`."""
+def _read_names(items: Iterable[Node], takes: str, findings: list[Finding]) -> tuple[Named, ...]:
+    """Return the texts of a list; for other items, add a finding that starts with `takes`."""
     named = []
     for item in items:
         if isinstance(item, Scalar) and isinstance(item.value, str):
@@ -89,18 +89,20 @@ def _names(items: Iterable[Node], takes: str, findings: list[Finding]) -> tuple[
 
 
 def parse_library(root: Node, skills: Skills, control: ControlNodes) -> tuple[Library, list[Finding]]:
-    """Return what a library file says, as far as it can be read, and what is wrong with its form."""
+    """Return the readable content of a library file, and the findings."""
     findings: list[Finding] = []
     start = replace(root.mark, length=1)
     fields = Fields("the library", start, root, grammar.LIBRARY, findings)
     for key in ("library", "trees"):
         fields.required(key)
     name = fields.text("library")
-    return Library(name, _trees(fields, NodeParser(findings, skills, control), name or "library")), findings
+    return Library(
+        name, _read_trees(fields, NodeParser(findings, skills, control), name or "library")
+    ), findings
 
 
-def _trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
-    """Return the subtrees under the key `trees`; `library` names the library they belong to."""
+def _read_trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
+    """Return the subtrees under the key `trees`; `library` is the name of their library."""
     trees: dict[str, Subtree] = {}
 
     def read(name: str, mark: Mark, node: Node) -> None:
@@ -110,7 +112,9 @@ def _trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, S
             whole = node.get("do") is not None
             if not whole:
                 parser.refuse(mark, "missing-key", f'the subtree "{name}" needs the key "do"')
-            trees[name] = _subtree(name, mark, node, parser if whole else parser.silent(), library)
+            trees[name] = _read_subtree(
+                name, mark, node, parser if whole else parser.make_silent_parser(), library
+            )
         else:
             trees[name] = Subtree(name, mark, "", {}, None, parser.node(node, mark), library)
 
@@ -118,7 +122,7 @@ def _trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, S
     return trees
 
 
-def _subtree(name: str, mark: Mark, node: Mapping, parser: NodeParser, library: str) -> Subtree:
+def _read_subtree(name: str, mark: Mark, node: Mapping, parser: NodeParser, library: str) -> Subtree:
     fields = Fields(f'the subtree "{name}"', mark, node, grammar.SUBTREE, parser.findings)
     args: dict[str, Argument] = {}
 
@@ -145,10 +149,10 @@ def _subtree(name: str, mark: Mark, node: Mapping, parser: NodeParser, library: 
     else:
         fields.mapping("args", read)
     body = parser.node(fields.get("do"), fields.key_mark("do"))
-    return Subtree(name, mark, fields.text("doc"), args, _returns(fields, parser), body, library)
+    return Subtree(name, mark, fields.text("doc"), args, _read_returns(fields, parser), body, library)
 
 
-def _returns(fields: Fields, parser: NodeParser) -> dict[str, Mark] | None:
+def _read_returns(fields: Fields, parser: NodeParser) -> dict[str, Mark] | None:
     """Return the names under `returns` with their places, or None where the key is missing."""
     if fields.get("returns") is None:
         return None

@@ -1,1 +1,1 @@
-"""The JSON Schema of mission, library and cell files."""
+"""JSON Schema of mission, library and cell files."""

@@ -1,4 +1,4 @@
-"""The JSON Schema of mission and library files, from the grammar and the installed skills."""
+"""JSON Schema of mission and library files, from the grammar and the installed skills."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import GrammarKey
-from executive.mission.parse.control import inner_keys, shorthand_key
+from executive.mission.parse.control import find_inner_keys, find_shorthand_key
 from executive.mission.parse.fields import NAME
 from executive.mission.parse.params import TYPES
 from executive.mission.schema.types import (
@@ -66,17 +66,17 @@ def _file(title: str, keys: Mapping[str, GrammarKey], skills: Skills, control: C
 
 
 def _node(skills: Skills, control: ControlNodes) -> Json:
-    """Return the schema of a node: a word, a list, or a mapping with one head and what belongs to it.
+    """Return the schema of a node: a word, a list, or a mapping with one head and its siblings.
 
-    A mapping is judged by the heads it has, never by trying one kind of node after the other, so an
-    editor complains about the key that is wrong and completes the keys that fit.
+    The head selects the schema of a mapping, without alternatives, so that an editor marks the invalid key
+    and completes the valid keys.
     """
     label: Json = {**_ref("label"), "description": grammar.AS.doc}
     heads = [*skills, *control, grammar.USE]
     bodiless = [
         {"const": word, "title": word, "description": _sentence(kind), **ALTERNATIVE}
         for word, kind in control.items()
-        if (bare := shorthand_key(kind)) is not None and not bare.is_required
+        if (bare := find_shorthand_key(kind)) is not None and not bare.is_required
     ]
     siblings: dict[str, Json] = {grammar.USE: _properties(grammar.USE_SIBLINGS)}
     demands: dict[str, Json] = {}
@@ -113,7 +113,7 @@ def _node(skills: Skills, control: ControlNodes) -> Json:
 
 def _form(kind: type[ControlNode]) -> Json:
     """Return the schema of the value under the keyword of a control node."""
-    bare, inner = shorthand_key(kind), inner_keys(kind)
+    bare, inner = find_shorthand_key(kind), find_inner_keys(kind)
     shapes = [_value_of(bare)] if bare else []
     if inner:
         demand = _any_of(kind.any_of) if set(kind.any_of) <= set(inner) else {}
@@ -157,7 +157,7 @@ def _value_of(key: Key) -> Json:
             section = _object(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}
         case Kind.SECTION:
-            section, bare = _object(key.section.keys), shorthand_key(key.section)
+            section, bare = _object(key.section.keys), find_shorthand_key(key.section)
             if bare is None:
                 return section
             written = bare.adapter().json_schema()
@@ -167,7 +167,7 @@ def _value_of(key: Key) -> Json:
 
 
 def _any_of(keys: Sequence[str]) -> Json:
-    """Return the demand that one of these keys at least is there."""
+    """Return the schema that requires at least one of these keys."""
     return {"anyOf": [{"required": [key]} for key in keys]} if keys else {}
 
 

@@ -1,4 +1,4 @@
-"""Python types, the cell file and the skills as JSON Schema draft-07, which editors know best."""
+"""JSON Schema draft-07, which most editors support, of Python types, the cell file and the skills."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ DIALECT = "http://json-schema.org/draft-07/schema#"
 
 
 class Draft07(GenerateJsonSchema):
-    """Pydantic's JSON Schema in the words of draft-07, without titles made up from names in the code."""
+    """Pydantic's JSON Schema as draft-07, without titles from names in the code."""
 
     def tuple_schema(self, schema: core_schema.TupleSchema) -> Json:
-        """Return the schema of a tuple, whose places draft-07 lists under `items`."""
+        """Return the schema of a tuple, whose elements draft-07 lists under `items`."""
         written = super().tuple_schema(schema)
         places = written.pop("prefixItems", None)
         if places is None:
@@ -57,7 +57,7 @@ def type_schema(declared: object) -> Json:
 def cell_schema() -> Json:
     """Return the schema of a cell file.
 
-    With a `base` no other key is needed, no detector needs a kind, and a detector may have no value.
+    With a `base`, no other key and no `kind` of a detector is required, and a detector may be empty.
     """
     written = CellConfig.model_json_schema(schema_generator=Draft07, ref_template="#/definitions/{model}")
     sections, required = written.pop("$defs"), written.pop("required")
@@ -75,12 +75,12 @@ def cell_schema() -> Json:
 
 
 def or_reference(*written: Json) -> Json:
-    """Return the schema of a value that is written out in one of these ways, or taken from `$name`."""
+    """Return the schema of a value with one of these schemas, or of a reference `$name`."""
     return {"anyOf": [*written, REFERENCE]}
 
 
 def settings(name: str, skill: type[Skill]) -> Json:
-    """Return what stands under the name of a skill: its params and ports."""
+    """Return the schema of the params and ports under the name of a skill."""
     required = [param.name for param in skill.params.values() if param.is_required]
     params = {key: _param(param) for key, param in skill.params.items()}
     ports = {key: _port(port) for key, port in skill.ports.items()}
@@ -90,12 +90,12 @@ def settings(name: str, skill: type[Skill]) -> Json:
         "required": required,
         "additionalProperties": False,
     }
-    # Under allOf, so that an editor completes the name alone, which is right in a list and in a mapping.
+    # With allOf an editor completes only the name, which is valid in a list and in a mapping.
     return {"title": name, **_documentation(skill), "allOf": [shape]}
 
 
 def words(skills: Mapping[str, type[Skill]]) -> list[Json]:
-    """Return the skills that may stand for themselves, without any params."""
+    """Return the schemas of the names of skills without required params."""
     return [
         {"const": name, "title": name, **_documentation(skill), **ALTERNATIVE}
         for name, skill in skills.items()
@@ -104,7 +104,7 @@ def words(skills: Mapping[str, type[Skill]]) -> list[Json]:
 
 
 def failures(skills: Mapping[str, type[Skill]]) -> list[str]:
-    """Return every `Skill.reason` there is."""
+    """Return `Skill.reason` for each reason of each skill."""
     return [f"{name}.{reason}" for name, skill in skills.items() for reason in skill.reasons]
 
 
@@ -125,15 +125,15 @@ def _param(param: Param) -> Json:
     bounds = {"minimum": param.ge, "maximum": param.le}
     written |= {word: bound for word, bound in bounds.items() if bound is not None}
     if param.choices is not None:
-        # Where a param names something of the cell, its choices are further words.
+        # A param that names a part of the cell accepts other values than its choices.
         written["examples" if param.refers else "enum"] = list(param.choices)
     if not param.is_required:
         written["default"] = to_jsonable_python(param.default)
-    return {"description": _sentence(param), **or_reference(written)}
+    return {"description": _describe_param(param), **or_reference(written)}
 
 
-def _sentence(param: Param) -> str:
-    """Return the param's sentence with its unit, bounds and default, which editors do not show otherwise."""
+def _describe_param(param: Param) -> str:
+    """Return the description of a param with unit, bounds and default, which editors do not show."""
     facts = [f"at least {param.ge:g}"] if param.ge is not None else []
     facts += [f"at most {param.le:g}"] if param.le is not None else []
     facts += [f"{param.default} if not given"] if param.default not in (..., "", None) else []
@@ -143,7 +143,7 @@ def _sentence(param: Param) -> str:
 
 def _port(port: Port) -> Json:
     written = port.direction is Direction.OUT
-    said = f"{'output' if written else 'input'}: {port.doc}"
+    description = f"{'output' if written else 'input'}: {port.doc}"
     if written or not is_plain(port.type):
-        return {"description": said, **REFERENCE}
-    return {"description": said, **or_reference(type_schema(port.type))}
+        return {"description": description, **REFERENCE}
+    return {"description": description, **or_reference(type_schema(port.type))}
