@@ -24,13 +24,13 @@ from executive.motion.arms import build_kinematics
 from executive.motion.plans import Plan, Plans
 
 MAX_REACH = 0.85
-"""Largest distance of the fake tool from the base [m]."""
+"""Maximum distance of the fake tool from the base [m]."""
 
 TOOL_SPEED = 1.0
-"""Largest tool speed of the fake arm, also its speed if a goal sets no lower one [m/s]."""
+"""Maximum tool speed of the fake arm, and default speed of a goal [m/s]."""
 
 SEAL_STRENGTH = 7.9
-"""Breakaway force of the seal of the fake tool, unless a test sets another one [N]."""
+"""Default breakaway force of the seal of the fake tool [N]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +167,7 @@ class FakeArm:
             held.position = self._tool.position - np.array([0.0, 0.0, height / 2])
 
     def _find_collision_of_held(self, pose: Pose) -> Collision | None:
-        """Return the collision of the held object on the way to a pose; the plan may lack this object."""
+        """Return the collision of the held object on the way to a pose, also if the plan lacks the object."""
         held = self._world.held
         if held is None:
             return None

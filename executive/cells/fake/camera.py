@@ -19,7 +19,7 @@ from executive.geometry import Pose
 from executive.perception.mounted_camera import MountedCamera
 
 MIN_CONFIDENCE = 0.9
-"""Smallest confidence of the detections of a fake detector; a higher threshold replaces it."""
+"""Confidence of the detections of a fake detector, unless its threshold is higher."""
 
 
 class FakeCamera(MountedCamera):

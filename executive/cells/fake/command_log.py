@@ -40,7 +40,7 @@ class FakeLog(LogFile):
             "tool": [arm.tool_pose.rotation, arm.tool_pose.position],
         }
         text = json.dumps(state, default=np.ndarray.tolist).encode()
-        # One write that is never shorter than the one before: a reader finds one state and blanks.
+        # No write is shorter than an earlier write, so that the file holds one state, followed by blanks.
         self._length = max(self._length, len(text))
         self.write(text.ljust(self._length), 0)
 
