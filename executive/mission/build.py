@@ -1,4 +1,4 @@
-"""From a checked mission to the tree that runs."""
+"""Construction of the behaviour tree of a checked mission."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def build(
     """Return the root of a fresh tree of py_trees behaviours; every node has a unique, readable `path`.
 
     `substitutes` maps patterns of node paths to the skills that run there
-    instead; `*` matches any characters, including `/`. The first one that fits is taken.
+    instead; `*` matches any characters, including `/`. The first matching pattern applies.
 
     Raises:
-        InputError: A pattern fits no node that runs a skill.
+        InputError: A pattern matches no skill node.
     """
     builder = Builder(skills, cell, blackboard, emit, substitutes or {})
     root = builder.build_node(loaded.tree)

@@ -8,7 +8,7 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, join_states
-from executive.tree.inspection import MinTimes, PassedFailure
+from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
 
@@ -20,7 +20,7 @@ class Fallback(ControlNode):
     """
 
     keyword = "fallback"
-    foreign_keywords: ClassVar = {"selector": "It is called fallback here."}
+    keyword_hints: ClassVar = {"selector": "It is called fallback here."}
     symbol, shape = "?", "octagon"
 
     do: Children = key(shorthand=True, doc="Alternatives, in order.")
@@ -56,7 +56,7 @@ class Fallback(ControlNode):
             entry = join_states(after.after_handling(failure) for failure, after in failures.items())
         return Flow(success, failures, halted)
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the time of the fastest child."""
         return min(map(min_time_of, self.do))
 
@@ -65,7 +65,7 @@ class Fallback(ControlNode):
         del child
         return "an earlier child never fails"
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         """Return the failures of all children."""
         others = ", ".join(f"{reason} ({message})" for reason, message in failure.messages.items())
         return f"all {len(self.do)} choices failed" + (f"; the others with {others}" if others else "")

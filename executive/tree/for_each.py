@@ -9,7 +9,7 @@ from py_trees.common import Status
 from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.tree.flow import Enter, Flow, FlowState, find_fixed_point, join_states
-from executive.tree.inspection import MinTimes, PassedFailure
+from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Child, Elements, VariableName, key
 from executive.tree.loop import Loop
 
@@ -22,7 +22,7 @@ class ForEach(Loop):
     """
 
     keyword = "for_each"
-    foreign_keywords: ClassVar = {"for": "It is called for_each here."}
+    keyword_hints: ClassVar = {"for": "It is called for_each here."}
     symbol = "∀"
 
     each: VariableName = key(element_of="in", doc="Variable that holds the current element.")
@@ -48,7 +48,7 @@ class ForEach(Loop):
             self._write_element()
 
     def step(self) -> Status:
-        """Tick the body; continue with the next element in the same tick if the round took time."""
+        """Tick the body; take the next element in the same tick if the round took at least one tick."""
         while self._next < len(self._elements):
             status = self.run_round(self.do)
             if status is Status.RUNNING:
@@ -92,7 +92,7 @@ class ForEach(Loop):
         return tuple(value)
 
     def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Enter the body with the variable written until no new state occurs."""
+        """Return the possible ends: the body is entered until its entry states reach a fixed point."""
         if self.in_ == ():
             return Flow(state, {}, None)
         is_known = not isinstance(self.in_, VariableName)
@@ -109,7 +109,7 @@ class ForEach(Loop):
             halted and halted.without_variable(self.each),
         )
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of all rounds [s]; 0 if their number is unknown."""
         return 0.0 if isinstance(self.in_, VariableName) else len(self.in_) * min_time_of(self.do)
 
@@ -118,7 +118,7 @@ class ForEach(Loop):
         del child
         return "the body runs 0 times"
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         """Return the element at which the body failed."""
         return f"failed at {failure.choice}"
 

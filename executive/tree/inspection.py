@@ -1,4 +1,4 @@
-"""Types with which control nodes, checker and diagnosis exchange facts, failures, complaints and advice."""
+"""Types with which control nodes, checker and diagnosis exchange facts, failures, findings and advice."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from executive.tree.failure import Reason
 from executive.tree.flow import Flow
 from executive.tree.keys import Child
 
-MinTimes: TypeAlias = Callable[[Child], float]
+MinTimeFunction: TypeAlias = Callable[[Child], float]
 """Function that returns a lower bound of the time in which a child can succeed [s]."""
 
 
@@ -64,7 +64,7 @@ class NodeFacts(Protocol):
 
 
 @dataclass(frozen=True)
-class PassedFailure:
+class PropagatedFailure:
     """A failure that ended a run, at a control node that it passed or in which it began.
 
     Attributes:
@@ -99,7 +99,7 @@ class Advice:
     """A change of the mission after which a failure would not end the run.
 
     Attributes:
-        text: The change; the message adds the place.
+        text: Description of the change, without its place, which the message adds.
         key: Key to change, or "".
         child: Child to change; None for the node itself.
     """

@@ -22,7 +22,7 @@ from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Failure
 from executive.tree.flow import Enter, Flow, FlowState
 from executive.tree.halting import halt
-from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure
+from executive.tree.inspection import Advice, MinTimeFunction, NodeFacts, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeyOwner, KeySection, Kind
 
 
@@ -55,7 +55,7 @@ class ControlNode(KeyOwner, Behaviour):
         shape: Shape of the node in Graphviz drawings.
         remedy: Advice to the mission author how to handle a failure by wrapping the failing node in this
             node; "" if this node handles none.
-        foreign_keywords: Hints by the keyword that other languages use for this node, as `selector`.
+        keyword_hints: Hints by the keyword that other languages use for this node, as `selector`.
         path: Unique path from the root of the tree.
         label: Label of the node in the mission, or "".
         failure: Cause of the failure while the status is FAILURE; else None.
@@ -67,7 +67,7 @@ class ControlNode(KeyOwner, Behaviour):
     symbol: ClassVar[str] = "◇"
     shape: ClassVar[str] = "ellipse"
     remedy: ClassVar[str] = ""
-    foreign_keywords: ClassVar[Mapping[str, str]] = {}
+    keyword_hints: ClassVar[Mapping[str, str]] = {}
     subtrees: tuple[str, ...] = ()
 
     def __init__(self, context: NodeContext, **values: object) -> None:
@@ -119,7 +119,7 @@ class ControlNode(KeyOwner, Behaviour):
         """Return how the node may end if it is entered in a state; `enter` returns the same for a child."""
         raise NotImplementedError
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return a lower bound of the time to success [s]; `min_time_of` returns it for a child."""
         del min_time_of
         return 0.0
@@ -151,17 +151,17 @@ class ControlNode(KeyOwner, Behaviour):
 
     # Explanations.
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         """Return why the node did not handle a failure of a child; "" for a node that handles no failures."""
         del failure
         return ""
 
-    def count_attempts(self, failure: PassedFailure) -> tuple[int, int] | None:
+    def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int] | None:
         """Return the number of the failed attempt and the allowed number, if the node has attempts."""
         del failure
         return None
 
-    def advise(self, failure: PassedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield changes of the mission after which this node would handle a failure."""
         del failure
         yield from ()

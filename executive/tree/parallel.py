@@ -17,7 +17,7 @@ from executive.tree.flow import (
     find_tools_at_end,
     join_states,
 )
-from executive.tree.inspection import MinTimes, PassedFailure
+from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
 
@@ -173,7 +173,7 @@ class Parallel(ControlNode):
         end = success.with_variables(name for one in succeeding for name in one.written or ())
         return end.with_tools(combine_branches(state.tools, [one.tools for one in succeeding]))
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of the lead, or the n-th shortest of a child if n must succeed [s]."""
         return (
             min_time_of(self.do[0]) if self._has_lead else sorted(map(min_time_of, self.do))[self._needed - 1]
@@ -189,7 +189,7 @@ class Parallel(ControlNode):
         """All children but the lead, if there is a lead."""
         return self.do[1:] if self._has_lead else ()
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         """Return the number of children that must succeed, and the other failures."""
         if self._has_lead:
             return "ends as its first child, the lead, ends"

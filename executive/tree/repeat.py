@@ -7,7 +7,7 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from executive.tree.flow import Enter, Flow, FlowState, find_fixed_point, join_states
-from executive.tree.inspection import MinTimes, PassedFailure, format_reasons
+from executive.tree.inspection import MinTimeFunction, PropagatedFailure, format_reasons
 from executive.tree.keys import Child, Reasons, key
 from executive.tree.loop import Loop
 
@@ -19,7 +19,7 @@ class Repeat(Loop):
     """
 
     keyword = "repeat"
-    foreign_keywords: ClassVar = {"loop": "It is called repeat here, or while with a condition."}
+    keyword_hints: ClassVar = {"loop": "It is called repeat here, or while with a condition."}
     any_of = ("times", "until")
 
     times: int | None = key(default=None, ge=0, doc="Maximum number of rounds.")
@@ -68,7 +68,7 @@ class Repeat(Loop):
         passed = {one: after for one, after in body.failures.items() if not one.must_match(self.until)}
         return Flow(success, passed, join_states((body.halted, entry)))
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of all rounds [s]; 0 if a failure may end the loop with success."""
         return 0.0 if self.until else (self.times or 0) * min_time_of(self.do)
 
@@ -77,7 +77,7 @@ class Repeat(Loop):
         del child
         return "the body runs 0 times"
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         """Return the conditions under which the loop would have succeeded."""
         del failure
         if self.until:

@@ -11,7 +11,14 @@ from executive.cell.protocols import Steps
 from executive.skill import Seconds
 from executive.tree.failure import Failure
 from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, find_fixed_point, join_states
-from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure, format_reasons
+from executive.tree.inspection import (
+    Advice,
+    MinTimeFunction,
+    NodeFacts,
+    NodeFinding,
+    PropagatedFailure,
+    format_reasons,
+)
 from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.loop import Loop
 
@@ -135,7 +142,7 @@ class Retry(Loop):
             body.success, failures, join_states((body.halted, *(flow.halted for flow in recovery), waits))
         )
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of one attempt [s]."""
         return min_time_of(self.do)
 
@@ -159,7 +166,7 @@ class Retry(Loop):
             "there is only one attempt" if self.attempts == 1 else "" if self.on else "the body never fails"
         )
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         """Return the failures of all attempts."""
         handled = dict(failure.handled)
         if self._has_given_up(failure):
@@ -174,12 +181,12 @@ class Retry(Loop):
             return "has no second attempt"
         return f"all {self.attempts} attempts failed: {_format_counts(handled)}"
 
-    def count_attempts(self, failure: PassedFailure) -> tuple[int, int]:
+    def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int]:
         """Return the number of the failed attempt and the number of allowed attempts."""
         # `handled` counts every failed attempt but the last one, and also a failed recovery.
         return sum(failure.handled.values()) + (-1 if self._has_given_up(failure) else 1), self.attempts
 
-    def advise(self, failure: PassedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
         attempts = self.attempts
         if self._has_given_up(failure):
@@ -192,7 +199,7 @@ class Retry(Loop):
         if self.recover is not None:
             yield "recover", self.recover
 
-    def _has_given_up(self, failure: PassedFailure) -> bool:
+    def _has_given_up(self, failure: PropagatedFailure) -> bool:
         return self.recover is not None and failure.has_failed(self.recover)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from py_trees.common import Status
 
 from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, join_states
-from executive.tree.inspection import MinTimes
+from executive.tree.inspection import MinTimeFunction
 from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
 
@@ -47,7 +47,7 @@ class Sequence(ControlNode):
             entry, halted = flow.success, join_states((halted, flow.halted))
         return Flow(entry, failures, halted)
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the sum of the minimum times of all children [s]."""
         return sum(map(min_time_of, self.do))
 

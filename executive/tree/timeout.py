@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from executive.skill import Seconds
 from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure
-from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure
+from executive.tree.inspection import Advice, MinTimeFunction, NodeFacts, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
@@ -57,7 +57,7 @@ class Timeout(ControlNode):
             failures[PossibleFailure(self.keyword, "timeout", self.path)] = body.halted
         return Flow(body.success, failures, body.halted)
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of the body [s]."""
         return min_time_of(self.do)
 
@@ -77,11 +77,11 @@ class Timeout(ControlNode):
         """The body."""
         return self.do
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         """Return the duration of the body."""
         return f"limits only the time: {failure.duration:.2f} of {self.seconds:g} s had passed"
 
-    def advise(self, failure: PassedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield a longer limit after a timeout."""
         if failure.child is None:
             yield Advice(f"allow more than {self.seconds:g} s", "seconds")

@@ -9,7 +9,14 @@ from py_trees.common import Status
 
 from executive.tree.failure import Failure, Reason
 from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, join_states
-from executive.tree.inspection import Advice, MinTimes, NodeFacts, NodeFinding, PassedFailure, format_reasons
+from executive.tree.inspection import (
+    Advice,
+    MinTimeFunction,
+    NodeFacts,
+    NodeFinding,
+    PropagatedFailure,
+    format_reasons,
+)
 from executive.tree.keys import Child, KeySection, Reasons, key
 from executive.tree.node import ControlNode
 
@@ -29,7 +36,7 @@ class TryCatch(ControlNode):
     """
 
     keyword = "try"
-    foreign_keywords: ClassVar = dict.fromkeys(("if", "else"), "To handle a failure, write try and catch.")
+    keyword_hints: ClassVar = dict.fromkeys(("if", "else"), "To handle a failure, write try and catch.")
     symbol = "↯"
     any_of = ("catch", "finally")
     remedy = "put a try with a catch for it around"
@@ -102,7 +109,7 @@ class TryCatch(ControlNode):
         flow = Flow(success, failures, halted)
         return flow if self.finally_ is None else _append(self.finally_, flow, enter)
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of the fastest of body and handlers, plus that of `finally` [s]."""
         fastest = min(min_time_of(child) for child in (self.do, *(handler.do for handler in self.catch)))
         return fastest + (min_time_of(self.finally_) if self.finally_ else 0.0)
@@ -124,7 +131,7 @@ class TryCatch(ControlNode):
         """The body."""
         return self.do
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         """Return the failures that are caught, or the failed handler."""
         if failure.child is self.finally_:
             return "its finally failed"
@@ -134,7 +141,7 @@ class TryCatch(ControlNode):
         named = [reason for handler in self.catch for reason in handler.on]
         return f"catches only {format_reasons(named)}" if named else "has no catch"
 
-    def advise(self, failure: PassedFailure) -> Iterator[Advice]:
+    def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield a further handler for a failure of the body."""
         if failure.child is self.do:
             yield Advice("catch it in the try")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.tree.flow import Enter, Flow, FlowState, find_fixed_point, join_states
-from executive.tree.inspection import NodeFacts, NodeFinding, PassedFailure
+from executive.tree.inspection import NodeFacts, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
 from executive.tree.loop import Loop
 
@@ -77,7 +77,7 @@ class While(Loop):
         del child
         return "the condition never succeeds"
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         """Return the rule for failures of the body."""
         del failure
         return "a failure of its body ends it"

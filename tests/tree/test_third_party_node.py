@@ -25,7 +25,7 @@ from py_trees.common import Status
 
 from executive.skill import Seconds
 from executive.tree.flow import Enter, Flow, FlowState, find_tools_at_end, join_states, combine_branches
-from executive.tree.inspection import MinTimes, PassedFailure
+from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
 
@@ -66,14 +66,14 @@ class Race(ControlNode):
         failures = {one: after.with_tools(tools) for flow in flows for one, after in flow.failures.items()}
         return Flow(success and success.with_tools(tools), failures, halted and halted.with_tools(tools))
 
-    def min_time(self, min_time_of: MinTimes) -> float:
+    def min_time(self, min_time_of: MinTimeFunction) -> float:
         return min(min_time_of(child) for child in self.do)
 
     @property
     def concurrent(self) -> Children:
         return self.do
 
-    def explain(self, failure: PassedFailure) -> str:
+    def explain(self, failure: PropagatedFailure) -> str:
         return f"none of the {len(self.do)} branches succeeded"
 '''
 

@@ -13,7 +13,7 @@ from executive.mission.flow.analysis import Analysis
 from executive.mission.model.mission import Mission
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.values import Reference
-from executive.mission.model.wiring import Wire, find_variables_written_in, find_wires
+from executive.mission.model.wiring import Wire, find_all_written_variables, find_wires
 from executive.skill import Direction, Skill
 from executive.tree.registry import ControlNodes
 
@@ -50,7 +50,7 @@ class Case:
     @cached_property
     def written(self) -> set[str]:
         """Variables that something in the tree may write."""
-        return find_variables_written_in(self.tree, self.skills)
+        return find_all_written_variables(self.tree, self.skills)
 
     def nodes(self) -> Iterator[Node]:
         """Yield every node, also of the subtrees that nothing uses."""

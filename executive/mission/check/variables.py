@@ -10,8 +10,8 @@ from executive.mission.model.nodes import Node, UseNode
 from executive.mission.model.paths import word_of
 from executive.mission.model.values import Named, Reference
 from executive.mission.model.wiring import (
+    find_all_written_variables,
     find_read_variables,
-    find_variables_written_in,
     find_wires,
     find_written_variables,
 )
@@ -113,7 +113,7 @@ def find_unwritten_returns(case: Case) -> Iterator[Finding]:
         after = case.flow.bodies.get(use.path)
         if after is None or after.written is None:
             continue
-        written = find_variables_written_in(use.body, case.skills)
+        written = find_all_written_variables(use.body, case.skills)
         for (name, mark), variable in zip((subtree.returns or {}).items(), use.returned, strict=True):
             if variable not in written:
                 message = f'the subtree "{use.name}" returns ${name}, which nothing in it writes'

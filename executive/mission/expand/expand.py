@@ -16,7 +16,7 @@ from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.nodes import Node, SectionNode, SkillNode, UnknownNode, UseNode
 from executive.mission.model.paths import word_of
 from executive.mission.model.values import Named, Reference, Setting, Value
-from executive.mission.model.wiring import find_variables_written_in, find_written_variables
+from executive.mission.model.wiring import find_all_written_variables, find_written_variables
 from executive.mission.source import Mark
 from executive.skill import Direction, Skill
 
@@ -188,7 +188,7 @@ class _Expander:
         """Return the body with the variables that it keeps to itself under names of their own."""
         number = self._uses[use.name]
         own = f"{use.name}." if number == 1 else f"{use.name}-{number}."
-        kept = find_variables_written_in(body, self.skills)
+        kept = find_all_written_variables(body, self.skills)
 
         def rename(name: str) -> str:
             if name.startswith(_OUTER_PREFIX):

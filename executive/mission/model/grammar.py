@@ -1,6 +1,6 @@
-"""The grammar of mission files: every key, what may stand under it, and what it means.
+"""Grammar of mission files: the keys, the kinds of their values, and their meaning.
 
-The parser, the checks, the JSON Schema and the documentation all read it here.
+Parser, checks, JSON Schema and documentation are derived from this module.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ class GrammarKey:
     """A key of a mapping.
 
     Attributes:
-        kind: Its content: `node`, `number`, `text`, `word`, `words`, `label`, `list`, `value`, `values`,
-            `variables`, `paths`, `params`, `routes`, `trees`, `args`.
-        doc: What it means, one sentence.
-        required: True where it must be there.
+        kind: Kind of the value: `node`, `number`, `text`, `word` (an identifier), `label`, `list`, `value`
+            (any plain value), or a list or mapping of them: `words`, `values`, `variables`, `paths`,
+            `params`, `routes`, `trees`, `args`.
+        doc: Meaning of the key, one sentence.
+        required: True if the key is mandatory.
     """
 
     kind: str
@@ -25,10 +26,10 @@ class GrammarKey:
     required: bool = False
 
 
-LABEL = "[a-z_][a-z0-9_]*"
-"""How labels are written."""
+LABEL_PATTERN = "[a-z_][a-z0-9_]*"
+"""Regular expression that every label matches."""
 
-AS = GrammarKey("label", "A name of its own, for `on`, `until` and `catch`.")
+AS = GrammarKey("label", "Label of the node, for references in `on`, `until` and `catch`.")
 """The key `as` beside the keyword of any node."""
 
 SEQUENCE = "sequence"
@@ -39,51 +40,53 @@ USE = "use"
 
 USE_SIBLINGS: Mapping[str, GrammarKey] = {
     "with": GrammarKey("values", "Values of the subtree's arguments."),
-    "returns": GrammarKey("variables", "Other names for the variables it returns: `its: $mine`."),
+    "returns": GrammarKey("variables", "Variables of the caller for returned variables: `returned: $mine`."),
 }
 """Keys that stand beside `use`."""
 
-FOREIGN_KEYWORDS: Mapping[str, str] = {
-    "then": "One after the other is a list.",
-    "do": "Only control nodes have a do; elsewhere the node stands there itself.",
-    "with": "It stands beside use, not below it.",
-    "returns": "It stands beside use, not below it.",
+KEYWORD_HINTS: Mapping[str, str] = {
+    "then": "Write nodes that run in sequence as a list.",
+    "do": "Only control nodes have the key do; write the node directly.",
+    "with": "Write with at the level of use, not below use.",
+    "returns": "Write returns at the level of use, not below use.",
 }
-"""Hints for words that are no nodes; control nodes have further ones."""
+"""Hints for words that are used as keywords by mistake; control nodes declare further ones."""
 
 MISSION: Mapping[str, GrammarKey] = {
-    "mission": GrammarKey("word", "Its name.", required=True),
-    "description": GrammarKey("text", "What it does, one sentence."),
+    "mission": GrammarKey("word", "Name of the mission.", required=True),
+    "description": GrammarKey("text", "Purpose of the mission, one sentence."),
     "cell": GrammarKey("text", "The cell file, below this file's folder, or a shipped one.", required=True),
     "library": GrammarKey("paths", "Files with subtrees, below this file's folder, or shipped ones."),
     "params": GrammarKey("params", "Constants, written `$name`; `--set name=value` gives another value."),
     "routes": GrammarKey("routes", "For every class the bin it goes to, or a list of bins."),
-    "tree": GrammarKey("node", "What is done.", required=True),
+    "tree": GrammarKey("node", "Root node of the tree.", required=True),
     "trees": GrammarKey("trees", "Subtrees by name."),
 }
 """The keys of a mission file."""
 
 LIBRARY: Mapping[str, GrammarKey] = {
-    "library": GrammarKey("word", "Its name.", required=True),
-    "description": GrammarKey("text", "What is in it, one sentence."),
+    "library": GrammarKey("word", "Name of the library.", required=True),
+    "description": GrammarKey("text", "Content of the library, one sentence."),
     "trees": GrammarKey("trees", "Subtrees by name.", required=True),
 }
 """The keys of a library file."""
 
 SUBTREE: Mapping[str, GrammarKey] = {
-    "doc": GrammarKey("text", "What it does, one sentence."),
-    "args": GrammarKey("args", "Its arguments: a list of names, or names with defaults."),
-    "returns": GrammarKey("words", "The variables it writes for others; with it, all others are its own."),
-    "do": GrammarKey("node", "What is done.", required=True),
+    "doc": GrammarKey("text", "Purpose of the subtree, one sentence."),
+    "args": GrammarKey("args", "Arguments of the subtree: a list of names, or names with defaults."),
+    "returns": GrammarKey("words", "Variables that the caller gets; all other variables are then local."),
+    "do": GrammarKey("node", "Root node of the subtree.", required=True),
 }
 """The keys of a subtree."""
 
 PARAM: Mapping[str, GrammarKey] = {
-    "default": GrammarKey("value", "Its value unless `--set` gives another; without it, it must be given."),
-    "type": GrammarKey("word", "text, integer, number, boolean or list; without it, that of the default."),
+    "default": GrammarKey("value", "Default value; a param without a default must be set with `--set`."),
+    "type": GrammarKey(
+        "word", "text, integer, number, boolean or list; by default the type of the default value."
+    ),
     "min": GrammarKey("number", "Smallest value."),
     "max": GrammarKey("number", "Largest value."),
-    "choices": GrammarKey("list", "The values it may have."),
-    "doc": GrammarKey("text", "What it means, one sentence."),
+    "choices": GrammarKey("list", "Allowed values."),
+    "doc": GrammarKey("text", "Meaning of the param, one sentence."),
 }
 """The keys of a param that is declared by a mapping."""

@@ -1,4 +1,4 @@
-"""What a mission's settings of a skill mean: constants, variables read and variables written."""
+"""Connections of the ports of a skill: constants, variables that are read, and variables that are written."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Wire:
         skill: Name of the skill.
         port: Its port.
         variable: Name of the variable.
-        mark: Where the mission says so, or the skill itself where the port goes by its own name.
-        explicit: True where the mission names the variable.
+        mark: Place of the variable in the mission, or of the skill if the variable has the name of the port.
+        explicit: True if the mission names the variable.
     """
 
     skill: str
@@ -35,27 +35,27 @@ class Wire:
 
 
 def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
-    """Yield how every port of this direction is connected; an input with a value of its own is not."""
+    """Yield the connection of every port of this direction; inputs with a constant are skipped."""
     for port in skill.ports.values():
         if port.direction is not direction:
             continue
         setting = node.settings.get(port.name)
         if setting is None or (direction is Direction.OUT and isinstance(setting.value, Literal)):
-            # A constant for an output is a mistake that is told elsewhere.
+            # A constant for an output is an error, which the check of settings reports.
             yield Wire(node.skill, port, node.names.get(port.name, port.name), node.mark, explicit=False)
         elif isinstance(setting.value, Reference):
             yield Wire(node.skill, port, setting.value.name, setting.value.mark, explicit=True)
 
 
 def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
-    """Yield every setting with a value instead of a variable."""
+    """Yield every setting with a constant, with its name."""
     for name, setting in node.settings.items():
         if isinstance(setting.value, Literal):
             yield name, setting.value
 
 
 def find_written_variables(node: Node) -> Iterator[tuple[Key, Named]]:
-    """Yield the keys of a control node that name a variable which it writes, with the variable."""
+    """Yield each output key of a control node, with the variable to which the node writes."""
     if isinstance(node, InnerNode):
         for key, value in iterate_parts(node):
             if isinstance(value, Named):
@@ -70,8 +70,8 @@ def find_read_variables(node: Node) -> Iterator[Reference]:
                 yield value
 
 
-def find_variables_written_in(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
-    """Return the variables that something in the tree may write."""
+def find_all_written_variables(root: Node, skills: Mapping[str, type[Skill]]) -> set[str]:
+    """Return the variables that the nodes of a tree may write."""
     written = set()
     for node in root.walk():
         written |= {variable.name for _, variable in find_written_variables(node)}

@@ -24,7 +24,7 @@ from executive.skill import Skill
 from executive.tree.registry import ControlNodes
 
 Skills = SkillsByName[str, type[Skill]]
-_LABEL = re.compile(grammar.LABEL)
+_LABEL = re.compile(grammar.LABEL_PATTERN)
 _SKILL = re.compile(r"[A-Z][A-Za-z0-9]*")
 
 
@@ -161,11 +161,11 @@ class NodeParser:
     def _refuse_word(self, mark: Mark, word: str) -> None:
         alike = {name.lower(): name for name in self._skills}
         skill = alike.get(word.replace("_", "").replace(" ", "").lower())
-        elsewhere = dict(grammar.FOREIGN_KEYWORDS)
+        elsewhere = dict(grammar.KEYWORD_HINTS)
         for name, kind in self._control.items():
             siblings = [key.name for key in kind.keys.values() if key.is_sibling]
             elsewhere |= dict.fromkeys(siblings, f"It stands beside {name}, not below it.")
-            elsewhere |= kind.foreign_keywords
+            elsewhere |= kind.keyword_hints
         hint = elsewhere.get(word) or (f'Did you mean the skill "{skill}"?' if skill else "")
         if not hint:
             known = alternatives(word, self._words, "Control nodes are")

@@ -57,7 +57,7 @@ def _file(title: str, keys: Mapping[str, GrammarKey], skills: Skills, control: C
             "param": _param(),
             "library": _mapping(grammar.LIBRARY),
             "reasons": _reasons(skills),
-            "label": {"type": "string", "pattern": f"^{grammar.LABEL}$"},
+            "label": {"type": "string", "pattern": f"^{grammar.LABEL_PATTERN}$"},
             "reference": {"title": "$name", "type": "string", "pattern": rf"^\${_NAME}$"},
             **{name: settings(name, skill) for name, skill in skills.items()},
             **forms,
@@ -174,7 +174,7 @@ def _any_of(keys: Sequence[str]) -> Json:
 def _reasons(skills: Skills) -> Json:
     one = [
         {"title": "Skill.reason", "enum": failures(skills)},
-        {"title": "label.reason", "type": "string", "pattern": rf"^{grammar.LABEL}\.{_NAME}$"},
+        {"title": "label.reason", "type": "string", "pattern": rf"^{grammar.LABEL_PATTERN}\.{_NAME}$"},
     ]
     several = {"title": "list", "type": "array", "items": {"anyOf": one}, "minItems": 1}
     return {"anyOf": [*one, several]}

@@ -10,7 +10,7 @@ from executive.mission.model.paths import name_of
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 from executive.tree.failure import Reason
-from executive.tree.inspection import PassedFailure
+from executive.tree.inspection import PropagatedFailure
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
 
@@ -32,7 +32,7 @@ class Link:
     node: Node
     subtree: str
     model: ControlNode | None
-    failure: PassedFailure
+    failure: PropagatedFailure
 
     @property
     def name(self) -> str:
@@ -77,7 +77,7 @@ def trace_failure(tree: Node, timeline: Timeline, origin: str, failure: str) -> 
 
 def _make_passed_failure(
     timeline: Timeline, node: Node, model: ControlNode | None, below: Node | None, reasons: frozenset[Reason]
-) -> PassedFailure:
+) -> PropagatedFailure:
     """Return the failure as input of a node; `below` is the child that failed, or None at the origin."""
     ran = timeline.nodes.get(node.path) or _NEVER
     children = [child for key in model.keys for child in model.children_of(key)] if model else []
@@ -86,7 +86,7 @@ def _make_passed_failure(
         last = timeline.nodes.get(node_of(child).path)
         return last is not None and last.number > ran.number and last.status == "FAILURE"
 
-    return PassedFailure(
+    return PropagatedFailure(
         next((child for child in children if node_of(child) is below), None),
         ran.reason, reasons, ran.handled, ran.messages, ran.last_handled, ran.choice, ran.end - ran.start,
         has_failed,
