@@ -23,7 +23,7 @@ WALL_MARGIN = 0.035
 LOG_ODDS_FELL_IN_BIN = math.log(0.95 / 0.05)
 """Prior log odds that a dropped item lies in the bin over which it was predicted to land."""
 BIN_AREA_SHARE = 0.04
-"""Share of the searched area in which a false detection is assigned to a given bin."""
+"""Probability that a false detection lies in a given bin: its share of the searched area."""
 FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
 """Points of a bin's floor that a look must show, in halves of its length and width."""
 
@@ -114,7 +114,7 @@ def find_believed_bin(record: Record) -> str | None:
 
 
 def update_bin_log_odds(record: Record, bin: str, rates: ErrorRates, *, is_shown: bool) -> None:
-    """Update the log odds that a dropped item lies in a bin with a look; they never fall below 0.
+    """Update, by a look, the log odds that a dropped item lies in a bin; the minimum is 0.
 
     `is_shown` is True if the look showed an object that was not released in the bin.
     """

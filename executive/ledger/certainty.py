@@ -11,17 +11,17 @@ from executive.ledger.association import MIN_EXISTENCE_PROBABILITY
 from executive.ledger.item import REASON_UNCERTAIN, Record, State
 
 MIN_P_VALUE, REJECTION_P_VALUE = 0.01, 0.001
-"""Minimum p-value of an item's class to sort the item, and the p-value below which the item is rejected."""
+"""Minimum p-value of the test whether the looks agree on the class of an item, to sort and to keep it."""
 RETRY_STANDARD_ERROR_FACTOR = 2 / 3
 """Factor on the allowed standard error of an item's position after a failed grasp."""
 MIN_MISS_PROBABILITY = 0.1
-"""Minimum probability that looks missed an item since its last detection, for an item that is picked."""
+"""An item is picked only if the probability is larger that all looks since its last detection missed it."""
 MIN_LOOKS_TO_REJECT = 40
 """Number of looks from which an item is rejected if they disagree about its class."""
 MIN_CONTRADICTIONS_TO_REJECT = 3
 """Number of contradicting looks from which an item may be rejected."""
 MAX_REPEATS = 2
-"""Number of repeated answers from a viewpoint from which further looks from there add hardly any evidence."""
+"""Number of repeats from a viewpoint after which more looks from it add hardly any evidence."""
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
 """Maximum probability of a wrong class for a touch, if the height of the touch determines the class."""
 MAX_UNCERTAIN_LOOKS = 10

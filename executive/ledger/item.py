@@ -35,7 +35,8 @@ class State(Enum):
     HELD = "held"
     """The tool holds the item."""
     DROPPED = "dropped"
-    """The tool lost the item, and no look has found it again. With a reason, the item is rejected later."""
+    """The tool lost the item, and no look has found it again. With a reason, the next look that finds it
+    rejects it."""
     PLACED = "placed"
     """The item was released in a bin."""
     REJECTED = "rejected"
@@ -144,7 +145,7 @@ class Record:
         self.state, self.reason = state, reason
 
     def forget_answers(self) -> None:
-        """Forget the answers of earlier looks: after a possible move, later looks do not repeat errors."""
+        """Forget the answers of earlier looks: after a possible move, later errors are independent."""
         self.belief.answers.clear()
         self.belief.repeats = self.contradictions = 0
 

@@ -40,7 +40,6 @@ class Replay:
         edited: True if the mission is not the recorded one.
         unanswered: Message of the question without a recorded answer that ended the replay, or "".
         is_complete: True if the replay repeated the last control step of the record, too.
-        last_command: Control step of the last command to arm or tool.
     """
 
     decisions: int
@@ -50,7 +49,6 @@ class Replay:
     edited: bool
     unanswered: str = ""
     is_complete: bool = True
-    last_command: int = 0
 
     @property
     def same(self) -> bool:
@@ -125,7 +123,6 @@ def compare(
         edited,
         comparison.unanswered,
         comparison.is_complete,
-        run.replayed.last_command,
     )
 
 

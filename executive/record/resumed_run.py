@@ -85,7 +85,6 @@ def resume_run(
             options,
             log,
             directory.world,
-            replay.last_command,
             is_complete=replay.is_complete,
             has_ended=has_ended,
         )

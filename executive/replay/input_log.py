@@ -10,6 +10,7 @@ from typing import NamedTuple
 from executive.events import (
     Event,
     InputRead,
+    MotionPlanned,
     RunEnded,
     RunHalted,
     RunResumed,
@@ -20,6 +21,8 @@ from executive.events import (
 
 UNKNOWN_ACTION = "unknown"
 """Last action of the tool before an interruption, if the journal lacks it."""
+_COMMANDS = (ToolCommanded, MotionPlanned)
+"""Events that precede commands to tool and arm."""
 
 
 class RecordedInput(NamedTuple):
@@ -124,7 +127,7 @@ class InputLog:
         return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
     def find_interruption(
-        self, steps: int, last_command: int = 0, known_command: int = 0, *, is_complete: bool = True
+        self, steps: int, last_command: int = 0, *, is_complete: bool = True
     ) -> Interruption:
         """Return the interruption at the end of the log.
 
@@ -134,7 +137,6 @@ class InputLog:
         Args:
             steps: Number of control steps that the world of the cell has made.
             last_command: Control step of the last command to arm or tool by the log of the world.
-            known_command: Control step of the last command to arm or tool by a replay of this log.
             is_complete: True if the log holds all events of its last control step.
         """
         incomplete_ends = _find_incomplete_ends(self.events)
@@ -142,14 +144,26 @@ class InputLog:
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
         end = self.last_tick + is_complete if self.halt is None else self.halt.tick
         complete = min(steps, end)
-        # The journal of a halted run contains events after the halt; the replay ends at the halt.
-        lacks_actions = last_command > (known_command if self.halt is None else self.last_tick)
+        is_cut = steps > self.last_tick and not is_complete
+        lacks_actions = self._lacks_command(last_command, is_cut)
         for earlier in reversed(list(self.interruptions.values())):
             if earlier.resumed_at >= complete:
                 complete = min(complete, earlier.complete_steps)
                 lacks_actions |= earlier.last_action == UNKNOWN_ACTION
         action = UNKNOWN_ACTION if lacks_actions else self.last_action
         return Interruption(complete, action, complete - 1 in incomplete_ends, steps)
+
+    def _lacks_command(self, last_command: int, is_cut: bool) -> bool:
+        """Return True if the last command to arm or tool may be missing in the log.
+
+        All commands before the last control step are in the log, because the log is written in order. In the
+        last step, an event precedes each command. A kill may leave this step incomplete; if the world got
+        beyond the step nevertheless, the log was cut, and `is_cut` is True.
+        """
+        if last_command != self.last_tick:
+            return last_command > self.last_tick
+        precedes = (one.tick == last_command for one in self.events if isinstance(one.event, _COMMANDS))
+        return is_cut or not any(precedes)
 
     def is_over(self, tick: int) -> bool:
         """Return True if the recorded run ended before its tree was ticked in this control step."""

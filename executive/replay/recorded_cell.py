@@ -85,9 +85,6 @@ COMMANDS = frozenset(
 )
 """Accesses that command the cell; a replay skips them."""
 
-MOVING_COMMANDS = frozenset({"arm.start", "tool.close", "tool.open"})
-"""Commands that the log of a simulated world contains, too."""
-
 RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
 """Roles with recorded answers. A replay builds its own ledger; the cell file defines the other roles."""
 

@@ -13,10 +13,9 @@ from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.errors import Stopped
-from executive.events import ToolCommanded
 from executive.replay.input_log import InputLog, Interruption
 from executive.replay.input_replayer import InputReplayer
-from executive.replay.recorded_cell import MOVING_COMMANDS, RECORDED_ROLES, InputFormat
+from executive.replay.recorded_cell import RECORDED_ROLES, InputFormat
 
 
 class ReplayedCell(CellWrapper):
@@ -42,10 +41,6 @@ class ReplayedCell(CellWrapper):
         self.last = last
         self._replayer = InputReplayer(self.log)
         self._is_halted = False
-        self._last_command = 0
-        self._tool_steps = {one.tick for one in log.events if isinstance(one.event, ToolCommanded)}
-        self._knows_commands = True
-        self._is_muted = False
         self.is_live = False
         clock = StepClock(self._now, self.log.step)
         self._cell = replace(intercept(inner.cell, self._answer, RECORDED_ROLES), clock=clock)
@@ -61,11 +56,6 @@ class ReplayedCell(CellWrapper):
     def steps(self) -> int:
         """Number of control steps since the run began."""
         return self.inner.steps if self.is_live else self._steps
-
-    @property
-    def last_command(self) -> int:
-        """Control step of the last command to arm or tool; of a recorded run, as far as the log reaches."""
-        return self.inner.last_command if self.is_live else self._last_command
 
     @property
     def unanswered(self) -> str:
@@ -100,11 +90,11 @@ class ReplayedCell(CellWrapper):
     @contextmanager
     def mute(self) -> Iterator[None]:
         """Answer with the last recorded answers in the `with` block; commands have no effect there."""
-        is_live, self.is_live, self._is_muted = self.is_live, False, True
+        is_live, self.is_live = self.is_live, False
         try:
             yield
         finally:
-            self.is_live, self._is_muted = is_live, False
+            self.is_live = is_live
 
     def advance(self) -> None:
         """Make one control step.
@@ -139,14 +129,5 @@ class ReplayedCell(CellWrapper):
     def _answer(self, access: Access) -> Any:
         if self.is_live:
             return access.proceed()
-        if access.name in MOVING_COMMANDS and not self._is_muted:
-            self._note_command(access)
         name, codec = InputFormat.find(access)
         return self._replayer.read(name, codec)
-
-    def _note_command(self, access: Access) -> None:
-        """Remember the step of a command that the log contains; later ones count only if it lacks none."""
-        is_recorded = access.role != "tool" or self._steps in self._tool_steps
-        self._knows_commands &= is_recorded and self._steps <= self.log.last_tick
-        if self._knows_commands:
-            self._last_command = self._steps

@@ -94,7 +94,6 @@ def assemble_resumed(
     options: RunOptions,
     log: InputLog,
     world: Path,
-    known_command: int = 0,
     *,
     is_complete: bool = True,
     has_ended: bool = False,
@@ -107,7 +106,6 @@ def assemble_resumed(
         options: Options of the interrupted run.
         log: The recorded inputs.
         world: File from which the cell rebuilds its world.
-        known_command: Control step of the last command to arm or tool in a replay of the log.
         is_complete: True if the log holds all events of its last control step.
         has_ended: True if the run is not continued.
 
@@ -117,7 +115,7 @@ def assemble_resumed(
     parts = _Parts(loaded, skills, options)
     frames, pose_changes = (log.count_answers(f"camera.{name}") for name in ("frame", "next_pose"))
     inner = parts.build_cell(ResumePoint(world, frames, pose_changes), log.count_events(RequestGiven))
-    last = log.find_interruption(inner.steps, inner.last_command, known_command, is_complete=is_complete)
+    last = log.find_interruption(inner.steps, inner.last_command, is_complete=is_complete)
     return parts.build_resumed_run(inner, log, None if has_ended else last)
 
 

@@ -1,4 +1,4 @@
-"""Recovery of the scene, if a run is resumed whose journal lacks the last actions of its tool."""
+"""Recovery of the scene in a resumed run whose journal lacks the last actions of the tool."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LOOKS_PER_PLACE = 3
 MIN_LOOKS = 5
 """Smallest number of looks from the scan poses."""
 RELEASE_TIME = 0.1
-"""Time allowed for the vacuum to vanish [s]."""
+"""Time for the vacuum to decay [s]."""
 
 
 def recover_scene(cell: Cell) -> Steps:

@@ -277,20 +277,18 @@ def test_a_scene_is_observed_if_the_journal_lacks_actions_of_the_tool(
     assert re.match(r"the journal ends \d+ control steps \([\d.]+ s\) before the log of the world", note)
 
 
-def test_a_scene_is_observed_if_the_journal_lacks_the_last_command_of_the_tool(
-    missions: Path, tmp_path: Path
+@pytest.mark.parametrize("kind", [ToolCommanded, MotionPlanned])
+def test_a_scene_is_observed_if_the_journal_lacks_the_last_command(
+    missions: Path, tmp_path: Path, kind: type
 ) -> None:
     loaded = load(missions, "sort_overhead")
-    whole = Path(run_of(loaded, tmp_path).run)
-    opened = [
-        one.tick
-        for one in read_journal(whole / "journal.jsonl")
-        if isinstance(one.event, ToolCommanded) and one.event.action == "open"
-    ]
-    path = cut_off(loaded, tmp_path, opened[1] + 1)
+    events = read_journal(Path(run_of(loaded, tmp_path).run) / "journal.jsonl")
+    closed = [one.tick for one in events if isinstance(one.event, ToolCommanded)][2]
+    command = next(one.tick for one in events if isinstance(one.event, kind) and one.tick > closed)
+    path = cut_off(loaded, tmp_path, command + 40)
     lines = (path / "journal.jsonl").read_text().splitlines(keepends=True)
-    last = max(number for number, line in enumerate(lines) if '"ToolCommanded"' in line)
-    (path / "journal.jsonl").write_text("".join(lines[:last]))
+    lost = next(n for n, one in enumerate(events) if isinstance(one.event, kind) and one.tick == command)
+    (path / "journal.jsonl").write_text("".join(lines[:lost]))
     watcher = Watcher()
     result = resumed(path, views=[watcher])
     assert (result.status, result.items.placed, result.audit.agrees) == ("SUCCESS", 6, True)

@@ -70,14 +70,27 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
 
 @pytest.mark.parametrize(
     ("last_command", "is_complete", "complete", "action"),
-    [(8, True, 9, "open"), (9, True, 9, "unknown"), (8, False, 8, "open"), (20, False, 8, "unknown")],
+    [
+        (7, True, 9, "open"),
+        (8, True, 9, "open"),
+        (9, True, 9, "unknown"),
+        (7, False, 8, "open"),
+        (8, False, 8, "unknown"),
+        (20, False, 8, "unknown"),
+    ],
 )
 def test_a_world_that_did_more_than_the_journal_knows(
     last_command: int, is_complete: bool, complete: int, action: str
 ) -> None:
     log = InputLog.from_events([START, at(8, ToolCommanded("open"))])
-    interruption = log.find_interruption(20, last_command, 8, is_complete=is_complete)
+    interruption = log.find_interruption(20, last_command, is_complete=is_complete)
     assert (interruption.complete_steps, interruption.last_action) == (complete, action)
+
+
+def test_a_command_without_an_event_before_it_is_missing_in_the_journal() -> None:
+    log = InputLog.from_events([START, at(5, ToolCommanded("open")), sense(8, 1)])
+    assert log.find_interruption(9, 8).last_action == "unknown"
+    assert log.find_interruption(9, 7).last_action == "open"
 
 
 def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> None:
@@ -88,7 +101,7 @@ def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> Non
 
 def test_a_kill_within_a_control_step_loses_no_action() -> None:
     interruption = InputLog.from_events([START, at(8, ToolCommanded("open"))]).find_interruption(
-        8, 8, 8, is_complete=False
+        8, 8, is_complete=False
     )
     assert (interruption.complete_steps, interruption.last_action) == (8, "open")
 

@@ -146,7 +146,7 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
                 return
             states = np.frombuffer(data, "<f8", state * int(numbers[-1]), place).reshape(-1, state)
             place += size
-        # The start of the guarded part of a motion may be infinite.
+        # The second number, the start of the guarded part, is infinite for a motion without one.
         finite = numbers if states is None else (numbers[0], *states.flat)
         if not all(map(math.isfinite, finite)):
             raise _damaged(path, start)
@@ -168,6 +168,6 @@ def _content(path: Path) -> bytes:
 
 
 def states_of(command: Command) -> JointState:
-    """Return the states of a motion that begins, each array of shape `(N, n)`."""
+    """Return the states in a MOTION command as arrays `(N, n)`."""
     assert command.states is not None
     return JointState(*np.hsplit(command.states, 3))

@@ -40,13 +40,13 @@ def evaluate(
     worst: WorstMisses | None = None,
     table: TableConfig | None = None,
 ) -> Evaluation:
-    """Return how good a detector is on labelled images; ignored objects may be found or not.
+    """Return the accuracy of a detector on labelled images; ignored objects are neither found nor missed.
 
     Args:
         detector: The detector.
         samples: The images.
         threshold: Confidence from which a detection counts; None for the detector's own.
-        localizer: Turns detections into positions, to be held against the objects' true ones.
+        localizer: Computes positions from detections, for comparison with the true positions.
         worst: Gathers the worst mistakes.
         table: Declares the workspace whose brightness, contrast and colours are measured; None: they are not.
     """
@@ -125,7 +125,7 @@ def model_detector(model: Path, labels: Path) -> DetectorConfig:
 
 
 def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -> Evaluation:
-    """Return how good an exported RF-DETR is on a folder of labelled images.
+    """Return the accuracy of an exported RF-DETR on a folder of labelled images.
 
     Args:
         model: The ONNX file.
@@ -142,10 +142,10 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
 
 
 class AveragePrecision:
-    """Gathers images and gives the mean average precision over all classes that are on them."""
+    """Collects detections; computes the mean average precision over all classes in the images."""
 
     def __init__(self) -> None:
-        # Half a second and 120 MB: only an evaluation pays for it.
+        # The import takes half a second and 120 MB, so only an evaluation makes it.
         import supervision
         from supervision.metrics import MeanAveragePrecision
 
@@ -162,7 +162,7 @@ class AveragePrecision:
         self._has_objects |= bool(sample.labels)
 
     def result(self) -> tuple[float, float]:
-        """Return it at an overlap of 0.5, and averaged over 0.5 to 0.95; zeros where there was no object."""
+        """Return it at an IoU of 0.5, and its mean over IoUs of 0.5 to 0.95; zeros without objects."""
         if not self._has_objects:
             return 0.0, 0.0
         result = self._metric.compute()

@@ -17,13 +17,13 @@ from executive.training.evaluation.matching import BoxMatch
 from executive.training.labelled_image import LabelledImage
 
 COLUMNS = 6
-"""Mistakes side by side."""
+"""Largest number of mistakes in a row."""
 TILE, CAPTION, GAP, HEAD = 240, 40, 10, 34
-"""Side of a picture, height of the words below it, space around both, height of the head [pixel]."""
+"""Side of a tile, height of its caption, gap between tiles, height of the header [pixel]."""
 SURROUNDINGS = 2.2
-"""Side of the part of the image around a mistake, in sides of the mistake's box."""
+"""Side of the crop as a multiple of the longer side of the mistake's box."""
 MIN_SIDE = 40.0
-"""Smallest side of that part [pixel of the image]: a smaller one shows no surroundings."""
+"""Smallest side of the crop [pixel of the image]."""
 THICKNESS = 2
 """Thickness of the lines [pixel]."""
 LEGEND = "boxes: found, corners: true"
@@ -41,12 +41,12 @@ class Miss:
     """One mistake.
 
     Attributes:
-        severity: 0 to 1; of an overlooked object how much of it showed, of a wrong detection its
-            confidence, of a box off its place the offset as a share of the object's size.
-        text: What is wrong, a few words.
-        box: Where to look [pixel].
+        severity: Visible share of a missed object, confidence of a wrong detection, or offset of a box as
+            a share of the object's size; 0 to 1.
+        text: Short description of the mistake.
+        box: Box around the mistake [pixel].
         sample: The image.
-        found: All that counted on it.
+        found: All detections in the image above the threshold.
     """
 
     severity: float
@@ -57,7 +57,7 @@ class Miss:
 
 
 class WorstMisses:
-    """Keeps the worst mistakes of all images, the worst first and of equally bad ones the first.
+    """Keeps the worst mistakes of all images, by falling severity; ties in the order of arrival.
 
     Args:
         count: Number of mistakes to keep.
@@ -135,7 +135,7 @@ def _picture(miss: Miss) -> Picture:
     side = max(SURROUNDINGS * max(right - left, bottom - top), MIN_SIDE)
     corner = np.array([left + right - side, top + bottom - side]) / 2
     zoom = TILE / side
-    # Pixel i covers [i, i + 1), OpenCV has its centre at i.
+    # In boxes, the centre of pixel i is at i + 0.5; in OpenCV, at i.
     shift = zoom * (0.5 - corner) - 0.5
     matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
     image = miss.sample.image[..., ::-1]  # The annotators draw on BGR.

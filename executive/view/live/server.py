@@ -51,7 +51,7 @@ class Server:
     Args:
         board: State of the page.
         tunnel: Proxy to the scene.
-        send_command: Receives the commands of watchers, and their number.
+        send_command: Receives the commands of watchers, and the number of watchers.
         token: First part of every address.
         port: Port of the server.
     """

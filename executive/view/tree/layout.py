@@ -15,7 +15,7 @@ MARGIN = 16.0
 GAP = 10.0
 """Vertical gap between nodes [pixel]."""
 STEM = 16.0
-"""Length of a horizontal line before and after its vertical part [pixel]."""
+"""Length of each horizontal part of a connecting line [pixel]."""
 FRAME, FRAME_HEAD = 9.0, 20.0
 """Distance of a frame from its nodes, and height of the name in a frame [pixel]."""
 
@@ -65,7 +65,7 @@ class Layout:
 
     Attributes:
         boxes: Box of each node.
-        trunks: x at which the lines to the nodes of each depth branch.
+        trunks: x of the vertical part of the lines to the nodes of each depth.
         frames: Frame of each subtree, by the index of its first node.
         width, height: Size of the picture with margins.
     """
