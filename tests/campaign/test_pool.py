@@ -27,11 +27,11 @@ def why(number: int, error: BaseException) -> str:
 
 
 def test_every_job_is_done_and_the_results_are_in_their_order() -> None:
-    told: list[tuple[int, int]] = []
+    calls: list[tuple[int, int]] = []
     results = run_jobs(
-        [4, 3, 2, 2], half, why, workers=2, progress=lambda done, all: told.append((done, all))
+        [4, 3, 2, 2], half, why, workers=2, progress=lambda done, all: calls.append((done, all))
     )
-    assert (results, told) == ([2.0, "3: 3 is odd", 1.0, 1.0], [(1, 4), (2, 4), (3, 4), (4, 4)])
+    assert (results, calls) == ([2.0, "3: 3 is odd", 1.0, 1.0], [(1, 4), (2, 4), (3, 4), (4, 4)])
     assert run_jobs([], half, why, workers=2) == []
 
 
@@ -58,9 +58,9 @@ def heard() -> Iterator[None]:
 @pytest.mark.usefixtures("heard")
 @pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_who_halts_this_process_alone_halts_the_runs_under_way(how: signal.Signals) -> None:
-    told: list[str] = []
-    results = run_jobs([how] * 3, halt, why, workers=1, halting=lambda: told.append("halting"))
-    assert (results, told) == (["halted in good order", None, None], ["halting"])
+    calls: list[str] = []
+    results = run_jobs([how] * 3, halt, why, workers=1, halting=lambda: calls.append("halting"))
+    assert (results, calls) == (["halted in good order", None, None], ["halting"])
 
 
 def deaf(how: signal.Signals) -> str:
@@ -79,7 +79,7 @@ def test_a_second_wish_ends_the_jobs_under_way_at_once(how: signal.Signals) -> N
 
 
 def die_with_it(how: signal.Signals) -> str:
-    """Do a job whose process is told to end, as that of its parent is."""
+    """Do a job whose process is ended, together with its parent."""
     os.kill(os.getppid(), how)
     os.kill(os.getpid(), signal.SIGTERM)
     return "dead"

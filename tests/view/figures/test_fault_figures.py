@@ -71,8 +71,8 @@ def test_what_went_wrong_and_what_was_never_entered_is_told_with_its_place() -> 
 
 
 def test_pairs_have_no_matrix_a_campaign_cut_short_says_so_and_one_run_is_a_few_lines() -> None:
-    told = ["fault 1+5: tree/Grasp missed, first: nothing seals", "  the fault did not occur", "  SUCCESS"]
-    assert trial_text(NOWHERE).splitlines() == told
+    lines = ["fault 1+5: tree/Grasp missed, first: nothing seals", "  the fault did not occur", "  SUCCESS"]
+    assert trial_text(NOWHERE).splitlines() == lines
     lines = fault_text(replace(FIGURES, pairs=True, complete=False, trials=(NOWHERE,))).splitlines()
     assert lines[:3] == [
         "sort (fake), seed 3: 1 runs with pairs of faults; undisturbed it takes 11.5 s",

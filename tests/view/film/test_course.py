@@ -89,10 +89,10 @@ def test_of_a_tree_that_ended_what_ended_last_stays_open(course: FilmCourse) -> 
 
 
 @pytest.mark.parametrize(
-    ("event", "told"),
+    ("event", "sentence"),
     [(FaultRaised("Traceback"), "fault"), (RunHalted(True), "halt"), (RunResumed(0, "", {}), "resumed")],
 )
-def test_what_befalls_a_whole_run_is_told(event: Event, told: str) -> None:
+def test_what_befalls_a_whole_run_is_told(event: Event, sentence: str) -> None:
     course = FilmCourse([at(1, event, 0.0)], NODES, [])
     course.go_to(1, 0.0)
-    assert course.failure == told
+    assert course.failure == sentence
