@@ -68,8 +68,6 @@ def has_valid_constants(node: InnerNode) -> bool:
                 read_constant(key, value, find_upper_bound(node, key))
             except WrongType:
                 return False
-        elif key.kind is Kind.ELEMENTS and isinstance(part, Literal) and not isinstance(part.value, list):
-            return False
     return True
 
 
