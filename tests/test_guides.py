@@ -11,9 +11,11 @@ from types import ModuleType
 import jsonschema
 import numpy as np
 import pytest
+import skill_reference
 from click.testing import CliRunner
 from guide_blocks import AUTHORS, GUIDES, ROOT, blocks, files, in_code, read, rows, shown, transcripts
 
+from executive.cell import protocols as protocols_module
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.scene_file import (
@@ -226,7 +228,7 @@ def test_the_skill_on_the_front_page_declares_what_the_shipped_one_does(tmp_path
 
 
 def test_every_file_and_folder_that_a_guide_links_to_exists() -> None:
-    for guide in (*GUIDES, "executive/README.md", "CONTRIBUTING.md"):
+    for guide in (*GUIDES, "skills/reference.md", "executive/README.md", "CONTRIBUTING.md"):
         folder = (ROOT / guide).parent
         links = re.findall(r"\]\(([^)#]+)\)", read(guide))
         missing = [link for link in links if "://" not in link and not (folder / link).exists()]
@@ -252,3 +254,11 @@ def test_the_authors_guide_names_every_control_node_with_its_keys() -> None:
 def partners(kind: type[ControlNode]) -> list[str]:
     """Return the keys that stand beside the word of a control node."""
     return [name for name, key in kind.keys.items() if key.is_sibling]
+
+
+def test_the_reference_of_skills_is_what_its_generator_writes() -> None:
+    written = skill_reference.PATH.read_text(encoding="utf-8")
+    assert written == skill_reference.generate(), f"write it again: {skill_reference.COMMAND}"
+    members = vars(protocols_module).items()
+    protocols = {name for name, kind in members if getattr(kind, "_is_protocol", False)} - {"Protocol"}
+    assert protocols <= set(re.findall(r"^### `(\w+)`", written, re.MULTILINE))

@@ -43,7 +43,7 @@ class Task:
 
     Attributes:
         load: Object in the tool, or None.
-        around: Obstacles that the cell file does not declare.
+        around: Obstacles that the cell file does not declare: objects on the table and in the bins.
         target: Obstacle that the tool may touch on the guarded part only, or None.
     """
 
@@ -60,7 +60,7 @@ class Planning(Protocol):
         """True from the control step in which the planning is finished."""
 
     def result(self) -> Motion:
-        """Return the motion.
+        """Return the motion, once `ready` is True.
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.
@@ -77,7 +77,7 @@ class Arm(Protocol):
 
     @property
     def tool_pose(self) -> Pose:
-        """Pose of the tool centre point in the world, from the joint positions."""
+        """Pose `X_WT` of the tool centre point, from the joint positions; z points out of the tool."""
 
     @property
     def tool_velocity(self) -> Array:
@@ -85,7 +85,7 @@ class Arm(Protocol):
 
     @property
     def destination(self) -> Array:
-        """Position of the tool at the end of the present motion, or now if there is none `(3,)` [m]."""
+        """Position of the tool `(3,)` [m] at the end of the present motion, or now if there is none."""
 
     @property
     def at_rest(self) -> bool:
@@ -96,7 +96,7 @@ class Arm(Protocol):
         """Description of the collision that ended the last motion, or None."""
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Planning:
-        """Begin to plan a motion from the present rest to a goal, or to a named pose of the cell file.
+        """Begin to plan a motion from the present position to a goal, or to a named pose of the cell file.
 
         The planning is finished at once if `plan_ahead` had the same arguments and the same start.
         """
@@ -105,7 +105,7 @@ class Arm(Protocol):
         """Plan a motion from the end of the present motion, for a later call of `plan`."""
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow `motion`; the arm must be at rest at its start."""
+        """Begin to follow `motion`; the arm must be at rest at the start of `motion`."""
 
     def stop(self) -> None:
         """Brake along the path of the present motion, if any; return at once."""

@@ -78,7 +78,7 @@ class Camera(Protocol):
         """Return the next scan pose in turn, for a look from another viewpoint."""
 
     def area(self, view: str) -> Box:
-        """Return the part of the image [pixel] of a `view` (`table` or `full`)."""
+        """Return the part of the image [pixel] that a view shows: `table` (the workspace) or `full`."""
 
     def sees_table(self) -> bool:
         """Return True if the whole workspace is in view now, and the arm does not hide any part of it."""
@@ -87,7 +87,7 @@ class Camera(Protocol):
         """Return a new frame."""
 
     def displacement(self, frame: Frame) -> str:
-        """Return the deviation of the camera from its declared pose in words, by a frame; "" if none."""
+        """Return a sentence about the displacement of the camera that a frame shows, or ""."""
 
 
 class Request(Protocol):
@@ -98,7 +98,7 @@ class Request(Protocol):
         """True from the control step in which the answer is due."""
 
     def result(self) -> Answer:
-        """Return the answer of the detector.
+        """Return the answer of the detector, once `ready` is True.
 
         Raises:
             Crowded: The detector found more boxes than there can be objects.
@@ -110,14 +110,14 @@ class Detector(Protocol):
     """Finds objects in frames, in parallel to the tick loop."""
 
     def request(self, frame: Frame, view: str) -> Request:
-        """Begin to search a view of a frame: `table` or `full`."""
+        """Begin to search a view of a frame: `table` (the workspace) or `full` (the whole image)."""
 
 
 class Localizer(Protocol):
     """Finds the positions of detected objects in the world."""
 
     def locate(self, detection: Detection, frame: Frame) -> Array:
-        """Return the centre of the detected object `(3,)` [m], from the camera pose of the frame.
+        """Return the centre of the detected object `(3,)` [m] in the world, by the camera pose of the frame.
 
         Raises:
             NoDepth: The frame has no usable depth at the detection.
@@ -138,7 +138,7 @@ class Operator(Protocol):
     """The person or script that requests objects."""
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the next request: one of `choices`, `rescan`, or None to quit.
+        """Return the next request: one of `choices` (classes), `rescan`, or None to quit.
 
         The clock of the run stands still until the answer.
 
@@ -172,8 +172,13 @@ class Cell:
     """A work cell: everything a skill may use.
 
     Attributes:
+        clock: The clock of the run.
+        arm: The robot arm.
+        tool: The tool at the flange of the arm.
         camera: The camera that sees the table.
         detectors: Detectors by name; the first is the default.
+        ledger: The items of the run.
+        operator: The person or script that requests objects.
         bins: Bins by name.
         classes: Known properties of each class of objects, by label.
         routes: Class label to the names of the bins that are right for it, by the mission.
@@ -181,7 +186,7 @@ class Cell:
         safe_place: Place on the table for a put-down `(3,)` [m].
         descent: Length of the guarded last part of an approach above the expected surface [m].
         descent_speed: Tool speed of the guarded part [m/s].
-        decided: Records a selected target and its bin.
+        decided: Records a selected target and the name of its bin; a skill that selects a target calls it.
     """
 
     clock: Clock

@@ -27,8 +27,8 @@ def plan(
 ) -> Generator[None, None, Motion]:
     """Yield until the arm is at rest and a motion is planned, and return the motion.
 
-    If `find_goal` returns another goal or task after the planning, because of a new look, the motion is
-    planned again.
+    `find_goal` returns the goal or the name of a pose, and the task. If it returns others after the planning,
+    because of a new look, the motion is planned again.
 
     Raises:
         SkillFailed: No motion was found; the reason is `unreachable` or `blocked`.

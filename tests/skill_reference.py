@@ -1,0 +1,210 @@
+"""Generator of `skills/reference.md`: everything that a skill may call, read from the protocols.
+
+Write the file again with `.venv/bin/python -m tests.skill_reference`.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PATH = ROOT / "skills" / "reference.md"
+COMMAND = ".venv/bin/python -m tests.skill_reference"
+INTRODUCTION = f"""# Reference: everything that a skill may call
+
+Generated from the protocols in `executive/cell/` and from `executive/manipulation/` by `{COMMAND}`. \
+The guide is [README.md](README.md).
+
+* No call waits. A method or function that returns `Steps` or a `Generator` is called with `yield from`.
+* Units are in brackets, shapes of arrays in parentheses.
+* Positions are in the world frame: z points up, and the top of the table is at z = 0.
+* `Array` is a NumPy array of floats, and `Item` the name of an item (`cube-2`).
+* `Box` contains the left, top, right and bottom side of a box in an image [pixel].
+* Exceptions are defined in `executive/errors.py`, `SkillFailed` in `executive/skill.py`.
+* The examples are taken from the shipped skills and from the functions that skills share.
+"""
+
+PARTS: dict[str, list[tuple[str, str, str]]] = {
+    "The cell": [("cell", "cell/protocols.py", "Cell")],
+    "Clock": [("cell.clock", "cell/protocols.py", "Clock")],
+    "Arm": [
+        ("cell.arm", "cell/arm.py", "Arm"),
+        ("planning = cell.arm.plan(goal, task)", "cell/arm.py", "Planning"),
+        ("motion = planning.result()", "cell/arm.py", "Motion"),
+        ("goal = Goal(...)", "cell/arm.py", "Goal"),
+        ("task = Task(...)", "cell/arm.py", "Task"),
+        ("load = Load(...)", "cell/objects.py", "Load"),
+        ("obstacle = Obstacle(...)", "cell/objects.py", "Obstacle"),
+        ("tool_pose = cell.arm.tool_pose", "geometry.py", "Pose"),
+    ],
+    "Tool": [("cell.tool", "cell/protocols.py", "Tool")],
+    "Camera": [
+        ("cell.camera", "cell/protocols.py", "Camera"),
+        ("frame = cell.camera.capture()", "cell/frame.py", "Frame"),
+    ],
+    "Detectors": [
+        ("detector = cell.detectors[name]", "cell/protocols.py", "Detector"),
+        ("request = detector.request(frame, view)", "cell/protocols.py", "Request"),
+        ("answer = request.result()", "cell/detection.py", "Answer"),
+        ("detection = answer.found[0]", "cell/detection.py", "Detection"),
+        ("detections = Detections(...)", "cell/detection.py", "Detections"),
+    ],
+    "Localizer": [
+        ("cell.localizer", "cell/protocols.py", "Localizer"),
+        ("observation = cell.localizer.localize(detections)[0]", "cell/detection.py", "Observation"),
+    ],
+    "Ledger": [
+        ("cell.ledger", "cell/ledger.py", "Ledger"),
+        ("target = cell.ledger.find_targets()[0]", "cell/objects.py", "Target"),
+    ],
+    "Operator": [("cell.operator", "cell/protocols.py", "Operator")],
+    "Bins and classes": [
+        ("bin = cell.bins[name]", "cell/bins.py", "Bin"),
+        ("kind = cell.classes[label]", "cell/objects.py", "ObjectClass"),
+    ],
+    "The skill itself": [
+        ("self", "skill.py", "Skill"),
+        ("min_times", "cell/protocols.py", "LeastTimes"),
+    ],
+    "Functions that skills share": [
+        (file, f"{file.replace('.', '/')}.py", "")
+        for file in (
+            "manipulation.motions",
+            "manipulation.tool_goals",
+            "manipulation.obstacles",
+            "manipulation.drops",
+        )
+    ],
+}
+"""For each section and table the expression of the object, the file, and the class; "": the functions."""
+
+MAX_EXAMPLE = 90
+"""Maximum number of characters of an example."""
+
+Row = tuple[str, str, str]
+"""Code of a member, its meaning, and an example or ""."""
+
+
+def generate() -> str:
+    """Return the text of the reference."""
+    sections = (
+        f"## {heading}\n\n" + "\n".join(_format_table(*part) for part in parts)
+        for heading, parts in PARTS.items()
+    )
+    return INTRODUCTION + "\n" + "\n".join(sections)
+
+
+def _format_table(expression: str, file: str, name: str) -> str:
+    owner: ast.AST = ast.parse((ROOT / "executive" / file).read_text(encoding="utf-8"))
+    title = f"### `executive.{expression}`"
+    if name:
+        owner = next(one for one in ast.walk(owner) if isinstance(one, ast.ClassDef) and one.name == name)
+        title = f"### `{name}`: `{expression}`"
+    text, entries = _parse_docstring(owner)
+    variable = expression.partition(" = ")[0].rpartition(".")[2] if name else ""
+    rows = list(_list_rows(owner, variable, dict(entries.get("Attributes", ()))))
+    columns = ("member", "meaning", "example")[: 3 if any(example for *_, example in rows) else 2]
+    lines = [columns, ("---",) * len(columns), *(row[: len(columns)] for row in rows)]
+    return f"{title}\n\n{text}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def _list_rows(owner: ast.AST, variable: str, attributes: dict[str, str]) -> Iterator[Row]:
+    """Yield a row for each public attribute, property, method or function of a class or module."""
+    for member in getattr(owner, "body", ()):
+        example = ""
+        if isinstance(member, ast.AnnAssign) and isinstance(owner, ast.ClassDef):
+            name = ast.unparse(member.target)
+            code = re.sub(r": ClassVar\[(.*)\] =", r": \1 =", ast.unparse(member))
+            meaning = attributes[name]
+            example = _find_example(name, variable) if variable == "cell" else ""
+        elif isinstance(member, ast.FunctionDef) and not member.name.startswith("_"):
+            code, meaning = _format_signature(member), _describe(member)
+            example = _find_example(member.name, variable)
+        else:
+            continue
+        yield _format_code(code.replace("''", '""')), _escape(meaning), example
+
+
+def _format_signature(function: ast.FunctionDef) -> str:
+    result = "" if function.returns is None else ast.unparse(function.returns)
+    if any(isinstance(one, ast.Name) and one.id == "property" for one in function.decorator_list):
+        return f"{function.name}: {result}"
+    arguments = re.sub(r"^(self|cls)(, |$)", "", ast.unparse(function.args))
+    arguments = re.sub(r"(: [^=()]*)=", r"\1 = ", arguments)
+    return f"{function.name}({arguments}) -> {result}"
+
+
+def _describe(function: ast.FunctionDef) -> str:
+    text, entries = _parse_docstring(function)
+    arguments = [f"`{name}`: {meaning}" for name, meaning in entries.get("Args", ())]
+    errors = [f"Raises `{name}`: {meaning}" for name, meaning in entries.get("Raises", ())]
+    return " ".join([text, *arguments, *errors])
+
+
+def _parse_docstring(owner: ast.AST) -> tuple[str, dict[str, list[tuple[str, str]]]]:
+    """Return the text of a docstring, and the entries of its sections (`Args`, `Attributes`, `Raises`)."""
+    assert isinstance(owner, ast.Module | ast.ClassDef | ast.FunctionDef)
+    docstring = inspect.cleandoc(ast.get_docstring(owner) or "")
+    text, *parts = re.split(r"^(Args|Attributes|Raises):\n", docstring, flags=re.MULTILINE)
+    entries = {}
+    for section, lines in zip(parts[::2], parts[1::2], strict=True):
+        found = re.findall(r"^    (\w[\w, ]*): (.*(?:\n {5,}.*)*)", lines, re.MULTILINE)
+        entries[section] = [
+            (name, " ".join(meaning.split())) for names, meaning in found for name in names.split(", ")
+        ]
+    return " ".join(text.split()), entries
+
+
+def _find_example(name: str, variable: str) -> str:
+    """Return the first use of a member by a skill, with a link to the file, or ""."""
+    files = [*sorted(PATH.parent.glob("*.py")), *sorted((ROOT / "executive/manipulation").glob("*.py"))]
+    for file in files:
+        text = file.read_text(encoding="utf-8")
+        found = _find_use(ast.parse(text), text, name, variable)
+        if found:
+            return f"{_format_code(found)} ([{file.stem}]({os.path.relpath(file, PATH.parent)}))"
+    return ""
+
+
+def _find_use(node: ast.AST, text: str, name: str, variable: str) -> str:
+    """Return the largest short piece of `text` around the first use of a member below `node`, or ""."""
+    for child in ast.iter_child_nodes(node):
+        if found := _find_use(child, text, name, variable):
+            piece = _join_source(node, text)
+            is_call = isinstance(node, ast.Call) and node.func is child
+            return piece if found in piece and (is_call or len(piece) <= MAX_EXAMPLE) else found
+    match node:
+        case ast.Name(id=called) if not variable and called == name:
+            return name
+        case ast.Attribute(attr=attribute, value=ast.Name(id=owner) | ast.Attribute(attr=owner)):
+            return _join_source(node, text) if (owner, attribute) == (variable, name) else ""
+    return ""
+
+
+def _join_source(node: ast.AST, text: str) -> str:
+    """Return the code of a node in one line; of an `if` or `while` the condition, of other blocks ""."""
+    if isinstance(node, ast.If | ast.While):
+        return f"{type(node).__name__.lower()} {_join_source(node.test, text)}:"
+    is_block = hasattr(node, "body") and not isinstance(node, ast.IfExp | ast.Lambda)
+    if is_block or isinstance(node, ast.Tuple):
+        return ""
+    line = " ".join((ast.get_source_segment(text, node) or "").split())
+    return re.sub(r"\( | (?=\))|,(?= \))", lambda match: match[0].strip(" ,"), line)
+
+
+def _format_code(text: str) -> str:
+    return f"`{_escape(text)}`"
+
+
+def _escape(text: str) -> str:
+    """Return a text for a cell of a table, in which a bar would begin the next cell."""
+    return text.replace("|", r"\|")
+
+
+if __name__ == "__main__":
+    PATH.write_text(generate(), encoding="utf-8")
