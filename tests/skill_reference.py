@@ -1,4 +1,4 @@
-"""Generator of `skills/reference.md`: everything that a skill may call, read from the protocols.
+"""Generator of `skills/reference.md`: all that a skill may call, and the test kit, from docstrings.
 
 Write the file again with `.venv/bin/python -m tests.skill_reference`.
 """
@@ -15,10 +15,9 @@ from pathlib import Path
 ROOT = Path(__file__).parent.parent
 PATH = ROOT / "skills" / "reference.md"
 COMMAND = ".venv/bin/python -m tests.skill_reference"
-INTRODUCTION = f"""# Reference: everything that a skill may call
+INTRODUCTION = f"""# Reference: everything that a skill may call, and the test kit
 
-Generated from the protocols in `executive/cell/` and from `executive/manipulation/` by `{COMMAND}`. \
-The guide is [README.md](README.md).
+Generated from the docstrings of the protocols by `{COMMAND}`. The guide is [README.md](README.md).
 
 * No call waits. A method or function that returns `Steps` or a `Generator` is called with `yield from`.
 * Units are in brackets, shapes of arrays in parentheses.
@@ -27,6 +26,7 @@ The guide is [README.md](README.md).
 * `Box` contains the left, top, right and bottom side of a box in an image [pixel].
 * Exceptions are defined in `executive/errors.py`, `SkillFailed` in `executive/skill.py`.
 * The examples are taken from the shipped skills and from the functions that skills share.
+* All times and effects of faults are imported from `executive.testing.faults`.
 """
 
 PARTS: dict[str, list[tuple[str, str, str]]] = {
@@ -69,16 +69,37 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
     ],
     "The skill itself": [
         ("self", "skill.py", "Skill"),
+        ("executive.skill", "skill.py", ""),
+        ("param(...)", "skill.py", "Param"),
+        ("port(...)", "skill.py", "Port"),
         ("min_times", "cell/protocols.py", "LeastTimes"),
     ],
     "Functions that skills share": [
-        (file, f"{file.replace('.', '/')}.py", "")
-        for file in (
-            "manipulation.motions",
-            "manipulation.tool_goals",
-            "manipulation.obstacles",
-            "manipulation.drops",
-        )
+        ("executive.manipulation.motions", "manipulation/motions.py", ""),
+        ("executive.manipulation.tool_goals", "manipulation/tool_goals.py", ""),
+        ("executive.manipulation.obstacles", "manipulation/obstacles.py", ""),
+        ("executive.manipulation.drops", "manipulation/drops.py", ""),
+        ("executive.perception.evidence", "perception/evidence.py", ""),
+    ],
+    "Test kit: run a skill or a mission": [
+        ("executive.testing.run_skill", "testing/run_skill.py", ""),
+        ("result = run_skill(...)", "testing/run_skill.py", "SkillResult"),
+        ("executive.testing.run_mission", "testing/run_mission.py", ""),
+        ("result = run_mission(...)", "testing/run_mission.py", "MissionResult"),
+        ("class MissionResult(RunEnded)", "events/run.py", "RunEnded"),
+        ("executive.testing.substitutes", "testing/substitutes.py", ""),
+    ],
+    "Test kit: faults": [
+        ("Times of faults", "testing/faults/script.py", ""),
+        ("Effects on tool, arm, camera, localizer, table and operator", "testing/faults/robot.py", ""),
+        ("Effects on objects", "testing/faults/objects.py", ""),
+        ("Effects on detectors", "testing/faults/detector.py", ""),
+        ("effect = Effect(...)", "testing/faults/effect.py", "Effect"),
+    ],
+    "Test kit: conformance": [
+        ("Checks of the declarations", "testing/conformance/declarations.py", ""),
+        ("Checks of the runs", "testing/conformance/conduct.py", ""),
+        ("stage", "testing/conformance/situations.py", "Stage"),
     ],
 }
 """For each section and table the expression of the object, the file, and the class; "": the functions."""
@@ -101,19 +122,22 @@ def generate() -> str:
 
 def _format_table(expression: str, file: str, name: str) -> str:
     owner: ast.AST = ast.parse((ROOT / "executive" / file).read_text(encoding="utf-8"))
-    title = f"### `executive.{expression}`"
+    title = f"### {expression}"
     if name:
         owner = next(one for one in ast.walk(owner) if isinstance(one, ast.ClassDef) and one.name == name)
-        title = f"### `{name}`: `{expression}`"
+        title = f"### {name}: `{expression}`"
     text, entries = _parse_docstring(owner)
     variable = expression.partition(" = ")[0].rpartition(".")[2] if name else ""
-    rows = list(_list_rows(owner, variable, dict(entries.get("Attributes", ()))))
+    has_examples = not file.startswith("testing/")
+    rows = list(_list_rows(owner, variable, dict(entries.get("Attributes", ())), has_examples))
     columns = ("member", "meaning", "example")[: 3 if any(example for *_, example in rows) else 2]
     lines = [columns, ("---",) * len(columns), *(row[: len(columns)] for row in rows)]
     return f"{title}\n\n{text}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def _list_rows(owner: ast.AST, variable: str, attributes: dict[str, str]) -> Iterator[Row]:
+def _list_rows(
+    owner: ast.AST, variable: str, attributes: dict[str, str], has_examples: bool
+) -> Iterator[Row]:
     """Yield a row for each public attribute, property, method or function of a class or module."""
     for member in getattr(owner, "body", ()):
         example = ""
@@ -124,10 +148,11 @@ def _list_rows(owner: ast.AST, variable: str, attributes: dict[str, str]) -> Ite
             example = _find_example(name, variable) if variable == "cell" else ""
         elif isinstance(member, ast.FunctionDef) and not member.name.startswith("_"):
             code, meaning = _format_signature(member), _describe(member)
-            example = _find_example(member.name, variable)
+            example = _find_example(member.name, variable) if has_examples else ""
         else:
             continue
-        yield _format_code(code.replace("''", '""')), _escape(meaning), example
+        code = re.sub("'([^'\"]*)'", r'"\1"', code).replace("field(default_factory=dict)", "{}")
+        yield _format_code(code.replace("field(default_factory=list)", "[]")), _escape(meaning), example
 
 
 def _format_signature(function: ast.FunctionDef) -> str:
@@ -135,6 +160,8 @@ def _format_signature(function: ast.FunctionDef) -> str:
     if any(isinstance(one, ast.Name) and one.id == "property" for one in function.decorator_list):
         return f"{function.name}: {result}"
     arguments = re.sub(r"^(self|cls)(, |$)", "", ast.unparse(function.args))
+    if arguments == "runs: SkillRuns":
+        return function.name
     arguments = re.sub(r"(: [^=()]*)=", r"\1 = ", arguments)
     return f"{function.name}({arguments}) -> {result}"
 

@@ -261,4 +261,4 @@ def test_the_reference_of_skills_is_what_its_generator_writes() -> None:
     assert written == skill_reference.generate(), f"write it again: {skill_reference.COMMAND}"
     members = vars(protocols_module).items()
     protocols = {name for name, kind in members if getattr(kind, "_is_protocol", False)} - {"Protocol"}
-    assert protocols <= set(re.findall(r"^### `(\w+)`", written, re.MULTILINE))
+    assert protocols <= set(re.findall(r"^### (\w+):", written, re.MULTILINE))

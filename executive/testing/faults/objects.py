@@ -26,7 +26,7 @@ def object_removed(which: ObjectChoice = "node", share: float | None = None) -> 
     """An object is removed once, from the tool if it is held.
 
     Args:
-        which: The object; by default the object of the node.
+        which: The object: its number from 1, the `nearest` to the tool, or that of the `node`.
         share: Share of the arm's motion after which this happens, 0 to 1; by default at once.
 
     Raises:
@@ -40,7 +40,7 @@ def object_moved(by: tuple[float, float], which: ObjectChoice = "node", share: f
 
     Args:
         by: Displacement along x and y [m]; an object at the new place is pushed aside.
-        which: The object; by default the object of the node.
+        which: The object: its number from 1, the `nearest` to the tool, or that of the `node`.
         share: Share of the arm's motion after which this happens, 0 to 1; by default at once.
 
     Raises:
@@ -55,7 +55,7 @@ def object_bumped(x: Range, y: Range, which: ObjectChoice = "node", share: float
     Args:
         x: Range of x of the place [m].
         y: Range of y of the place [m].
-        which: The object; by default the object of the node.
+        which: The object: its number from 1, the `nearest` to the tool, or that of the `node`.
         share: Share of the arm's motion after which this happens, 0 to 1; by default at once.
 
     Raises:
