@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 from executive.errors import InputError, shorten_quotations
 from executive.mission.source import Mark
@@ -20,19 +21,11 @@ _SECRET = re.compile(
     r"(?i)(\b\w*(?:api_?key|token|secret|password|authorization)\w*[\"']?\s*[:=]\s*|://(?=\S+@)).*"
 )
 """A key, or a user's name, and the rest of its line."""
-CODES = frozenset({
-    "alias", "ambiguous", "bad-key", "bad-label", "bad-match", "bad-name", "bad-reference", "duplicate-key",
-    "duplicate-label", "duplicate-tree", "empty", "empty-list", "endless", "impossible-reason", "layout",
-    "merge-key", "missing-argument", "missing-key", "missing-node", "missing-param", "no-base", "no-cell",
-    "no-library", "not-finite", "not-measured", "out-of-range", "outside", "port-type", "recursive-use",
-    "robot", "shadowed-param", "shadowed-variable", "shared-resource", "shared-variable", "short-timeout",
-    "tag", "too-deep", "too-large", "tool-state", "two-documents", "two-nodes", "unchanging-retry",
-    "unknown-argument", "unknown-bin", "unknown-class", "unknown-detector", "unknown-key", "unknown-kind",
-    "unknown-node", "unknown-param", "unknown-pose", "unknown-reason", "unknown-return", "unknown-skill",
-    "unknown-tree", "unreachable", "unread", "unseen-class", "unused-argument", "unused-param",
-    "unused-tree", "unwritten", "wrong-length", "wrong-type", "wrong-value", "yaml",
-})  # fmt: skip
-"""Every code of a finding."""
+_CODES_FILE = Path(__file__).parent / "finding_codes.txt"
+CODES: Mapping[str, str] = dict(
+    line.split(": ", 1) for line in _CODES_FILE.read_text(encoding="utf-8").splitlines()
+)
+"""Meaning of every code of a finding, and the action to take."""
 _VALUE_CODES = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",

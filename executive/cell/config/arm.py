@@ -28,11 +28,11 @@ class LimitsConfig(Section):
     position_deg: tuple[Angle, ...] = Field(min_length=1)
     """Largest joint angles [degree]."""
     velocity_deg: tuple[Speed, ...]
-    """[degree/s]"""
+    """Largest velocity [degree/s]."""
     acceleration: tuple[Acceleration, ...]
-    """[rad/s²]"""
+    """Largest acceleration [rad/s²]."""
     jerk: tuple[Jerk, ...]
-    """[rad/s³]"""
+    """Largest jerk [rad/s³]."""
     stop_acceleration: tuple[Acceleration, ...]
     """Largest acceleration while braking [rad/s²]."""
     stop_jerk: tuple[Jerk, ...]

@@ -61,7 +61,7 @@ class TransformConfig(Section):
     rotation: tuple[Turn, Turn, Turn]
     """Rotation vector, the axis times the angle [rad]: OpenCV's rvec, from R by `cv2.Rodrigues`."""
     translation: Vector
-    """OpenCV's tvec t."""
+    """OpenCV's tvec t: x, y, z [m]."""
 
 
 class CalibrationConfig(Section):
@@ -98,11 +98,11 @@ class CameraConfig(Section):
     mount: Literal["fixed", "wrist"]
     """`fixed`: the pose is in the world frame. `wrist`: the pose is in the frame of the flange."""
     position: Vector | None = None
-    """Optical centre."""
+    """Optical centre: x, y, z [m]."""
     look_at: Vector | None = None
-    """A point on the optical axis."""
+    """A point on the optical axis: x, y, z [m]."""
     up: Vector | None = None
-    """Direction of the top of the image."""
+    """Direction of the top of the image: x, y, z."""
     width: int = Field(640, ge=64, le=8192)
     """Image width [pixel]."""
     height: int = Field(480, ge=64, le=8192)

@@ -29,33 +29,47 @@ class LedgerConfig(Section):
 
 
 class CellConfig(Section):
-    """Content of a cell file."""
+    """A cell: robot, tool, camera, table, bins, objects and detectors.
 
-    base: str = Field("", exclude=True)
+    Values are in SI units; values of keys that end in `_deg` are in degrees.
+    """
+
+    base: str = Field("", exclude=True)  # "" after loading.
     """Another cell file. This file inherits each missing top-level key, each missing detector and each
-    missing key of a detector from it; "" after loading."""
+    missing key of a detector from it."""
     cell: Name
     """Name of the cell."""
     description: str = ""
     """Description of the cell in one sentence."""
     kind: str = "sim"
-    """Kind of cell (entry-point group `executive.cells`)."""
+    """Kind of cell: `sim`, a simulated cell; `fake`, a cell without physics for rehearsals; or an installed
+    kind (entry-point group `executive.cells`)."""
     arm: ArmConfig
+    """Robot arm."""
     tool: ToolConfig
+    """Suction tool."""
     motion: MotionConfig = MotionConfig()
+    """Distances, speeds and times of motion planning."""
     table: TableConfig = TableConfig()
+    """Workspace, and the objects that a simulated run puts there."""
     bins: dict[Name, BinConfig] = Field(min_length=1)
+    """Bins by name."""
     cameras: dict[Name, CameraConfig] = Field(min_length=1, max_length=1)
+    """The camera, by its name."""
     detector: str = ""
-    """Name of the default detector of missions; "": the first of `detectors`."""
+    """Name of the default detector of missions; if not given, the first of `detectors`."""
     detectors: dict[Name, DetectorConfig] = Field(min_length=1)
     """Detectors by name. With a `base`, a detector of the same name and kind changes keys of the base's
     detector, another kind replaces it, another name adds one, and a name without a value removes it."""
     localization: Literal["plane", "depth", "ray"] = "plane"
+    """Height of a detected object: `plane`, from its class; `depth`, from the depth image; `ray`, from a ray
+    of the simulator."""
     objects: dict[Name, ObjectConfig] = Field(min_length=1)
+    """Classes of objects by name; their names are those that detectors report."""
     ledger: LedgerConfig = LedgerConfig()
+    """Limits of the ledger, which tracks every object."""
     safe_place: Vector
-    """Place on the table for a put-down."""
+    """Place on the table where `PutDown` puts an object: x, y, z [m]."""
 
     @field_validator("detectors")
     @classmethod

@@ -62,7 +62,7 @@ class BinConfig(Section):
     """A container with a floor and four walls."""
 
     position: Vector
-    """Centre of the floor's underside."""
+    """Centre of the floor's underside: x, y, z [m]."""
     size: tuple[Length, Length, Length]
     """Inner length along x, inner width along y, wall height [m]."""
     slots: tuple[Count, Count] = (2, 3)

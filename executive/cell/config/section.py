@@ -46,10 +46,12 @@ Count = Annotated[int, Field(ge=1, le=1000)]
 """A positive count [1]; no bin, table or image holds more than 1000 objects."""
 Natural = Annotated[int, Field(ge=0, le=1000)]
 Range = Annotated[tuple[Coordinate, Coordinate], AfterValidator(check_ascending)]
-Vector = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(description="x, y, z [m]")]
+Vector = tuple[Coordinate, Coordinate, Coordinate]
+"""x, y, z [m]."""
 Angle = Annotated[float, Field(ge=-360, le=360)]
 """An angle [degree]; a whole turn to either side covers all orientations."""
-Angles = Annotated[tuple[Angle, Angle, Angle], Field(description="roll, pitch, yaw [degree]")]
+Angles = tuple[Angle, Angle, Angle]
+"""Roll, pitch, yaw [degree]."""
 Force = Annotated[float, Field(ge=1e-3, le=1e4)]
 """A force [N]: from the weight of a tenth of a gram to that of a ton."""
 Channel = Annotated[float, Field(ge=0, le=1)]

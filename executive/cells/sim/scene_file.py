@@ -76,25 +76,28 @@ class LightConfig(Light):
 
 
 class SceneTableConfig(Section):
-    """The surface of the table and the arrangement of the objects; None: the value of the cell file."""
+    """The surface of the table and the arrangement of the objects."""
 
     colour: Colour = (1.0, 1.0, 1.0)
     """Factor on the brightness of the texture: r, g, b, each 0 to 1."""
     texture: Annotated[str, AfterValidator(check_texture)] = WOOD
     """`wood`, `plain` (white), or a generated texture, `pattern 0` to `pattern 23`."""
     objects: Counts | None = None
-    """Range of the number of objects of the cell's classes."""
+    """Smallest and largest number of objects of the cell's classes; by default as in the cell file."""
     gap: float | None = Field(None, ge=0, le=0.5)
-    """Smallest distance between the outlines of two objects [m]; 0: outlines may touch."""
+    """Smallest distance between the outlines of two objects [m]; 0: outlines may touch. By default
+    as in the cell file."""
     stacked: Share | None = None
-    """Share of the objects that are put on top of another one, 0 to 1; unstable stacks are undone."""
+    """Share of the objects that are put on top of another one, 0 to 1; unstable stacks are undone. By
+    default as in the cell file."""
 
 
 class SceneObjectConfig(Section):
     """Colours and size of one object class."""
 
     colours: Palette | None = None
-    """Colours (r, g, b, each 0 to 1) of which each object gets one; None: those of the cell file."""
+    """Colours (r, g, b, each 0 to 1) of which each object gets one; by default those of the cell
+    file."""
     scale: float = Field(1.0, ge=0.2, le=3)
     """Factor on the size that the cell file declares."""
 
@@ -103,7 +106,7 @@ class UnknownConfig(Section):
     """Objects without a class, in addition to the other objects; they are never stacked."""
 
     count: Counts
-    """Range of their number."""
+    """Smallest and largest number of these objects."""
     models: Models = (800, 999)
     """First and last number of the random shapes in pybullet_data, 0 to 999; the shipped detector was
     trained with 0 to 799."""
@@ -127,20 +130,24 @@ class SceneCameraConfig(Section):
     fov_factor: float = Field(1.0, ge=0.3, le=3)
     """Factor on the vertical field of view."""
     noise: NoiseConfig | None = None
-    """Sensor noise; None: the value of the cell file."""
+    """Sensor noise; by default as in the cell file."""
 
 
 class SceneConfig(Section):
-    """A scene file; a missing key leaves the world as the cell file declares it."""
+    """Changes to the simulated world; a missing key leaves the world as the cell file declares it."""
 
     scene: str = Field(min_length=1)
     """Name of the scene."""
     light: LightConfig = LightConfig()
+    """The lamp and the ambient light."""
     table: SceneTableConfig = SceneTableConfig()
+    """The table, and the number and places of the objects."""
     objects: dict[str, SceneObjectConfig] = Field(default_factory=dict)
     """Colours and sizes by class; `any`: every class without a section."""
     unknown: UnknownConfig | None = None
+    """Objects of no class; none by default."""
     camera: SceneCameraConfig = SceneCameraConfig()
+    """Errors of the camera."""
 
 
 DECLARED_SCENE = SceneConfig(scene="as declared")

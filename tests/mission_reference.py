@@ -1,0 +1,251 @@
+"""Generator of `missions/reference.md`, read from the registered parts of the package.
+
+Write the file again with `.venv/bin/python -m tests.mission_reference`.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from executive.cell.config import CellConfig, Section
+from executive.cells.fake.noisy_detector import NoisyOptions
+from executive.cells.sim.scene_file import SceneConfig
+from executive.cli.main import main as command_line
+from executive.cli.skills import Declaration, collect_declarations
+from executive.mission.findings import CODES
+from executive.mission.model import grammar
+from executive.mission.parse.control import find_inner_keys
+from executive.mission.schema.types import Json, type_schema
+from executive.mission.text.files import shipped_missions
+from executive.perception.detectors.registry import find_detector_kinds
+from executive.perception.detectors.rfdetr import RfdetrOptions
+from executive.perception.detectors.roboflow.options import RoboflowOptions
+from executive.plugins import discover
+from executive.tree.keys import KeySection, Kind
+from executive.tree.node import ControlNode
+from executive.tree.registry import control_nodes
+
+MISSIONS = Path(__file__).parent.parent / "missions"
+PATH = MISSIONS / "reference.md"
+COMMAND = ".venv/bin/python -m tests.mission_reference"
+INTRODUCTION = f"""# Reference: missions, skills, cells and findings
+
+This file is generated from the code: `{COMMAND}`. The tutorial is [README.md](README.md).
+
+The column "default" shows the value of a key that a file does not contain; *required*: a file must contain \
+the key. `NAME` stands for a name that you choose. Units are in brackets.
+"""
+KEYS = "key, value, default, meaning"
+"""Columns of the tables of keys."""
+DETECTOR_OPTIONS = {
+    "embedded": None, "noisy": NoisyOptions, "rfdetr": RfdetrOptions, "roboflow": RoboflowOptions,
+}  # fmt: skip
+KINDS = {
+    "node": "node", "number": "number", "text": "text", "word": "name", "words": "name, or list of names",
+    "list": "list", "value": "any value", "values": "names with values", "variables": "names with `$name`",
+    "paths": "file, or list of files", "params": "names with params", "routes": "classes with bins",
+    "trees": "names with subtrees", "args": "list of names, or names with values", "label": "name",
+    Kind.NODE: "node", Kind.NODES: "list of nodes", Kind.REASONS: "reason, or list of reasons",
+    Kind.VARIABLE: "name of a variable", Kind.ELEMENTS: "list, or `$name`",
+    Kind.SECTION: "section", Kind.SECTIONS: "section, or list of sections",
+    "float": "number", "int": "whole number", "str": "text", "str | None": "text",
+}  # fmt: skip
+"""Kinds of values of the keys of files and control nodes, and types of params, in words."""
+
+
+def generate() -> str:
+    """Return the text of the reference."""
+    codes = ([f"`{code}`", meaning] for code, meaning in CODES.items())
+    chapters = {
+        "Mission files": _mission_files(),
+        "Control nodes": _control_nodes(),
+        "Skills": (part for name, skill in discover().items() for part in _skill(name, skill)),
+        "Subtrees of library/sorting.yaml": _sorting_library(),
+        "Shipped missions": _shipped_missions(),
+        "Cell files": _model(CellConfig),
+        "Detectors": _detectors(),
+        "Scene files": _model(SceneConfig),
+        "Findings of executive check": [_table("code, meaning", codes)],
+        "Exit codes": [inspect.cleandoc(command_line.help or "").partition("Exit codes: ")[2]],
+    }
+    contents = "\n".join(f"* [{title}](#{slug(title)})" for title in chapters)
+    texts = ("\n\n".join([f"## {title}", *parts]) for title, parts in chapters.items())
+    return "\n\n".join([INTRODUCTION + "\n" + contents, *texts]) + "\n"
+
+
+def slug(heading: str) -> str:
+    """Return the anchor of a heading."""
+    return re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
+
+
+def _mission_files() -> Iterator[str]:
+    tables = {
+        "A mission": grammar.MISSION, "A param of a mission": grammar.PARAM, "A library": grammar.LIBRARY,
+        "A subtree": grammar.SUBTREE, "Beside `use`": grammar.USE_SIBLINGS, "Any node": {"as": grammar.AS},
+    }  # fmt: skip
+    for title, keys in tables.items():
+        yield f"### {title}"
+        defaults = [_default(... if key.required else "") for key in keys.values()]
+        cells = zip(keys.items(), defaults, strict=True)
+        yield _table(
+            KEYS, ([f"`{name}`", KINDS[key.kind], default, key.doc] for (name, key), default in cells)
+        )
+
+
+def _control_nodes() -> Iterator[str]:
+    for word, node in control_nodes().items():
+        yield f"### `{word}`\n\n{inspect.getdoc(node)}"
+        if node.any_of:
+            yield f"At least one of {_listed(node.any_of)} is required."
+        if node.reasons:
+            yield f"Reason of its own: {_listed(f'{word}.{reason}' for reason in node.reasons)}."
+        yield _table(KEYS, _key_rows(word, node))
+
+
+def _key_rows(owner: str, node: type[ControlNode | KeySection], prefix: str = "") -> Iterator[list[str]]:
+    for name, key in node.keys.items():
+        written = f"`{prefix}{name}`" + (f", beside `{owner}`" if key.is_sibling else "")
+        if key.is_shorthand:
+            written = (f"{written}, or " if find_inner_keys(node) else "") + f"the value of `{owner}`"
+        value = KINDS.get(key.kind) or _value(key.adapter().json_schema())
+        value += f", at most {key.max_count}" if key.max_count else ""
+        yield [written, value, _default(key.default), key.doc]
+        if key.kind in (Kind.SECTION, Kind.SECTIONS):
+            yield from _key_rows(name, key.section, f"{name}.")
+
+
+def _skill(name: str, skill: type) -> Iterator[str]:
+    facts = collect_declarations(name, skill)
+    yield f"### `{name}`\n\n{facts['doc']}"
+    tool = facts["tool"]
+    left = "".join(f"; {state} after `{ending}`" for ending, state in tool["left"].items())
+    yield (
+        f"* Reasons: {_listed(facts['reasons']) or 'none'}\n"
+        f"* Parts of the cell: {_listed(facts['uses']) or 'none'}\n"
+        f"* Tool: {tool['before']} before, {tool['after']} after success{left}"
+    )
+    if entries := [*facts["ports"], *facts["params"]]:
+        yield _table("name, kind, value, default, meaning", map(_skill_row, entries))
+
+
+def _skill_row(entry: Declaration) -> list[str]:
+    kind = {"in": "input", "out": "output", "": "param"}[entry.get("direction", "")]
+    value = KINDS.get(entry["type"], f"`{entry['type']}`")
+    if entry["refers"]:
+        value = f"name of {'an' if entry['refers'][0] in 'aeiou' else 'a'} {entry['refers']}"
+    if entry.get("choices"):
+        value = f"{_listed(entry['choices'])}{', or ' + value if entry['refers'] else ''}"
+    value += f" [{entry['unit']}]" if entry.get("unit") else ""
+    value += _bounds({"minimum": entry.get("min"), "maximum": entry.get("max")})
+    default = "" if kind == "output" else ... if entry["required"] else entry["default"]
+    return [f"`{entry['name']}`", kind, value, _default(default), entry["doc"]]
+
+
+def _sorting_library() -> Iterator[str]:
+    library, rows = yaml.safe_load((MISSIONS / "library" / "sorting.yaml").read_text(encoding="utf-8")), []
+    yield library["description"]
+    for name, tree in library["trees"].items():
+        args = tree.get("args", {})
+        defaults = [f"{arg}: {args[arg]}" if isinstance(args, dict) else arg for arg in args]
+        rows.append([f"`{name}`", _listed(defaults), tree["doc"]])
+    yield _table("subtree, arguments and defaults, meaning", rows)
+
+
+def _shipped_missions() -> Iterator[str]:
+    texts = ((MISSIONS / f"{name}.yaml").read_text(encoding="utf-8") for name in shipped_missions())
+    missions = map(yaml.safe_load, texts)
+    rows = ([f"`{one['mission']}`", f"`{one['cell']}`", one["description"]] for one in missions)
+    yield _table("mission, cell, meaning", rows)
+
+
+def _detectors() -> Iterator[str]:
+    for name, entry in find_detector_kinds().items():
+        yield f"### Kind `{name}`\n\n{inspect.getdoc(inspect.getmodule(entry.load()))}"
+        if options := DETECTOR_OPTIONS[name]:
+            yield from _model(options)
+
+
+def _model(model: type[Section]) -> Iterator[str]:
+    """Yield the tables of a file or section, and of the sections below it."""
+    schema = type_schema(model)
+    paths: dict[str, list[str]] = {}
+
+    def visit(part: Json, prefix: str) -> None:
+        for name, key in part["properties"].items():
+            for one in key.get("anyOf", [key]):
+                named = one.get("additionalProperties")
+                if "$ref" in (section := named if isinstance(named, dict) else one):
+                    definition = section["$ref"].rpartition("/")[2]
+                    path = f"{prefix}{name}.NAME" if section is named else f"{prefix}{name}"
+                    paths.setdefault(definition, []).append(path)
+                    visit(schema["$defs"][definition], f"{path}.")
+
+    visit(schema, "")
+    for definition, section in {"": schema, **{name: schema["$defs"][name] for name in paths}}.items():
+        rows = []
+        for name, key in section["properties"].items():
+            default = ... if name in section.get("required", ()) else key.get("default")
+            rows.append([f"`{name}`", _value(key), _default(default), key.get("description", "")])
+        heading = f"### {_listed(paths[definition])}\n\n" if definition else ""
+        yield f"{heading}{section['description']}\n\n{_table(KEYS, rows)}"
+
+
+def _value(schema: Json, plural: str = "") -> str:
+    """Return a JSON schema in words."""
+    if "anyOf" in schema:
+        return ", or ".join(_value(one, plural) for one in schema["anyOf"] if one.get("type") != "null")
+    if "const" in schema or "enum" in schema:
+        return _listed(schema.get("enum") or [schema["const"]])
+    if "$ref" in schema:
+        return f"section{plural}"
+    if schema["type"] == "object":
+        return f"names with {_value(schema['additionalProperties'], 's')}"
+    if schema["type"] == "array":
+        items = schema["items"][0] if isinstance(schema["items"], list) else schema["items"]
+        count = f"{schema['minItems']} " if schema.get("minItems") == schema.get("maxItems", 0) else ""
+        return f"list{plural} of {count}{_value(items, 's')}"
+    words = {"number": f"number{plural}", "integer": f"whole number{plural}", "string": f"text{plural}"}
+    return words.get(schema["type"], "`true` or `false`") + _bounds(schema)
+
+
+def _bounds(schema: Mapping[str, float | None]) -> str:
+    words = {
+        "minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below",
+    }  # fmt: skip
+    bounds = {word: schema[key] for key, word in words.items() if schema.get(key) is not None}
+    if list(bounds) == ["at least", "at most"]:
+        return ", {:g} to {:g}".format(*bounds.values())
+    return "".join(f", {word} {bound:g}" for word, bound in bounds.items())
+
+
+def _default(value: Any) -> str:
+    """Return a default in words; `...`: the value is required."""
+    if value is ...:
+        return "*required*"
+    if value in (None, "", (), [], {}, inf):
+        return ""
+    value = str(value).lower() if isinstance(value, bool) else value
+    return "its defaults" if isinstance(value, dict) else f"`{value}`"
+
+
+def _listed(words: Iterable[object]) -> str:
+    return ", ".join(f"`{word}`" for word in words)
+
+
+def _table(columns: str, rows: Iterable[list[str]]) -> str:
+    lines = [columns.split(", "), ["---"] * (columns.count(",") + 1)]
+    for row in rows:
+        assert row[-1], f"{row[0]} has no description; write it where {row[0]} is declared"
+        lines.append([" ".join(cell.split()).replace("|", "\\|") for cell in row])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+if __name__ == "__main__":
+    PATH.write_text(generate(), encoding="utf-8")
