@@ -63,7 +63,7 @@ class Pose:
 
         return np.asarray(Rotation.from_matrix(self.rotation).as_rotvec())
 
-    def rounded(self, digits: int = 6) -> list[float]:
+    def to_rounded_list(self, digits: int = 6) -> list[float]:
         """Return position and quaternion as a list of seven rounded numbers."""
         return [round(float(value), digits) for value in (*self.position, *self.quaternion)]
 

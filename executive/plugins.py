@@ -92,7 +92,7 @@ class PluginEntry:
         except Exception as error:  # A plugin's module may raise anything.
             raise InputError(
                 f'the {self.kind} "{self.name}" ({self.value}) cannot be loaded: {type(error).__name__}: '
-                f"{error}{_locate_error(error)}; mend it, or {self.remedy}"
+                f"{error}{_locate_error(error)}; correct it, or {self.remedy}"
             ) from error
 
 
@@ -225,12 +225,12 @@ def _read_project(file: Path) -> Project:
         content = tomllib.loads(file.read_bytes().decode("utf-8"))
     except OSError as error:
         raise InputError(
-            f"{file} cannot be read: {error.strerror}; what the project registers stands there"
+            f"{file} cannot be read: {error.strerror}; it lists the plugins of the project"
         ) from None
     except UnicodeDecodeError as error:
         raise InputError(f"{file} is not UTF-8 text: byte {error.start} does not fit") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file} is no TOML: {error}; mend it: it says what the project registers") from None
+        raise InputError(f"{file} is no TOML: {error}; correct it: it lists the plugins") from None
     tables = content.get("project", {})
     if not isinstance(tables, dict):
         raise InputError(f"{file}: project is no table; begin it with a line [project]")

@@ -54,7 +54,7 @@ def test_one_that_cannot_be_loaded_is_named_with_the_place(
     with pytest.raises(InputError) as caught:
         discover()
     assert str(caught.value).startswith(f'the skill "Wave" ({module}:Wave) cannot be loaded: ')
-    assert str(caught.value).endswith(f"; mend it, or uninstall the package {module}")
+    assert str(caught.value).endswith(f"; correct it, or uninstall the package {module}")
     caught.match(says)
 
 

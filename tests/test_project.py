@@ -82,7 +82,7 @@ def test_a_file_in_a_folder_that_is_everybodys_does_not_count(write: Write, mode
     ("text", "says"),
     [
         ("[project\n", "is no TOML: Expected ']' at the end of a table declaration (at line 1, column 9); "
-         "mend it: it says what the project registers"),
+         "correct it: it lists the plugins"),
         ("project = 3\n", ": project is no table; begin it with a line [project]"),
         ("[project]\nentry-points = 3\n",
          ': [project.entry-points."executive.skills"] is no table; write lines as '
@@ -113,5 +113,5 @@ def test_a_file_that_cannot_be_read_is_refused(write: Write, monkeypatch: pytest
     with pytest.raises(InputError) as caught:
         project_here()
     assert str(caught.value) == (
-        f"{file} cannot be read: Permission denied; what the project registers stands there"
+        f"{file} cannot be read: Permission denied; it lists the plugins of the project"
     )

@@ -42,7 +42,7 @@ def plain_or_type(value: Any) -> Any:
         return type(value).__name__
 
 
-def rounded(values: Iterable[float], digits: int) -> list[float]:
+def round_values(values: Iterable[float], digits: int) -> list[float]:
     """Return the values rounded to a number of decimal places; -0.0 becomes 0.0."""
     return [round(float(value), digits) + 0.0 for value in values]
 
@@ -68,7 +68,7 @@ _RULES: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
     (np.generic, lambda value: plain(value.item())),
     (np.ndarray, lambda value: plain(value.tolist())),
     (Frame, lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _number(frame.stamp)}),
-    (Pose, lambda pose: pose.rounded(DIGITS)),
+    (Pose, lambda pose: pose.to_rounded_list(DIGITS)),
     (Mapping, lambda mapping: {_text(str(key)): plain(value) for key, value in mapping.items()}),
     ((list, tuple), lambda values: [plain(value) for value in values]),
     ((set, frozenset), lambda values: sorted((plain(value) for value in values), key=repr)),

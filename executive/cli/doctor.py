@@ -102,30 +102,30 @@ def check_packages() -> Iterator[Diagnosed]:
     """Yield findings on required packages, packages that provide `cv2`, extras, and the video encoder."""
     from importlib.metadata import packages_distributions
 
-    from executive.run.versions import DISTRIBUTION, installed, installer, required
+    from executive.run.versions import DISTRIBUTION, find_installer, find_version, list_requirements
 
-    names = required()
-    missing = [name for name in (DISTRIBUTION, *names) if not installed(name)]
+    names = list_requirements()
+    missing = [name for name in (DISTRIBUTION, *names) if not find_version(name)]
     for name in missing:
         yield Diagnosed("problem", "packages", f"{name} is missing", "run `uv sync`")
     if not missing:
-        message = f"{DISTRIBUTION} {installed(DISTRIBUTION)} and its {len(names)} required packages"
+        message = f"{DISTRIBUTION} {find_version(DISTRIBUTION)} and its {len(names)} required packages"
         yield Diagnosed("ok", "packages", message)
     if packages := sorted(set(packages_distributions().get("cv2", ()))):
-        opencv = ", ".join(f"{name} {installed(name)}" for name in packages)
+        opencv = ", ".join(f"{name} {find_version(name)}" for name in packages)
         fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
-        if installer(DISTRIBUTION) == "pip":
+        if find_installer(DISTRIBUTION) == "pip":
             fix = f"run `pip uninstall -y {' '.join(packages)}`, then `pip install opencv-python-headless`"
         alone = f"{opencv} is the only package that provides `cv2`"
         message = f"{len(packages)} packages provide `cv2` and overwrite each other ({opencv})"
         yield _make_result(len(packages) == 1, "opencv", alone, "problem", message, fix)
     for extra, purpose in EXTRAS.items():
-        names = required(extra)
-        missing = [name for name in names if not installed(name)]
-        versions = ", ".join(f"{name} {installed(name)}" for name in names)
+        names = list_requirements(extra)
+        missing = [name for name in names if not find_version(name)]
+        versions = ", ".join(f"{name} {find_version(name)}" for name in names)
         fix = f"to {purpose}, run `uv sync --extra {extra}`"
         yield _make_result(not missing, extra, versions, "note", f"not installed: {', '.join(missing)}", fix)
-    if version := installed("av"):
+    if version := find_version("av"):
         yield Diagnosed("ok", "film", f"av {version} encodes videos; the program ffmpeg is not needed")
 
 

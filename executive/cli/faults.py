@@ -64,8 +64,9 @@ def command(
             campaign = Campaign(subject, workers=workers, progress=progress, halting=print_halting)
             plain: Any
             if is_list:
-                plain = [{"fault": number, "told": str(one)} for number, one in enumerate(campaign.faults, 1)]
-                text, code = "\n".join(f"{fault['fault']:4} {fault['told']}" for fault in plain), 0
+                listed = enumerate(campaign.faults, 1)
+                plain = [{"fault": number, "description": str(fault)} for number, fault in listed]
+                text, code = "\n".join(f"{fault['fault']:4} {fault['description']}" for fault in plain), 0
             elif numbers is not None:
                 trial, path = record_trial(subject, campaign.rehearsal, campaign.select(numbers), runs)
                 plain = {**trial_as_plain(trial), "run": str(path)}

@@ -12,7 +12,7 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from executive.cli.streams import unescaped_stderr
+from executive.cli.streams import open_unescaped_stderr
 
 LINE_PERIOD = 10.0
 """Time between two lines about the progress of a command without a terminal [s]."""
@@ -31,7 +31,7 @@ def bar(
         quiet: Show nothing.
         print_lines: Without a terminal, write a line every ten seconds.
     """
-    console = Console(file=unescaped_stderr())
+    console = Console(file=open_unescaped_stderr())
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     disable = quiet or not console.is_interactive
     if print_lines and not quiet and disable:

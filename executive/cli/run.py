@@ -19,7 +19,7 @@ from executive.cli.options import (
     scene_option,
     seed_option,
 )
-from executive.cli.streams import print_json, stdout_kept_clean, unescaped_stderr
+from executive.cli.streams import open_unescaped_stderr, print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.events import RunStarted
@@ -182,7 +182,7 @@ def _make_view() -> Lines | Terminal:
     from executive.view.terminal.lines import Lines
     from executive.view.terminal.screen import Terminal
 
-    console = Console(file=unescaped_stderr())
+    console = Console(file=open_unescaped_stderr())
     if not console.is_terminal or console.is_dumb_terminal:
         return Lines(sys.stderr)
     return Terminal(console, sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)

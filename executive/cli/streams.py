@@ -63,7 +63,7 @@ class TolerantStream(io.TextIOBase):
         """Return True if the stream is a terminal."""
         return self._stream is not None and self._stream.isatty()
 
-    def unescaped(self) -> TolerantStream:
+    def copy_unescaped(self) -> TolerantStream:
         """Return the same stream without the escaping of control characters."""
         return TolerantStream(self._stream, is_unescaped=True)
 
@@ -84,10 +84,10 @@ class TolerantStream(io.TextIOBase):
             os.close(null)
 
 
-def unescaped_stderr() -> TextIO:
+def open_unescaped_stderr() -> TextIO:
     """Return standard error without escaping, for a library that draws with control characters."""
     if isinstance(sys.stderr, TolerantStream):
-        return cast(TextIO, sys.stderr.unescaped())
+        return cast(TextIO, sys.stderr.copy_unescaped())
     return sys.stderr
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from executive.cell.detection import Observation
 from executive.cell.frame import Frame
 from executive.cell.objects import Target
-from executive.cell.plain import rounded
+from executive.cell.plain import round_values
 from executive.events import ItemChanged
 from executive.geometry import Array
 from executive.ledger.belief import Belief
@@ -132,7 +132,7 @@ class Record:
     def summary(self) -> ItemChanged:
         """The item as an event, its position rounded to 0.1 mm."""
         return ItemChanged(
-            self.item, self.label, self.state.value, rounded(self.position, 4),
+            self.item, self.label, self.state.value, round_values(self.position, 4),
             self.belief.looks, self.attempts, self.bin, self.reason,
         )  # fmt: skip
 

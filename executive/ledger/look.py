@@ -11,7 +11,7 @@ import numpy as np
 
 from executive.cell.config import LedgerConfig
 from executive.cell.detection import Detections, Observation
-from executive.cell.plain import rounded
+from executive.cell.plain import round_values
 from executive.events import DetectedObject, FrameSearched
 from executive.ledger.association import associate, find_duplicate, find_moved, may_show
 from executive.ledger.belief import ITEM_AREA_SHARE, Belief, viewpoint_of
@@ -30,8 +30,10 @@ def describe_look(look: Detections, observations: Sequence[Observation]) -> Fram
     def describe(*, confident: bool) -> list[DetectedObject]:
         return [
             DetectedObject(
-                seen.detection.label, round(seen.detection.confidence, 4), rounded(seen.detection.box, 2),
-                rounded(seen.position, 4), seen.contradiction,
+                seen.detection.label,
+                round(seen.detection.confidence, 4),
+                round_values(seen.detection.box, 2),
+                round_values(seen.position, 4), seen.contradiction,
             )
             for seen in observations if seen.confident == confident
         ]  # fmt: skip

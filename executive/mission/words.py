@@ -59,7 +59,7 @@ def violation(problem: ErrorDetails) -> str:
         words, key = _BOUNDS[kind]
         return f"must be {words} {context[key]:g}, not {describe(given)}"
     if kind == "literal_error":
-        meant = suggest(given, _quoted(context["expected"])) if isinstance(given, str) else None
+        meant = suggest(given, _find_quoted(context["expected"])) if isinstance(given, str) else None
         question = f' (did you mean "{meant}"?)' if meant else ""
         return f"must be {context['expected'].replace(chr(39), chr(34))}, not {describe(given)}{question}"
     if kind == "too_short":
@@ -80,5 +80,5 @@ def _suggest_correction(kind: str, given: object) -> str:
     return ""
 
 
-def _quoted(expected: str) -> list[str]:
+def _find_quoted(expected: str) -> list[str]:
     return expected.split("'")[1::2]

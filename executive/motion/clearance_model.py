@@ -119,7 +119,7 @@ class ClearanceModel:
             axes: Tool axes `(N, 3)`.
             discs: Tool and load.
         """
-        excess = self._distances(tips, axes, discs) - self._required(tips)[:, None]
+        excess = self._distances(tips, axes, discs) - self._required_distances(tips)[:, None]
         return np.minimum(excess.min(axis=(1, 2)), _tilt_slack(axes, discs))
 
     def slopes(self, tips: Array, axes: Array, discs: Discs, moved: tuple[Array, Array]) -> Array:
@@ -133,7 +133,7 @@ class ClearanceModel:
             discs: Tool and load.
             moved: Tool centre points and axes of the displaced states, `(N, M, 3)` each.
         """
-        required = self._required(tips)
+        required = self._required_distances(tips)
         excess = self._distances(tips, axes, discs) - required[:, None]
         state, prism_count = np.arange(len(tips)), excess.shape[2]
         pairs = excess.reshape(len(tips), excess.shape[1] * prism_count)
@@ -159,7 +159,7 @@ class ClearanceModel:
         # Undetected objects need no margin; no state may be pressed into the table or a floor.
         tolerance = np.where(self._prisms.unknown, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
         tolerance = np.where(self._prisms.flat, MAX_PENETRATION, tolerance)
-        excess = self._distances(tips, axes, discs) - self._required(tips)[:, None] + tolerance
+        excess = self._distances(tips, axes, discs) - self._required_distances(tips)[:, None] + tolerance
         excess = excess.min(axis=1)
         state, prism = np.unravel_index(np.argmin(excess), excess.shape)
         if excess[state, prism] < 0:
@@ -169,7 +169,7 @@ class ClearanceModel:
                 f"{self._prisms.names[prism]}{_describe_tip(tips[state])}"
             )
 
-    def _required(self, tips: Array) -> Array:
+    def _required_distances(self, tips: Array) -> Array:
         """Return the required distance of each state from each prism `(N, K)` [m]."""
         end_distances = np.linalg.norm(tips[:, None, :2] - self._ends, axis=-1).min(axis=1)
         return np.where((end_distances < OBSERVED_RADIUS)[:, None], self._end_margins, self._margin)

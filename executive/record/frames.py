@@ -127,7 +127,7 @@ class PictureRecorder:
             camera=frame.camera,
             detector=searched.detector,
             age=timed.clock - frame.stamp,
-            phase=" + ".join(skill_name(last.node) for last in timeline.running() if last.skill),
+            phase=" + ".join(skill_name(last.node) for last in timeline.find_running() if last.skill),
             item=item,
             bin=selection.bin if selection else "",
             attempts=history.now.attempts if history else 0,

@@ -100,7 +100,7 @@ def come_to_rest(cell: Cell, advance: Callable[[], None]) -> str:
             cell.arm.stop()
             while not cell.arm.at_rest:
                 if cell.clock.now > deadline:
-                    return f"the arm is not at rest {MAX_BRAKING_TIME:.0f} s after it was told to brake"
+                    return f"the arm is not at rest {MAX_BRAKING_TIME:.0f} s after the command to brake"
                 advance()
         except Exception as error:
             problems.append(str(error))

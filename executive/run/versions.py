@@ -18,13 +18,13 @@ DISTRIBUTION = "executive"
 def versions() -> Mapping[str, str]:
     """Return the versions by name; packages that are not installed are left out."""
     found = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
-    for name in (DISTRIBUTION, *required()):
-        if version := installed(name):
+    for name in (DISTRIBUTION, *list_requirements()):
+        if version := find_version(name):
             found[name] = version
     return MappingProxyType(found)
 
 
-def required(extra: str = "") -> tuple[str, ...]:
+def list_requirements(extra: str = "") -> tuple[str, ...]:
     """Return the names of the packages that this project requires on this Python, or that an extra adds.
 
     Empty if the project is not installed.
@@ -37,7 +37,7 @@ def required(extra: str = "") -> tuple[str, ...]:
     return tuple(one.name for one in applicable if not extra or "extra" in str(one.marker))
 
 
-def installed(name: str) -> str:
+def find_version(name: str) -> str:
     """Return the version of a distribution, or "" if it is not installed."""
     try:
         return metadata.version(name)
@@ -45,7 +45,7 @@ def installed(name: str) -> str:
         return ""
 
 
-def installer(name: str) -> str:
+def find_installer(name: str) -> str:
     """Return the program that installed a distribution, for instance `pip`; "" if unknown."""
     try:
         return (metadata.distribution(name).read_text("INSTALLER") or "").strip()

@@ -1,8 +1,8 @@
 """Labelled images on disk, in the two layouts that detectors are trained from.
 
 `coco` is Roboflow's: `train|valid|test/_annotations.coco.json` beside the images. `yolo` is
-`data.yaml` with `train|valid|test/images` and `…/labels`. Images are written by whoever makes them
-(see `image_path`), annotations once all are there.
+`data.yaml` with `train|valid|test/images` and `…/labels`. The caller writes the images
+(see `image_path`); the annotations are written once, at the end.
 """
 
 from __future__ import annotations

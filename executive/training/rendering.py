@@ -190,7 +190,7 @@ def _truth(sample: Sample, camera: str, part: Box) -> dict[str, Any]:
         "camera": camera,
         "part": part,
         "matrix": sample.matrix,
-        "X_WC": sample.X_WC.rounded(9),
+        "X_WC": sample.X_WC.to_rounded_list(9),
         "labels": sample.labels,
         "positions": sample.positions,
         "centres": sample.centres,

@@ -15,7 +15,7 @@ from executive.tree.loop import Loop
 class Repeat(Loop):
     """Run the body again after each success, up to a number of times or until an expected failure.
 
-    With both, whichever comes first ends the loop with success. Any other failure is passed on.
+    The first limit that is reached ends the loop with success. Any other failure is passed on.
     """
 
     keyword = "repeat"

@@ -85,17 +85,17 @@ MISSING = [f"problem packages: {name} is missing; run `uv sync`" for name in ("e
 )
 def test_packages(monkeypatch, missing, opencv, expected):
     monkeypatch.setattr(
-        versions, "installed", lambda name: "" if name in missing else INSTALLED.get(name, "")
+        versions, "find_version", lambda name: "" if name in missing else INSTALLED.get(name, "")
     )
-    monkeypatch.setattr(versions, "required", lambda extra="": NEEDED[extra])
+    monkeypatch.setattr(versions, "list_requirements", lambda extra="": NEEDED[extra])
     monkeypatch.setattr(
         "importlib.metadata.packages_distributions", lambda: {"cv2": opencv} if opencv else {}
     )
     assert shown(doctor.check_packages()) == expected
 
 
-def test_an_environment_made_with_pip_is_mended_with_pip(monkeypatch):
-    monkeypatch.setattr(versions, "installer", lambda name: "pip")
+def test_an_environment_made_with_pip_is_corrected_with_pip(monkeypatch):
+    monkeypatch.setattr(versions, "find_installer", lambda name: "pip")
     packages = {"cv2": ["opencv-python-headless", "opencv-python"]}
     monkeypatch.setattr("importlib.metadata.packages_distributions", lambda: packages)
     (problem,) = (finding for finding in doctor.check_packages() if finding.subject == "opencv")
@@ -224,7 +224,7 @@ def test_marks_and_subjects_are_aligned_and_problems_counted(monkeypatch, findin
 
 def test_everything_is_examined_whatever_fails(monkeypatch):
     def fail() -> None:
-        raise InputError("the skill is broken; mend it")
+        raise InputError("the skill is broken; correct it")
 
     monkeypatch.setattr("executive.plugins.discover", fail)
     monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.key", None)
@@ -234,7 +234,7 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
         "python", "display", "packages", "opencv", "view", "train", "film",
         "plugins", "renderer", "egl", "roboflow",
     ]  # fmt: skip
-    assert found[7] == "problem plugins: the skill is broken; mend it"
+    assert found[7] == "problem plugins: the skill is broken; correct it"
     assert found[-1].startswith(
         "problem roboflow: cannot be checked: import of executive.perception.detectors.r"
     )

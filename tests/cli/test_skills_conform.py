@@ -56,9 +56,10 @@ def test_without_a_name_all_skills_are_checked_and_mistakes_have_exit_code_1() -
     result = conform()
     lines = [line for line in result.stdout.splitlines() if not line.startswith("ok")]
     assert lines[:3] == [
-        "failed   Nap.defaults_allowed: the default of Nap.gap must be at most 0.2 m, not 0.3. "
+        "failed   Nap.has_allowed_defaults: the default of Nap.gap must be at most 0.2 m, not 0.3. "
         "Correct the default, or the limits. (and 1 more)",
-        'failed   Dream.arranged: Dream cannot be tried: no value can be generated for "story" (a text). '
+        "failed   Dream.succeeds_somewhere: Dream cannot be tried: "
+        'no value can be generated for "story" (a text). '
         'Return it from a function in a test: conformance(Dream, lambda stage: {"story": ...}), '
         "as skills/README.md shows.",
         "not run  Dream.comes_to_an_end",
@@ -75,7 +76,7 @@ def test_as_json_all_checks_are_one_array() -> None:
     assert [verdict["check"] for verdict in told] == [rule.__name__ for rule in RULES]
     assert {verdict["skill"] for verdict in told} == {"Nap"}
     (failed,) = (verdict for verdict in told if verdict["status"] != "ok")
-    assert (failed["check"], failed["status"]) == ("defaults_allowed", "failed")
+    assert (failed["check"], failed["status"]) == ("has_allowed_defaults", "failed")
     assert failed["doc"].startswith("Each default is a value that a mission may give")
     assert len(failed["problems"]) == 2
     assert result.exit_code == 1

@@ -43,7 +43,7 @@ def test_fresh_scenes_of_a_shipped_cell_are_read_almost_without_error(
         drawn = renderer.sample(seed)
         boxes, ignored = (tuple(map(tuple, found.tolist())) for found in (drawn.boxes, drawn.ignored))
         truth = {
-            "part": drawn.part, "matrix": drawn.matrix.tolist(), "X_WC": drawn.X_WC.rounded(9),
+            "part": drawn.part, "matrix": drawn.matrix.tolist(), "X_WC": drawn.X_WC.to_rounded_list(9),
             "positions": drawn.positions.tolist(),
         }  # fmt: skip
         samples.append(LabelledImage(str(seed), drawn.image, drawn.labels, boxes, ignored, truth))

@@ -102,7 +102,7 @@ def test_an_undeclared_reason_is_told_at_the_line_of_its_skill() -> None:
 @pytest.mark.parametrize(
     ("at_rest", "arm", "first"),
     [
-        (lambda: True, "at rest", "mend what is broken"),
+        (lambda: True, "at rest", "repair the code or the cell"),
         (lambda: False, "it was commanded to brake and is not at rest",
          "keep away from the arm until you have seen it stand still: it"),
         (lambda: 1 / 0, "it does not say whether it is at rest (ZeroDivisionError: division by zero)",
@@ -133,7 +133,7 @@ def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
 
     run.at_every_step(let_go_and_stop)
     story = run.tell()
-    said = ["see where cube-1 lies: it was let go as the run ended"]
+    said = ["find cube-1 in the cell: the tool released it at the end of the run"]
     assert (story.holds, story.left, story.next) == ("", ["cube-1"], said)
 
 

@@ -151,7 +151,7 @@ def test_skills_that_run_are_in_the_order_of_their_starts() -> None:
         skill_started("tree/Transit"), skill_started("tree/Detect"), skill_ended("tree/Transit"),
         skill_started("tree/Transit"),
     )  # fmt: skip
-    assert [one.node for one in timeline.running()] == ["tree/Detect", "tree/Transit"]
+    assert [one.node for one in timeline.find_running()] == ["tree/Detect", "tree/Transit"]
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_the_accounts_after_the_end_of_the_tree_leave_the_final_states_as_they_w
         NodeStarted("tree"), item_changed("cube-1"), item_changed("cube-2", "held"),
         NodeEnded("tree", "FAILURE"), item_changed("cube-1", "rejected"), item_changed("cube-2", "placed"),
     )  # fmt: skip
-    assert list(timeline.items.unfinished("seen", "held")) == ["cube-1"]
+    assert list(timeline.items.find_in_states("seen", "held")) == ["cube-1"]
 
 
 def test_an_item_has_its_last_failure() -> None:

@@ -100,14 +100,14 @@ def draw_items(config: CellConfig, count: int, table: Colour, rng: Generator) ->
         colour = random_object_colour(model.colours, table, rng)
         if rng.random() < share_unknown:
             label, model = UNKNOWN, unknown_model(int(rng.choice(UNKNOWN_MODELS)))
-            model = resized(model, rng.uniform(0.4, 1.0))
+            model = resize(model, rng.uniform(0.4, 1.0))
         elif rng.random() < share_resized:
-            model = resized(model, float(rng.choice(SCALES)))
+            model = resize(model, float(rng.choice(SCALES)))
         items.append(SceneObject(label, model, Pose.identity(), colour))
     return items
 
 
-def resized(model: ObjectConfig, factor: float) -> ObjectConfig:
+def resize(model: ObjectConfig, factor: float) -> ObjectConfig:
     """Return a model `factor` times as large."""
     names = ("scale", "height", "radius", "ring")
     return model.model_copy(update={name: getattr(model, name) * factor for name in names})

@@ -133,7 +133,7 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
             if not data[place:].strip(b"\0"):
                 # A power failure left the last blocks empty.
                 return
-            raise _damaged(path, start)
+            raise _make_damage_error(path, start)
         body = struct.Struct(f"<{bodies[kind]}")
         if place + 1 + body.size > len(data):
             return
@@ -149,11 +149,11 @@ def _commands(path: Path) -> Iterator[tuple[Command, int]]:
         # The second number, the start of the guarded part, is infinite for a motion without one.
         finite = numbers if states is None else (numbers[0], *states.flat)
         if not all(map(math.isfinite, finite)):
-            raise _damaged(path, start)
+            raise _make_damage_error(path, start)
         yield Command(kind, numbers, states), place
 
 
-def _damaged(path: Path, place: int) -> InputError:
+def _make_damage_error(path: Path, place: int) -> InputError:
     """Return the error for a log without a valid command at a position [byte]."""
     return InputError(
         f'the log of the world "{path}" is damaged at byte {place}: a log is only ever appended to, so '

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, ObjectConfig, TransformConfig
 from executive.cell.config.cameras import POSE_AND_FOV_KEYS
-from executive.cells.sim.arrangements import DAMAGED_MODEL, resized, unknown_model
+from executive.cells.sim.arrangements import DAMAGED_MODEL, resize, unknown_model
 from executive.cells.sim.camera import Light
 from executive.cells.sim.scene_file import (
     ANY,
@@ -65,7 +65,7 @@ def unknown_objects(unknown: UnknownConfig | None, rng: np.random.Generator) -> 
     first, last = unknown.models
     numbers = [number for number in range(first, last + 1) if number != DAMAGED_MODEL]
     count = int(rng.integers(*unknown.count, endpoint=True))
-    models = [resized(unknown_model(int(number)), unknown.scale) for number in rng.choice(numbers, count)]
+    models = [resize(unknown_model(int(number)), unknown.scale) for number in rng.choice(numbers, count)]
     return [model.model_copy(update={"colours": unknown.colours}) for model in models]
 
 
@@ -77,7 +77,7 @@ def _true_object(model: ObjectConfig, appearance: SceneObjectConfig | None) -> O
     if len(colours) == 1:
         # With one colour, no random number is drawn: later rotations and stacks would change.
         colours *= len(model.colours)
-    return resized(model, appearance.scale).model_copy(update={"colours": colours})
+    return resize(model, appearance.scale).model_copy(update={"colours": colours})
 
 
 def _true_camera(camera: CameraConfig, error: SceneCameraConfig) -> CameraConfig:

@@ -175,7 +175,7 @@ class SceneRenderer:
             shot = render(world, matrix, X_WC, part, light)
         view = SceneView(shot.image, shot.bodies, part, matrix, X_WC, noise)
         sample = self._label(view, bodies, items)
-        return None if sample is None else replace(sample, image=_resized(add_noise(shot.image, noise, rng)))
+        return None if sample is None else replace(sample, image=_resize(add_noise(shot.image, noise, rng)))
 
     def _draw_as_run(self, rng: np.random.Generator) -> Sample | None:
         world, camera = self._world, self._camera
@@ -203,7 +203,7 @@ class SceneRenderer:
             return None
         # A run takes the camera for what the cell file declares.
         sample = replace(sample, matrix=compute_calibration(self._declared)[0], X_WC=declared)
-        image = _resized(frame[top:bottom, left:right])
+        image = _resize(frame[top:bottom, left:right])
         return replace(sample, image=image, frame=frame, depth=depth, second=second)
 
     def _label(self, view: SceneView, bodies: Sequence[int], items: Sequence[SceneObject]) -> Sample | None:
@@ -220,7 +220,7 @@ class SceneRenderer:
             pixels = project(view.matrix, view.X_WC, vertices)
             share = visible_share(mesh, pixels, mine)
             whole = outline_box(pixels)
-            box = _clipped(whole, corner, scale)
+            box = _clip(whole, corner, scale)
             if share < MAX_HIDDEN_SHARE:
                 continue
             half_hidden += share < MIN_LABELLED_SHARE
@@ -276,13 +276,13 @@ def measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
     return float(np.median(np.abs(image[mask] - around).max(axis=1)))
 
 
-def _clipped(box: Box, corner: Array, scale: float) -> list[float]:
+def _clip(box: Box, corner: Array, scale: float) -> list[float]:
     """Return a box of the whole image in a sample's pixels, cut at its edges."""
     points = (np.array(box).reshape(2, 2) - corner) * scale
     return [float(value) for value in points.clip(0, IMAGE_SIZE).ravel()]
 
 
-def _resized(image: Image) -> Image:
+def _resize(image: Image) -> Image:
     if image.shape[0] == IMAGE_SIZE:
         return image
     return np.asarray(

@@ -60,13 +60,13 @@ def _constant(case: Case, name: str, key: Key, value: Part, max_value: int | Non
 
 def check_class_rules(case: Case) -> Iterator[Finding]:
     """Find the mistakes that only the class of a control node knows."""
-    halted = {node.path for node in _halted(case)}
+    halted = {node.path for node in _find_halted(case)}
     for node in case.inner_nodes():
         for finding in inspection_instance(node).check(CaseFacts(case, node, node.path in halted)):
             yield _finding(node, finding)
 
 
-def _halted(case: Case) -> Iterator[Node]:
+def _find_halted(case: Case) -> Iterator[Node]:
     """Yield every node that is halted when a concurrent one has ended."""
     for node in case.inner_nodes():
         for child in inspection_instance(node).halted_by_sibling:

@@ -37,7 +37,7 @@ class Writer:
     refers: str
     values: tuple[tuple[object, Mark], ...] | None = None
 
-    def seen_from(self, mark: Mark) -> str:
+    def describe_for(self, mark: Mark) -> str:
         """Return what it is and where, for who reads the file of `mark`."""
         return f"{self.name} in {self.mark.place(mark.source)}"
 
@@ -103,7 +103,7 @@ class ElementType:
                     yield error(place, "port-type", message, f"It is read in {mark.place(place.source)}.")
             if source.values is None and find_element_type(source.type) is None:
                 message = f"{what} takes a list, but ${name} holds {describe_type(source.type)}"
-                yield error(mark, "port-type", message, f"It is written by {source.seen_from(mark)}.")
+                yield error(mark, "port-type", message, f"It is written by {source.describe_for(mark)}.")
 
     def elements(self, source: Writer) -> Iterator[Writer]:
         """Yield the writers of the variable for a list."""
@@ -129,7 +129,7 @@ def _loops(node: Node) -> Iterator[ElementType]:
 
 def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:
     """Find what is wrong with wiring an input to what a writer writes."""
-    port, wanted = wire.port, f"{wire} takes {_wanted(wire.port)}"
+    port, wanted = wire.port, f"{wire} takes {_describe_accepted(wire.port)}"
     for value, mark in writer.values or ():
         known = case.names.get(port.refers)
         if find_input_problem(value, port):
@@ -147,10 +147,10 @@ def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:
         holds = f"the name of {_a(writer.refers)}" if writer.refers else "any text"
     if holds:
         message = f"{wanted}, but ${wire.variable} holds {holds}"
-        yield error(wire.mark, "port-type", message, f"It is written by {writer.seen_from(wire.mark)}.")
+        yield error(wire.mark, "port-type", message, f"It is written by {writer.describe_for(wire.mark)}.")
 
 
-def _wanted(port: Port) -> str:
+def _describe_accepted(port: Port) -> str:
     return f"the name of {_a(port.refers)}" if port.refers else describe_type(port.type)
 
 

@@ -52,7 +52,7 @@ def check_failure_names(case: Case) -> Iterator[Finding]:
                 yield unknown
             elif not coming:
                 yield _impossible(case, case.flow, match, where, body)
-            elif len(meant := _meant(case.flow, match, coming)) > 1:
+            elif len(meant := _find_meant_nodes(case.flow, match, coming)) > 1:
                 places = " and ".join(
                     f"{node.mark.place(match.mark.source)}:{node.mark.col}" for node in meant
                 )
@@ -100,7 +100,7 @@ def _impossible(case: Case, flow: Analysis, match: FailureName, where: str, body
 
 
 def _unknown(case: Case, flow: Analysis, match: FailureName, body: Node) -> Finding | None:
-    """Return a finding where what a name means has no such reason, wherever it stands."""
+    """Return a finding if the skill or label exists, but never fails with the reason."""
     skill = case.skills.get(match.source)
     reasons = skill.reasons if skill else _reasons(flow, body).get(match.source)
     if reasons is None or match.reason in reasons or UNKNOWN_NAME in reasons:
@@ -124,7 +124,7 @@ def _reasons(flow: Analysis, body: Node) -> dict[str, list[str]]:
     return {source: list(dict.fromkeys(found)) for source, found in reasons.items()}
 
 
-def _meant(flow: Analysis, match: FailureName, coming: list[PossibleFailure]) -> list[Node]:
+def _find_meant_nodes(flow: Analysis, match: FailureName, coming: list[PossibleFailure]) -> list[Node]:
     """Return the nodes that a name means; a label means whatever fails under it, and so one thing."""
     if any(match.source in failure.labels for failure in coming):
         return []

@@ -1,4 +1,4 @@
-"""Checks of the variables: who writes what before whom, and who reads it."""
+"""Checks that each variable is written before it is read, and read after it is written."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from executive.mission.source import Mark
 from executive.skill import Direction, Skill
 
 Read = tuple[Node, str, str, Mark]
-"""A node that reads, what reads it (`Approach.target`), the variable, and where the mission says so."""
+"""Node that reads, its input (`Approach.target`), the variable, and the position in the mission file."""
 
 
 def find_unwritten_inputs(case: Case) -> Iterator[Finding]:
-    """Find everything in the mission's own file that reads a variable not written on every way to it."""
+    """Find the inputs in the mission's own file whose variable is not written on every path to them."""
     for _, what, variable, mark in _unwritten(case, libraries=False):
-        # Inside a subtree its own variables go by their bare names.
+        # In the file, a variable of a subtree has no prefix.
         bare = variable.rpartition(".")[2]
         if variable in case.written:
-            message = f"{what} reads ${bare}, which is not written on every way to here"
+            message = f"{what} reads ${bare}, which is not written on every path to this node"
             yield error(mark, "unwritten", message, f"It is written by {_writers(case, variable, mark)}.")
         else:
             message = f"{what} reads ${bare}, which nothing writes"
@@ -36,7 +36,7 @@ def find_unwritten_inputs(case: Case) -> Iterator[Finding]:
 
 
 def find_unwritten_library_inputs(case: Case) -> Iterator[Finding]:
-    """Find every use of a library's subtree that lacks variables it reads: told there, once for all."""
+    """Find each use of a library's subtree that reads unwritten variables: one finding for all of them."""
     lacking: dict[str, dict[str, str]] = {}
     for node, what, variable, _ in _unwritten(case, libraries=True):
         lacking.setdefault(case.library_uses[node.path].path, {}).setdefault(variable, what)

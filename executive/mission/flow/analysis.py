@@ -98,11 +98,13 @@ class Analysis:
         end = state.after_motion() if skill.moves else state
         success = end.with_variables(outputs).with_tools(tools_after_success(end.tools, after, node.path))
 
-        def left(by: str) -> FlowState:
-            return end.with_tools(tools_after_failure(end.tools, skill.tool_left.get(by), node.path))
+        def end_after(reason: str) -> FlowState:
+            return end.with_tools(tools_after_failure(end.tools, skill.tool_left.get(reason), node.path))
 
-        failures = {PossibleFailure(node.skill, reason, node.path): left(reason) for reason in skill.reasons}
-        return Flow(success, failures, left(HALT))
+        failures = {
+            PossibleFailure(node.skill, reason, node.path): end_after(reason) for reason in skill.reasons
+        }
+        return Flow(success, failures, end_after(HALT))
 
     def _use(self, node: UseNode, body: Node, state: FlowState) -> Flow:
         flow = self._run(body, state)

@@ -24,7 +24,7 @@ from executive.tree.keys import Kind
 
 def with_paths(root: Node) -> Node:
     """Return the tree with the path of every node set."""
-    return _placed(root, "", "tree")
+    return _assign_path(root, "", "tree")
 
 
 def name_of(node: Node) -> str:
@@ -44,7 +44,7 @@ def word_of(node: Node) -> str:
     return "unknown"
 
 
-def _placed(node: Node, parent: str, slot: str, name: str | None = None) -> Node:
+def _assign_path(node: Node, parent: str, slot: str, name: str | None = None) -> Node:
     """Return the node as it stands in `slot` of `parent`, or there under another name.
 
     A bare list is the slot itself; any other node adds its own name to the path.
@@ -56,9 +56,9 @@ def _placed(node: Node, parent: str, slot: str, name: str | None = None) -> Node
         case InnerNode():
             return replace(node, path=path, values=_parts(node, path))
         case UseNode(body=Node() as body):
-            return replace(node, path=path, body=_placed(body, path, "do" if node.label else ""))
+            return replace(node, path=path, body=_assign_path(body, path, "do" if node.label else ""))
         case UnknownNode():
-            return replace(node, path=path, parts=_listed(node.parts, path))
+            return replace(node, path=path, parts=_assign_list_paths(node.parts, path))
     return replace(node, path=path)
 
 
@@ -69,11 +69,11 @@ def _parts(owner: InnerNode | SectionNode, path: str, prefix: str = "") -> dict[
         # The only child of a section has the name of the section.
         name = prefix if prefix and key.name == "do" else _join(prefix, key.name)
         if isinstance(value, Node):
-            value = _placed(value, path, name if key.is_in_path or _is_list(value) else "")
+            value = _assign_path(value, path, name if key.is_in_path or _is_list(value) else "")
         elif isinstance(value, SectionNode):
             value = replace(value, values=_parts(value, path, name))
         elif isinstance(value, tuple) and key.kind is Kind.NODES:
-            value = _listed(tuple(item for item in value if isinstance(item, Node)), path)
+            value = _assign_list_paths(tuple(item for item in value if isinstance(item, Node)), path)
         elif isinstance(value, tuple):
             value = tuple(
                 replace(item, values=_parts(item, path, f"{name}/{index}"))
@@ -85,7 +85,7 @@ def _parts(owner: InnerNode | SectionNode, path: str, prefix: str = "") -> dict[
     return placed
 
 
-def _listed(items: tuple[Node, ...], parent: str) -> tuple[Node, ...]:
+def _assign_list_paths(items: tuple[Node, ...], parent: str) -> tuple[Node, ...]:
     """Return the nodes of a list, named so that no two have the same path."""
     names = [name_of(node) for node in items]
     count = Counter(names)
@@ -93,7 +93,7 @@ def _listed(items: tuple[Node, ...], parent: str) -> tuple[Node, ...]:
     for index, (node, name) in enumerate(zip(items, names, strict=True), 1):
         named = bool(node.label) or isinstance(node, SkillNode | UseNode)
         unique = name if named and count[name] == 1 else f"{index}:{name}"
-        placed.append(_placed(node, parent, "", unique))
+        placed.append(_assign_path(node, parent, "", unique))
     return tuple(placed)
 
 

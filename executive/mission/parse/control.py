@@ -103,7 +103,7 @@ class _Reader:
         fields = Fields(owner, mark, value, inner, self.parser.findings)
         self.has_valid_constants = self.has_valid_constants and fields.is_mapping
         for name, key in inner.items():
-            found = fields.required(name) if key.is_required else fields.get(name)
+            found = fields.require(name) if key.is_required else fields.get(name)
             if found is not None:
                 self.read(fields, key, found, fields.key_mark(name), values)
             elif key.kind is Kind.NODE and key.is_required:

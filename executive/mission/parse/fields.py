@@ -63,7 +63,7 @@ class Fields:
         node = self.get(key)
         return node.mark if node else self.mark
 
-    def required(self, key: str) -> Node | None:
+    def require(self, key: str) -> Node | None:
         """Return the value of `key`, or None after adding a finding."""
         node = self.get(key)
         if node is None and self.is_mapping:

@@ -30,7 +30,7 @@ def parse_mission(
     start = replace(root.mark, length=1)
     fields = Fields("the mission", start, root, grammar.MISSION, findings)
     for key in ("mission", "cell", "tree"):
-        fields.required(key)
+        fields.require(key)
     parser = NodeParser(findings, skills, control)
     tree = fields.get("tree")
     mission = Mission(
@@ -94,7 +94,7 @@ def parse_library(root: Node, skills: Skills, control: ControlNodes) -> tuple[Li
     start = replace(root.mark, length=1)
     fields = Fields("the library", start, root, grammar.LIBRARY, findings)
     for key in ("library", "trees"):
-        fields.required(key)
+        fields.require(key)
     name = fields.text("library")
     return Library(
         name, _read_trees(fields, NodeParser(findings, skills, control), name or "library")

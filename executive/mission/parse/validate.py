@@ -67,7 +67,7 @@ def mark_of(root: Node, path: KeyPath, of_key: bool = False) -> Mark:
     return mark
 
 
-def dotted(path: KeyPath) -> str:
+def join_keys(path: KeyPath) -> str:
     """Return `("bins", "red", "size", 0)` as `bins.red.size[0]`."""
     text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     return text.removeprefix(".")
@@ -79,22 +79,24 @@ def _describe_problem(root: Node, model: type[BaseModel], problem: ErrorDetails)
     inside, last = path[:-1], path[-1] if path else ""
     if kind == "extra_forbidden":
         parent = _find_section(model, inside)
-        owner = dotted(inside) or "the file"
+        owner = join_keys(inside) or "the file"
         known = list(parent.model_fields) if parent else []
         hint = alternatives(str(last), known, f"{owner} takes")
         key = mark_of(root, path, of_key=True)
         return error(key, "unknown-key", f'{owner} has no key "{last}"', hint)
     if kind == "missing" and isinstance(last, int):
         given = len(problem["input"])
-        message = f"{dotted(inside)} has {given} of the {_tuple_length(model, inside)} values it needs"
+        message = f"{join_keys(inside)} has {given} of the {_tuple_length(model, inside)} values it needs"
         return error(mark_of(root, inside), "wrong-length", message)
     if kind == "missing":
-        owner = dotted(inside) or "the file"
+        owner = join_keys(inside) or "the file"
         return error(mark_of(root, inside), "missing-key", f'{owner} needs the key "{last}"')
     if last == "[key]":
-        return error(mark_of(root, inside, of_key=True), "bad-name", f"{dotted(inside)} {violation(problem)}")
+        return error(
+            mark_of(root, inside, of_key=True), "bad-name", f"{join_keys(inside)} {violation(problem)}"
+        )
     code = "out-of-range" if "than" in kind else _CODES.get(kind, "wrong-type")
-    name = dotted(path) or "the file"
+    name = join_keys(path) or "the file"
     return error(mark_of(root, path), code, f"{name} {violation(problem)}")
 
 

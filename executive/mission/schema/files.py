@@ -203,7 +203,7 @@ def _ref(name: str) -> Json:
     return {"$ref": f"#/definitions/{name}"}
 
 
-def _named(value: Json) -> Json:
+def _map_names_to(value: Json) -> Json:
     """Return the schema of a mapping from names to values."""
     return {
         "type": ["object", "null"],
@@ -227,12 +227,12 @@ _KINDS: Mapping[str, Json] = {
     "words": {**_one_or_several({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
     "list": or_reference({"type": "array"}),
     "value": {},
-    "values": _named({}),
-    "variables": _named(REFERENCE),
+    "values": _map_names_to({}),
+    "variables": _map_names_to(REFERENCE),
     "paths": _one_or_several({}),
-    "params": _named(_ref("param")),
+    "params": _map_names_to(_ref("param")),
     "routes": {"type": ["object", "null"], "additionalProperties": _one_or_several({})},
-    "trees": _named(_ref("tree")),
-    "args": {**_named({}), "type": ["object", "array", "null"], "items": {"type": "string", **_WORD}},
+    "trees": _map_names_to(_ref("tree")),
+    "args": {**_map_names_to({}), "type": ["object", "array", "null"], "items": {"type": "string", **_WORD}},
 }
 """Content of a key, by its kind."""

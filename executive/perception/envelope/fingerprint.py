@@ -62,7 +62,7 @@ def _describe_camera(camera: CameraConfig, config: CellConfig) -> dict[str, str]
         {name: config.arm.poses_deg[name] for name in camera.scan_poses} if camera.mount == "wrist" else {}
     )
     return {
-        "camera pose": f"{camera.mount} {X_MC.rounded(4)} {json.dumps(poses)}",
+        "camera pose": f"{camera.mount} {X_MC.to_rounded_list(4)} {json.dumps(poses)}",
         "camera lens": f"{matrix.round(2).tolist()}",
         "camera image": f"{camera.width} x {camera.height}, searched {list(camera.table_view)}",
         "camera depth": "" if camera.depth is None else camera.depth.model_dump_json(),

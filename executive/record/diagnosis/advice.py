@@ -37,17 +37,17 @@ def give_advice(case: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator
         resumption = f"to go on with this run leave {content} in the tool; " if can_resume else ""
         yield f"{resumption}take {content} out of the tool before another run"
     else:
-        for name in case.timeline.items.unfinished("held"):
-            yield f"see where {name} lies: it was let go as the run ended"
+        for name in case.timeline.items.find_in_states("held"):
+            yield f"find {name} in the cell: the tool released it at the end of the run"
     for reading in reads:
         if reading.raised == Unavailable.__name__:
-            yield f"see to it that {reading.name} answers again"
+            yield f"make sure that {reading.name} answers again"
         elif reading.name == "arm.met":
-            yield f"see what is in the arm's way: {reading.value}"
+            yield f"find what the arm collided with: {reading.value}"
     if case.is_unrecorded:
         yield "free some space on the disk of the run directory, or name another place with --runs DIR"
     elif case.end.status == "FAULT":
-        yield "mend what is broken, in the code or in the cell: a fault is never tried again"
+        yield "repair the code or the cell: a fault is never retried"
     if remedy := REMEDIES.get(case.end.reason.rpartition(".")[2]):
         yield remedy
     elif changes := list(_suggest_changes(case)):

@@ -63,7 +63,7 @@ def diagnose(
     reads = list(_deciding_reads(case, skills))
     journal = RunDirectory(run).journal
     has_begun = journal.exists() and journal.stat().st_size > 0
-    unfinished = timeline.items.unfinished("seen", "dropped", "held")
+    unfinished = timeline.items.find_in_states("seen", "dropped", "held")
     left = {name: item for name, item in unfinished.items() if name not in case.lost}
     return Diagnosis(
         status=end.status,

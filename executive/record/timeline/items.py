@@ -125,7 +125,7 @@ class ItemsTimeline:
             item.sighting, item.unseen = _make_sighting(self.look, item.now, event.found), 0
         self._seen_now.clear()
 
-    def unfinished(self, *states: str) -> dict[str, ItemTimeline]:
+    def find_in_states(self, *states: str) -> dict[str, ItemTimeline]:
         """Return the items by name that had one of the given states at the end of the tree.
 
         The accounts of the ledger may prove afterwards that an item is placed or was a phantom.

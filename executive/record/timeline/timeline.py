@@ -78,7 +78,7 @@ class Timeline:
         timeline = Timeline()
         for timed in recorded:
             timeline(timed)
-        for running in timeline.running():
+        for running in timeline.find_running():
             running.end_tick, running.end = timeline.tick, timeline.clock
         return timeline
 
@@ -121,7 +121,7 @@ class Timeline:
             case events.RunEnded():
                 self.ended = event
 
-    def running(self) -> list[Activation]:
+    def find_running(self) -> list[Activation]:
         """Return the activations that have not ended, in the order of their starts."""
         found = (last for last in self.nodes.values() if last.status == "RUNNING")
         return sorted(found, key=lambda last: last.number)

@@ -22,7 +22,7 @@ _MEASUREMENTS = ("camera.capture", "operator.ask")
 """Calls that return new information, which require `senses`."""
 
 
-def arranged(runs: SkillRuns) -> Iterator[str]:
+def succeeds_somewhere(runs: SkillRuns) -> Iterator[str]:
     """The skill can be tried, and succeeds in at least one situation."""
     try:
         _ = runs.situations
@@ -80,7 +80,7 @@ def outputs_fit(runs: SkillRuns) -> Iterator[str]:
                 )
 
 
-def inputs_unchanged(runs: SkillRuns) -> Iterator[str]:
+def keeps_inputs(runs: SkillRuns) -> Iterator[str]:
     """The skill does not change its params and inputs."""
     for rehearsal in runs.complete_runs:
         for name in rehearsal.changed:
@@ -103,7 +103,7 @@ def uses_only_what_it_declares(runs: SkillRuns) -> Iterator[str]:
             yield f"{runs.name} calls cell.{name} and does not declare that it senses. Add senses = True."
 
 
-def tool_left_as_declared(runs: SkillRuns) -> Iterator[str]:
+def leaves_tool_as_declared(runs: SkillRuns) -> Iterator[str]:
     """After success, each failure and a halt at any tick, the tool is in the declared state."""
     for rehearsal in _first_violations(
         [*runs.complete_runs, *runs.halted_runs], lambda rehearsal: bool(_tool_problem(runs, rehearsal))
@@ -111,7 +111,7 @@ def tool_left_as_declared(runs: SkillRuns) -> Iterator[str]:
         yield _tool_problem(runs, rehearsal)
 
 
-def arm_left_at_rest(runs: SkillRuns) -> Iterator[str]:
+def leaves_arm_at_rest(runs: SkillRuns) -> Iterator[str]:
     """If the skill started the arm, the arm is at rest after its end or a halt."""
     for rehearsal in _first_violations([*runs.complete_runs, *runs.halted_runs], _is_arm_left_moving):
         yield (

@@ -22,7 +22,7 @@ HALT = "halt"
 """Key of `tool_left` for a halt."""
 
 
-def documented(runs: SkillRuns) -> Iterator[str]:
+def has_documentation(runs: SkillRuns) -> Iterator[str]:
     """The docstring of the class begins with a sentence, and each param and port has a `doc`."""
     doc = vars(runs.skill).get("__doc__") or ""
     summary = inspect.cleandoc(doc).partition("\n")[0]
@@ -38,14 +38,14 @@ def documented(runs: SkillRuns) -> Iterator[str]:
             yield f'{runs.name}.{name} has no doc. Write {declare}(..., doc="what it is").'
 
 
-def defaults_allowed(runs: SkillRuns) -> Iterator[str]:
+def has_allowed_defaults(runs: SkillRuns) -> Iterator[str]:
     """Each default is a value that a mission may give: of the type, inside the bounds, among the choices."""
     for param in runs.skill.params.values():
         if not param.is_required and (problem := _default_problem(param)):
             yield f"the default of {runs.name}.{param.name} {problem}. Correct the default, or the limits."
 
 
-def reasons_declared(runs: SkillRuns) -> Iterator[str]:
+def declares_reasons(runs: SkillRuns) -> Iterator[str]:
     """The reasons are a tuple, and the code fails only with declared reasons."""
     reasons = runs.skill.reasons
     if isinstance(reasons, str):
@@ -60,7 +60,7 @@ def reasons_declared(runs: SkillRuns) -> Iterator[str]:
                 )
 
 
-def resources_declared(runs: SkillRuns) -> Iterator[str]:
+def declares_resources(runs: SkillRuns) -> Iterator[str]:
     """`uses` has only arm, tool and camera, and the arm with `moves`; `tool_left` has only own reasons."""
     skill, name = runs.skill, runs.name
     unknown = [repr(skill.uses)] if isinstance(skill.uses, str) else sorted(set(skill.uses) - set(RESOURCES))
@@ -75,7 +75,7 @@ def resources_declared(runs: SkillRuns) -> Iterator[str]:
             yield f'{name}.tool_left has "{ending}", which is no reason of the skill. Allowed: {allowed}.'
 
 
-def imports_allowed(runs: SkillRuns) -> Iterator[str]:
+def imports_allowed_modules(runs: SkillRuns) -> Iterator[str]:
     """The file imports no package with another clock, other threads, or one kind of cell only."""
     for path in filter(lambda path: path.is_file(), source.find_files(runs.skill)):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

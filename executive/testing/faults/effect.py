@@ -12,7 +12,7 @@ import numpy as np
 
 from executive.cell.arm import Motion
 from executive.cell.objects import Item
-from executive.cell.plain import rounded
+from executive.cell.plain import round_values
 from executive.cell.workcell import Workcell
 from executive.errors import InputError
 from executive.events import Emit, FaultInjected
@@ -148,7 +148,7 @@ class Occurrence:
             return
         self._last_record = self.scene.now
         label = affected.label if affected else ""
-        position = rounded(affected.position, 4) if affected else []
+        position = round_values(affected.position, 4) if affected else []
         self.scene.emit(FaultInjected(self.effect.name, self.node, self.item, label, position))
 
 

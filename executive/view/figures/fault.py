@@ -157,7 +157,7 @@ def trial_as_plain(trial: Trial) -> dict[str, object]:
     for name in ("numbers", "descriptions", "name", "cut", "entered", "robot_time"):
         del plain[name]
     more = {"fault": trial.label, "verdict": trial.verdict, "robot_time_s": trial.robot_time}
-    return {**plain, **more, "told": list(trial.descriptions), "problems": list(trial.problems)}
+    return {**plain, **more, "descriptions": list(trial.descriptions), "problems": list(trial.problems)}
 
 
 def fault_text(figures: FaultFigures) -> str:

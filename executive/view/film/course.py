@@ -44,7 +44,7 @@ class FilmCourse:
     def open_paths(self) -> frozenset[str]:
         """Paths of the running nodes; after the end of the tree, of those with its end and its status."""
         timeline = self.timeline
-        if running := timeline.running():
+        if running := timeline.find_running():
             return frozenset(activation.node for activation in running)
         end = _find_end(timeline.last_end)
         return frozenset(path for path, activation in timeline.nodes.items() if _find_end(activation) == end)

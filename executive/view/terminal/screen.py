@@ -103,7 +103,7 @@ class Terminal:
 
     def _render_tree(self) -> RenderableType:
         """Return the running nodes and their neighbours: a whole tree is taller than a terminal."""
-        shown = select_open(self._outline, {running.node for running in self.timeline.running()})
+        shown = select_open(self._outline, {running.node for running in self.timeline.find_running()})
         lines = Text()
         for node, branch in zip(shown, draw_branches(shown), strict=True):
             last = self.timeline.nodes.get(node.path)

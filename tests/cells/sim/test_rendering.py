@@ -17,7 +17,7 @@ from executive.cells.sim.arrangements import (
     arrange,
     draw_items,
     make_held_object,
-    resized,
+    resize,
     settle,
 )
 from executive.cells.sim.models import load_mesh
@@ -96,7 +96,7 @@ def test_some_scenes_have_objects_of_unknown_kinds_or_other_sizes(overhead: Cell
 
 
 def test_a_resized_model_has_the_size_that_it_states(overhead: CellConfig) -> None:
-    model = resized(overhead.objects["duck"], 1.2)
+    model = resize(overhead.objects["duck"], 1.2)
     mesh = load_mesh(model)
     assert (mesh.top - mesh.bottom, mesh.radius) == pytest.approx(
         (model.height, model.radius), abs=0.003 * 1.2

@@ -84,7 +84,7 @@ def capture(made: SimCell) -> Frame:
 
 def placed(world: World) -> list[tuple[str, list[float]]]:
     """Return label and pose of every object."""
-    return [(label, world.object_pose(body).rounded(5)) for body, label in world.bodies.items()]
+    return [(label, world.object_pose(body).to_rounded_list(5)) for body, label in world.bodies.items()]
 
 
 def test_a_scene_without_changes_is_the_declared_world(world: Build, overhead: CellConfig) -> None:
@@ -218,7 +218,7 @@ def test_the_image_is_from_the_true_camera_and_the_frame_says_the_declared_one(
     assert isinstance(frame, TrueFrame)
     matrix, X_WC = compute_calibration(overhead.cameras["overhead"])
     assert (frame.matrix == matrix).all()
-    assert frame.X_WC.rounded() == X_WC.rounded()
+    assert frame.X_WC.to_rounded_list() == X_WC.to_rounded_list()
     true = np.diag([zoom, zoom, 1.0]) @ matrix
     true[:2, 2] = matrix[:2, 2]
     expected = middles(made, true, moved(X_WC))
@@ -241,9 +241,9 @@ def test_the_error_of_a_camera_on_the_wrist_moves_with_the_arm(
     for pose in ("scan", "aside_left"):
         made._world.set_arm(np.radians(wrist.arm.poses_deg[pose]))
         flange, X_FC = made._world.flange_pose(), compute_calibration(camera)[1]
-        assert capture(made).X_WC.rounded() == (flange @ X_FC).rounded()
+        assert capture(made).X_WC.to_rounded_list() == (flange @ X_FC).to_rounded_list()
         true = made.cell.camera._true_view()[1]  # type: ignore[attr-defined]
-        assert true.rounded() == (flange @ Pose.of([0.0, 0.01, 0.0]) @ X_FC).rounded()
+        assert true.to_rounded_list() == (flange @ Pose.of([0.0, 0.01, 0.0]) @ X_FC).to_rounded_list()
 
 
 def test_the_noise_is_that_of_the_scene(cell: Callable[..., SimCell]) -> None:
@@ -259,7 +259,7 @@ def test_evaluated_frames_are_of_the_scene_and_say_what_the_cell_declares(overhe
         SceneRenderer(overhead, "overhead", randomized=False, scene=s) for s in (DECLARED_SCENE, changed)
     )
     one, sample = usual.sample(1), other.sample(1)
-    assert (sample.X_WC.rounded(), UNKNOWN in sample.labels) == (one.X_WC.rounded(), False)
+    assert (sample.X_WC.to_rounded_list(), UNKNOWN in sample.labels) == (one.X_WC.to_rounded_list(), False)
     scale = (sample.part[2] - sample.part[0]) / 256
     boxes = sample.boxes * scale + [*sample.part[:2], *sample.part[:2]]
     for box, centre in zip(boxes, sample.centres, strict=True):

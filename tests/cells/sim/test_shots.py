@@ -77,7 +77,7 @@ def test_a_viewpoint_has_arm_workspace_and_bins_in_the_given_part_of_the_image(o
     view = overview(overhead, (800, 720), (20, 60, 780, 640))
     assert view.matrix == pytest.approx(np.array([[1215.34, 0, 400], [0, 1215.34, 360], [0, 0, 1]]), rel=1e-5)
     pose = [1.8486, -1.1888, 1.3928, -0.7711, -0.3845, 0.2265, 0.4542]
-    assert (view.X_WC.rounded(4), view.size) == (pytest.approx(pose, abs=2e-4), (800, 720))
+    assert (view.X_WC.to_rounded_list(4), view.size) == (pytest.approx(pose, abs=2e-4), (800, 720))
 
 
 def test_a_picture_is_of_the_world_of_the_scene(shoot: Shoot, tmp_path: Path) -> None:

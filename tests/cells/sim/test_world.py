@@ -35,9 +35,9 @@ def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, ov
     world = build(overhead)
     first, second = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2])), Pose.of([0.4, 0, 0.3])
     body = world.add_object("duck", first, (1, 1, 1))
-    assert world.object_pose(body).rounded() == pytest.approx(first.rounded(), abs=1e-6)
+    assert world.object_pose(body).to_rounded_list() == pytest.approx(first.to_rounded_list(), abs=1e-6)
     world.place_object(body, second)
-    assert world.object_pose(body).rounded() == pytest.approx(second.rounded(), abs=1e-6)
+    assert world.object_pose(body).to_rounded_list() == pytest.approx(second.to_rounded_list(), abs=1e-6)
     world.remove_object(body)
     assert world.bodies == {}
 

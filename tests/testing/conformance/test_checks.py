@@ -34,13 +34,13 @@ def unraised(text: str) -> str:
 
 
 FAULTY: list[tuple[str, type[Skill], list[str]]] = [
-    ("documented", faulty.Undocumented, [
+    ("has_documentation", faulty.Undocumented, [
         'the docstring of Undocumented begins with "", which is no sentence. State in the first line what is '
         "true after success.",
         'Undocumented.gap has no doc. Write param(..., doc="what it is").',
         'Undocumented.target has no doc. Write port(..., doc="what it is").',
     ]),
-    ("defaults_allowed", faulty.BadDefaults, [
+    ("has_allowed_defaults", faulty.BadDefaults, [
         f"the default of BadDefaults.{problem}. Correct the default, or the limits." for problem in (
             "near must be at least 0.2 m, not 0.1",
             "far must be at most 0.2 m, not 0.3",
@@ -48,17 +48,17 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
             'gap must be a number, not the text "wide"',
         )
     ]),
-    ("reasons_declared", faulty.RaisesUndeclared, [
+    ("declares_reasons", faulty.RaisesUndeclared, [
         'faulty_skills.py:N fails with "no_bins", which RaisesUndeclared does not declare. '
         "Add it to reasons; there are: tired.",
     ]),
-    ("reasons_declared", faulty.TextForTuple, [
+    ("declares_reasons", faulty.TextForTuple, [
         'TextForTuple.reasons is the text "tired". Write a tuple: ("tired",).',
     ]),
-    ("resources_declared", faulty.TextForTuple, [
+    ("declares_resources", faulty.TextForTuple, [
         "TextForTuple uses 'arm'. Write a tuple of arm, tool, camera.",
     ]),
-    ("resources_declared", faulty.BadResources, [
+    ("declares_resources", faulty.BadResources, [
         "BadResources uses gripper. Write a tuple of arm, tool, camera.",
         'BadResources moves the arm but does not use it. Add "arm" to uses, or leave moves out.',
         'BadResources.tool_left has "dropped", which is no reason of the skill. Allowed: tired, halt.',
@@ -67,16 +67,16 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         unmade("follow"), unmade("follow"), unmade("cell.clock.sleep"), unmade("self._rest"), unmade("_wait"),
         unraised("self._tire"), unraised("self.failure"), unmade("follow"), unmade("cell.clock.sleep"),
     ]),
-    ("arranged", faulty.AlwaysFails, [
+    ("succeeds_somewhere", faulty.AlwaysFails, [
         f'AlwaysFails never succeeded; {EMPTY} it failed with "tired" (after 1 step). Arrange a stage on '
         f"which it succeeds: conformance(AlwaysFails, lambda stage: ...), {ARRANGE}",
     ]),
-    ("arranged", faulty.Shake, [
+    ("succeeds_somewhere", faulty.Shake, [
         'Shake never succeeded; with an item in the tool it failed with "blocked" (the motion would bring '
         "the held cube 0.030 m into the table, with the tool at (0.530, -0.110, 0.020) m). Arrange a stage "
         f"on which it succeeds: conformance(Shake, lambda stage: ...), {ARRANGE}",
     ]),
-    ("arranged", faulty.NeedsUnknown, [
+    ("succeeds_somewhere", faulty.NeedsUnknown, [
         'NeedsUnknown cannot be tried: no value can be generated for "plan" (dict) and "words" (a text). '
         f'Return it from a function in a test: '
         f'conformance(NeedsUnknown, lambda stage: {{"plan": ..., "words": ...}}), {ARRANGE}',
@@ -105,7 +105,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f"{EMPTY} WrongOutputs.targets is of the type list, not a list of Target. "
         "Set a value of this type, or change the declaration.",
     ]),
-    ("inputs_unchanged", faulty.ChangesInput, [
+    ("keeps_inputs", faulty.ChangesInput, [
         f"{EMPTY} it changed the value of self.targets. Other nodes read the same value later: "
         "work on a copy.",
     ]),
@@ -118,19 +118,19 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ("uses_only_what_it_declares", faulty.MovesUndeclared, [
         "MovesUndeclared calls cell.arm.start and does not declare that it moves. Add moves = True.",
     ]),
-    ("tool_left_as_declared", faulty.LetsGo, [
+    ("leaves_tool_as_declared", faulty.LetsGo, [
         "with an item in the tool it succeeded, and the tool is empty. It should hold something, by "
         f"tool_state. {TOOL}",
     ]),
-    ("tool_left_as_declared", faulty.GraspsInSecret, [
+    ("leaves_tool_as_declared", faulty.GraspsInSecret, [
         f"{EMPTY} it succeeded, and the tool holds an object that the ledger does not know. "
         "Call cell.ledger.record_grasp, or open the tool in finally.",
     ]),
-    ("tool_left_as_declared", faulty.HoldsOnWhenHalted, [
+    ("leaves_tool_as_declared", faulty.HoldsOnWhenHalted, [
         f"{EMPTY} it was halted at tick 1, and the tool holds something. It should be empty, as before, "
         f'because tool_left has no "halt". {TOOL}',
     ]),
-    ("arm_left_at_rest", faulty.RunsOnWhenHalted, [
+    ("leaves_arm_at_rest", faulty.RunsOnWhenHalted, [
         f"{EMPTY} it was halted at tick 25, and the arm still moves. {REST}",
     ]),
     ("halts_at_once", faulty.WaitsInFinally, [
@@ -173,14 +173,15 @@ def test_a_mistake_is_told(check: str, skill: type[Skill], problems: list[str]) 
 
 
 def test_every_check_has_a_skill_that_fails_it() -> None:
-    assert {check for check, _, _ in FAULTY} | {"imports_allowed"} == {rule.__name__ for rule in RULES}
+    tested = {check for check, _, _ in FAULTY} | {"imports_allowed_modules"}
+    assert tested == {rule.__name__ for rule in RULES}
 
 
 def test_the_guide_lists_every_check_with_its_rule() -> None:
     guide = (Path(__file__).parents[3] / "skills" / "README.md").read_text(encoding="utf-8")
     rows = [f"| `{check.name}` | {check.doc.rstrip('.')} |" for check in conformance(faulty.Pause)]
     assert re.findall(r"^\| `[a-z_]+` \| .* \|$", guide.partition("## Conformance")[2], re.M) == rows
-    assert str(conformance(faulty.Pause, name="Break")[0]) == "Break.documented"
+    assert str(conformance(faulty.Pause, name="Break")[0]) == "Break.has_documentation"
 
 
 @pytest.mark.parametrize(
@@ -218,18 +219,18 @@ def test_a_file_that_imports_another_clock_or_threads_is_found(statement: str, t
     finally:
         del sys.modules[path.stem]
     package = statement.split()[1].partition(".")[0]
-    assert check_of(module.Wave, "imports_allowed").run().problems == (
+    assert check_of(module.Wave, "imports_allowed_modules").run().problems == (
         f"waving.py:2 imports {package}. A skill takes the time from cell.clock and acts only through cell.",
     )
 
 
 def test_a_problem_is_raised_with_the_rule_and_without_a_stage_nothing_succeeds() -> None:
     with pytest.raises(ConformanceError) as raised:
-        check_of(faulty.AlwaysFails, "arranged")()
+        check_of(faulty.AlwaysFails, "succeeds_somewhere")()
     assert str(raised.value).splitlines()[0] == (
         "The skill can be tried, and succeeds in at least one situation. Violated:"
     )
-    check = check_of(faulty.NeedsUnknown, "arm_left_at_rest")
+    check = check_of(faulty.NeedsUnknown, "leaves_arm_at_rest")
     assert check.run().status == "not run"
     with pytest.raises(ConformanceError, match='no value can be generated for "plan"'):
         check()
@@ -245,7 +246,7 @@ def test_a_tick_that_does_not_come_back_is_broken_off_once(monkeypatch: pytest.M
         "A tick blocks the arm: yield in each loop that waits, and leave long computations to a detector."
     )
     assert told(checks["comes_to_an_end"]) == told(checks["halts_at_once"]) == [problem]
-    assert [checks[name].run().status for name in ("halts_at_once", "defaults_allowed")] == [
+    assert [checks[name].run().status for name in ("halts_at_once", "has_allowed_defaults")] == [
         "not run",
         "ok",
     ]

@@ -100,7 +100,7 @@ last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera over
             1 look, 0 failed attempts in all
 now         the arm is at rest, the tool is empty
 left to do  1: cube-1
-next        mend what is broken, in the code or in the cell: a fault is never tried again
+next        repair the code or the cell: a fault is never retried
 """
     )
 
