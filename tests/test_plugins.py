@@ -97,7 +97,8 @@ def test_what_cannot_be_loaded_is_named_with_place_and_file(
         ask()
     assert str(caught.value) == (
         f'the {kind} "wave" (hall_five.part:Wave) cannot be loaded: ModuleNotFoundError: '
-        f"No module named 'nowhere', in {file.parent}/hall_five/part.py:1; correct it, or take it out of {file}"
+        f"No module named 'nowhere', in {file.parent}/hall_five/part.py:1; "
+        f"correct it, or take it out of {file}"
     )
 
 

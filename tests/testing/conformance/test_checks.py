@@ -177,10 +177,7 @@ def test_every_check_has_a_skill_that_fails_it() -> None:
     assert tested == {rule.__name__ for rule in RULES}
 
 
-def test_the_guide_lists_every_check_with_its_rule() -> None:
-    guide = (Path(__file__).parents[3] / "skills" / "README.md").read_text(encoding="utf-8")
-    rows = [f"| `{check.name}` | {check.doc.rstrip('.')} |" for check in conformance(faulty.Pause)]
-    assert re.findall(r"^\| `[a-z_]+` \| .* \|$", guide.partition("## Conformance")[2], re.M) == rows
+def test_a_check_has_the_name_under_which_the_skill_is_installed() -> None:
     assert str(conformance(faulty.Pause, name="Break")[0]) == "Break.has_documentation"
 
 

@@ -112,7 +112,7 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
     chain = [link.why for link in story.chain if link.why]
     assert chain[0::2] == ["catches only Detect.unsure", "all 10 attempts failed: 10 x Detect.unavailable"]
     assert [unnumbered(each) for each in story.next] == [
-        "see to it that detector.embedded answers again",
+        "make sure that detector.embedded answers again",
         "to let the mission go on after Detect.unavailable: catch it in the try at "
         "missions/library/sorting.yaml:N, or allow more than 10 attempts at missions/library/sorting.yaml:N",
     ]
@@ -176,7 +176,7 @@ last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera over
 now         the arm is at rest, the tool holds cube-1
 left to do  1: cube-1
 next        take cube-1 out of the tool before another run
-next        see what is in the arm's way: link 5 met a wrench
+next        find what the arm collided with: link 5 met a wrench
 next        to let the mission go on after PutDown.blocked: catch it in the try at
             missions/library/sorting.yaml:N
 """
