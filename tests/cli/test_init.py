@@ -87,10 +87,10 @@ def test_everything_works_at_once_and_its_tests_find_a_broken_skill() -> None:
     tests = called("pytest", "-q", folder=hall)
     assert tests.returncode == 0, tests.stdout
     skill = hall / "hall" / "check_seal.py"
-    skill.write_text(skill.read_text().replace("bears < self.least", "bears > self.least"))
+    skill.write_text(skill.read_text().replace("force < self.min_force", "force > self.min_force"))
     tests = called("pytest", "-q", folder=hall)
     assert tests.returncode == 1
-    assert re.search(r"^FAILED .*::test_what_is_held_badly_is_let_go", tests.stdout, re.MULTILINE)
+    assert re.search(r"^FAILED .*::test_an_object_with_a_weak_seal_is_released", tests.stdout, re.MULTILINE)
 
 
 @pytest.mark.slow
