@@ -208,7 +208,7 @@ class Skill:
             setattr(self, name, value)
 
     def run(self, cell: Cell) -> Iterator[None] | None:
-        """Execute the skill: `yield` ends a control step, a return is success, a raised `failure` is failure."""
+        """Execute the skill: `yield` ends a control step, a return is success, raising is failure."""
         raise NotImplementedError
 
     @classmethod
