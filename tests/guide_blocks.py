@@ -1,6 +1,6 @@
-"""The guides as the tests read them: fenced blocks, files and tables.
+"""The guides as the tests read them: fenced blocks, and the files that they show.
 
-The author's guide, `missions/README.md`, marks what a reader sees anyway by comments above a block:
+The guides in `missions/` mark by comments above a block what a reader sees anyway:
 
 * `<!-- complete: NAME -->`: a part of a mission; what it does not show is as in the mission NAME.
 * `<!-- mistake -->`: `executive check` finds something in it.
@@ -21,8 +21,11 @@ from pathlib import Path
 import yaml
 
 ROOT = Path(__file__).parent.parent
-AUTHORS = "missions/README.md"
-GUIDES = ("README.md", AUTHORS, "skills/README.md")
+TUTORIAL = "missions/README.md"
+MISSION_GUIDES = (
+    TUTORIAL, "missions/running.md", "missions/editor.md", "missions/detectors.md", "missions/scenes.md"
+)  # fmt: skip
+GUIDES = ("README.md", *MISSION_GUIDES, "skills/README.md")
 
 _FENCED = re.compile(r"((?:^<!-- [^\n]* -->\n)*)^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _KEY = re.compile(r"^(\w+:)(.*?)(?=^\w|\Z)", re.MULTILINE | re.DOTALL)
@@ -45,7 +48,7 @@ class Block:
 
 @dataclass(frozen=True)
 class File:
-    """A file that the author's guide shows, with the keys put in that the block leaves out."""
+    """A file that a guide to missions shows, with the keys put in that the block leaves out."""
 
     name: str
     block: Block
@@ -66,9 +69,9 @@ def shown(language: str) -> list[Block]:
 
 
 def files() -> dict[str, File]:
-    """Return every file that the author's guide shows, by its name."""
+    """Return every file that the guides to missions show, by its name."""
     found: dict[str, File] = {}
-    for block in blocks(AUTHORS):
+    for block in (block for guide in MISSION_GUIDES for block in blocks(guide)):
         if block.language == "yaml":
             text = block.text
             for mark in block.marks:
@@ -83,29 +86,17 @@ def files() -> dict[str, File]:
 def transcripts() -> Iterator[tuple[str, list[str], str]]:
     """Yield where it stands, the words after `executive`, and what is printed, of every command shown."""
     names = {file.block.where: name for name, file in files().items()}
-    before = None
-    for block in blocks(AUTHORS):
-        if before is not None and before.language == "console":
-            prompt, program, *words = shlex.split(before.text)
-            assert (prompt, program, block.language) == ("$", "executive", "text"), before.where
-            yield before.where, words, block.text
-        elif before is not None and before.is_mistake:
-            assert block.language == "text", f"{before.where}: what check says is missing"
-            yield before.where, ["check", names[before.where]], block.text
-        before = block
-
-
-def rows(heading: str) -> dict[str, list[str]]:
-    """Return the rows of the tables below a heading of the author's guide, by their first cell."""
-    _, _, rest = read(AUTHORS).partition(f"{heading}\n")
-    section = re.split(r"^#", rest, maxsplit=1, flags=re.MULTILINE)[0]
-    lines = re.findall(r"^\| (.*) \|$", section, re.MULTILINE)
-    return {first: others for first, *others in (line.split(" | ") for line in lines)}
-
-
-def in_code(cell: str) -> list[str]:
-    """Return the words of a table's cell that are set as code."""
-    return re.findall(r"`([^`]+)`", cell)
+    for guide in MISSION_GUIDES:
+        before = None
+        for block in blocks(guide):
+            if before is not None and before.language == "console":
+                prompt, program, *words = shlex.split(before.text)
+                assert (prompt, program, block.language) == ("$", "executive", "text"), before.where
+                yield before.where, words, block.text
+            elif before is not None and before.is_mistake:
+                assert block.language == "text", f"{before.where}: what check says is missing"
+                yield before.where, ["check", names[before.where]], block.text
+            before = block
 
 
 def read(guide: str) -> str:

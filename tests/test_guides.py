@@ -12,41 +12,27 @@ import jsonschema
 import mission_reference
 import numpy as np
 import pytest
-import skill_reference
 from click.testing import CliRunner
-from guide_blocks import AUTHORS, GUIDES, ROOT, blocks, files, in_code, read, rows, shown, transcripts
+from guide_blocks import GUIDES, ROOT, TUTORIAL, blocks, files, read, shown, transcripts
 
-from executive.cell import protocols as protocols_module
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.scene_file import (
-    LightConfig,
-    SceneCameraConfig,
-    SceneConfig,
-    SceneObjectConfig,
-    SceneTableConfig,
-    UnknownConfig,
     load_scene,
 )
 from executive.cli.main import main
 from executive.events import Event
-from executive.mission.findings import CODES, MissionError
+from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission, load_mission
-from executive.mission.model import grammar
 from executive.mission.parse.cell_file import load_cell
-from executive.mission.parse.control import find_inner_keys
 from executive.mission.schema.files import mission_schema
 from executive.mission.source import Source
-from executive.mission.text.files import shipped_missions
 from executive.mission.text.yaml_text import parse_yaml, plain
 from executive.plugins import cell_kind, discover
 from executive.record.result import EXIT_CODES
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
-from executive.tree.node import ControlNode
 from executive.tree.registry import control_nodes
-from executive.tree.retry import Backoff
-from executive.tree.try_catch import Catch
 
 LONGEST = 300.0
 """Time on the run's clock within which every mission shown is done on the fake cell [s]."""
@@ -61,7 +47,7 @@ PYTHON = [pytest.param(block.text, id=block.where) for block in shown("python")]
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder to work in, with every file that the author's guide shows."""
+    """A folder to work in, with every file that the guides to missions show."""
     monkeypatch.chdir(tmp_path)
     for name, file in FILES.items():
         path = tmp_path / name
@@ -92,7 +78,7 @@ def assert_does_its_work(loaded: LoadedMission) -> None:
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_every_mission_of_the_authors_guide_does_its_work(name: str, folder: Path) -> None:
+def test_every_mission_of_the_mission_guides_does_its_work(name: str, folder: Path) -> None:
     assert_does_its_work(load_mission(name, discover(), kinds=cell_kind))
 
 
@@ -104,20 +90,20 @@ def test_the_mission_on_the_front_page_does_its_work(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_an_editor_marks_nothing_in_the_missions_of_the_authors_guide(name: str) -> None:
+def test_an_editor_marks_nothing_in_the_missions_of_the_mission_guides(name: str) -> None:
     root, _ = parse_yaml(Source(name, FILES[name].text))
     assert root is not None
     jsonschema.validate(plain(root), mission_schema(discover(), control_nodes()))
 
 
 @pytest.mark.parametrize("name", MISTAKES)
-def test_every_mistake_of_the_authors_guide_is_found(name: str, folder: Path) -> None:
+def test_every_mistake_of_the_mission_guides_is_found(name: str, folder: Path) -> None:
     with pytest.raises(MissionError):
         load_mission(name, discover(), kinds=cell_kind)
 
 
 @pytest.mark.parametrize(("words", "printed"), TRANSCRIPTS)
-def test_every_command_of_the_authors_guide_prints_what_is_shown(
+def test_every_command_of_the_mission_guides_prints_what_is_shown(
     words: list[str], printed: str, folder: Path
 ) -> None:
     assert lasting(CliRunner().invoke(main, words).output) == lasting(printed)
@@ -129,58 +115,30 @@ def lasting(printed: str) -> str:
     return re.sub(r"runs/\S+", "runs/...", printed).rstrip()
 
 
-def test_every_library_and_cell_of_the_authors_guide_is_used_by_a_mission_of_it() -> None:
+def test_every_library_and_cell_of_the_mission_guides_is_used_by_a_mission_of_it() -> None:
     missions = "".join(FILES[name].text for name in MISSIONS)
     assert [name for name in FILES if "/" in name and name not in missions] == SCENES
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_every_scene_of_the_authors_guide_fits_the_cell_of_its_missions(name: str, folder: Path) -> None:
+def test_every_scene_of_the_mission_guides_fits_the_cell_of_its_missions(name: str, folder: Path) -> None:
     scene = load_scene(Path(name), load_cell(ROOT / "missions" / "cells" / "overhead.yaml"))
     assert f"scenes/{scene.scene}.yaml" == name
-
-
-def test_the_authors_guide_names_every_section_and_key_of_a_scene() -> None:
-    documented = rows("### Change the world without the knowledge of the mission")
-    sections = list(SceneConfig.model_fields)
-    assert ["section", *(f"`{name}`" for name in sections if name != "scene")] == list(documented)
-    models = {"light": LightConfig, "table": SceneTableConfig, "objects": SceneObjectConfig}
-    models |= {"unknown": UnknownConfig, "camera": SceneCameraConfig}
-    for name, model in models.items():
-        assert set(model.model_fields) <= set(in_code(documented[f"`{name}`"][0])), name
-    assert in_code(rows("### Keys")["a scene"][0]) == sections
-
-
-def test_the_authors_guide_tells_every_code_of_a_finding_and_no_other() -> None:
-    told = [code for cell in rows("## 11. What `executive check` finds") for code in in_code(cell)]
-    assert len(told) == len(set(told))
-    assert set(told) == set(CODES)
-
-
-def test_the_authors_guide_names_every_other_key_of_a_file() -> None:
-    mappings = {
-        "a mission": grammar.MISSION,
-        "a library": grammar.LIBRARY,
-        "a subtree": grammar.SUBTREE,
-        "a param": grammar.PARAM,
-        "an item of `catch`": Catch.keys,
-        "`backoff`": Backoff.keys,
-    }
-    told = rows("### Keys")
-    assert {name: in_code(told[name][0]) for name in mappings} == {
-        name: list(keys) for name, keys in mappings.items()
-    }
-
-
-def test_the_authors_guide_names_every_shipped_mission_and_exit_code() -> None:
-    assert [word for cell in rows("### Shipped missions") for word in in_code(cell)] == shipped_missions()
-    told = read(AUTHORS).partition("### Exit codes\n")[2].partition("###")[0]
-    assert {int(code) for code in re.findall(r"\d+", told)} == {2, *EXIT_CODES.values()}
 
 
 def test_the_reference_of_missions_is_that_of_the_code() -> None:
     written = mission_reference.PATH.read_text(encoding="utf-8")
     assert written == mission_reference.generate(), f"write it again: {mission_reference.COMMAND}"
+
+
+def test_the_reference_names_every_exit_code() -> None:
+    exit_codes = read("missions/reference.md").partition("## Exit codes\n")[2]
+    assert {int(code) for code in re.findall(r"\d+", exit_codes)} == {2, *EXIT_CODES.values()}
+
+
+@pytest.mark.parametrize(("guide", "limit"), [("README.md", 8_000), (TUTORIAL, 20_000)])
+def test_front_page_and_tutorial_stay_short(guide: str, limit: int) -> None:
+    assert len(read(guide).encode()) <= limit
 
 
 def module_of(text: str, path: Path) -> ModuleType:
@@ -236,9 +194,17 @@ def test_the_skill_on_the_front_page_declares_what_the_shipped_one_does(tmp_path
 def test_every_file_and_folder_that_a_guide_links_to_exists() -> None:
     for guide in (*GUIDES, "skills/reference.md", "executive/README.md", "CONTRIBUTING.md"):
         folder = (ROOT / guide).parent
-        links = re.findall(r"\]\(([^)#]+)\)", read(guide))
+        links = re.findall(r"\]\(([^)#]+)[)#]", read(guide))
         missing = [link for link in links if "://" not in link and not (folder / link).exists()]
         assert not [link for link in missing if not link.endswith(".png")], guide
+
+
+def test_every_heading_that_a_guide_links_to_exists() -> None:
+    for guide in (*GUIDES, "missions/reference.md", "executive/README.md", "CONTRIBUTING.md"):
+        for path, anchor in re.findall(r"\]\(([^)#:]*)#([^)]+)\)", read(guide)):
+            target = (ROOT / guide).parent / path if path else ROOT / guide
+            headings = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
+            assert anchor in map(mission_reference.slug, headings), f"{guide}: {path}#{anchor}"
 
 
 @pytest.mark.parametrize("guide", ["executive/README.md", "CONTRIBUTING.md"])
@@ -247,24 +213,3 @@ def test_every_file_that_a_guide_to_the_code_names_exists(guide: str) -> None:
     roots = (ROOT, ROOT / "executive", ROOT / "executive/cells")
     assert named
     assert not {name for name in named if not any((root / name).exists() for root in roots)}
-
-
-def test_the_authors_guide_names_every_control_node_with_its_keys() -> None:
-    told = rows("### Control nodes")
-    assert {cell.strip("`"): set(in_code(keys)) for cell, (keys, *_) in told.items() if "`" in cell} == {
-        **{word: {*find_inner_keys(kind), *partners(kind)} for word, kind in control_nodes().items()},
-        grammar.USE: set(grammar.USE_SIBLINGS),
-    }
-
-
-def partners(kind: type[ControlNode]) -> list[str]:
-    """Return the keys that stand beside the word of a control node."""
-    return [name for name, key in kind.keys.items() if key.is_sibling]
-
-
-def test_the_reference_of_skills_is_what_its_generator_writes() -> None:
-    written = skill_reference.PATH.read_text(encoding="utf-8")
-    assert written == skill_reference.generate(), f"write it again: {skill_reference.COMMAND}"
-    members = vars(protocols_module).items()
-    protocols = {name for name, kind in members if getattr(kind, "_is_protocol", False)} - {"Protocol"}
-    assert protocols <= set(re.findall(r"^### (\w+):", written, re.MULTILINE))
