@@ -81,6 +81,14 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("executive.manipulation.drops", "manipulation/drops.py", ""),
         ("executive.perception.evidence", "perception/evidence.py", ""),
     ],
+    "Test kit: fake cell": [
+        ("fake = FakeCell()", "cells/fake/cell.py", "FakeCell"),
+        ("fake.world", "cells/fake/world.py", "FakeWorld"),
+        ("fake.arm", "cells/fake/arm.py", "FakeArm"),
+        ("fake.tool", "cells/fake/arm.py", "FakeTool"),
+        ("fake.camera", "cells/fake/camera.py", "FakeCamera"),
+        ("fake.detector", "cells/fake/camera.py", "FakeDetector"),
+    ],
     "Test kit: run a skill or a mission": [
         ("executive.testing.run_skill", "testing/run_skill.py", ""),
         ("result = run_skill(...)", "testing/run_skill.py", "SkillResult"),
@@ -107,6 +115,9 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
 MAX_EXAMPLE = 90
 """Maximum number of characters of an example."""
 
+EXAMPLE_FOLDERS = ("cell/", "manipulation/", "perception/", "geometry.py", "skill.py")
+"""Folders and files of `executive/` whose members get examples."""
+
 Row = tuple[str, str, str]
 """Code of a member, its meaning, and an example or ""."""
 
@@ -128,8 +139,12 @@ def _format_table(expression: str, file: str, name: str) -> str:
         title = f"### {name}: `{expression}`"
     text, entries = _parse_docstring(owner)
     variable = expression.partition(" = ")[0].rpartition(".")[2] if name else ""
-    has_examples = not file.startswith("testing/")
-    rows = list(_list_rows(owner, variable, dict(entries.get("Attributes", ())), has_examples))
+    attributes = dict(entries.get("Attributes", ()))
+    if file.startswith("cells/") and name != "FakeWorld":
+        # The methods are those of the protocols.
+        rows = [(_format_code(attribute), _escape(meaning), "") for attribute, meaning in attributes.items()]
+    else:
+        rows = list(_list_rows(owner, variable, attributes, has_examples=file.startswith(EXAMPLE_FOLDERS)))
     columns = ("member", "meaning", "example")[: 3 if any(example for *_, example in rows) else 2]
     lines = [columns, ("---",) * len(columns), *(row[: len(columns)] for row in rows)]
     return f"{title}\n\n{text}\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)

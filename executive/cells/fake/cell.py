@@ -60,8 +60,13 @@ class FakeCell(CellWithoutHardware):
         options: Options of the run; by default with an operator without requests.
 
     Attributes:
-        world, arm, tool, camera, detectors, ledger: The parts of the cell, for tests.
+        world: Objects and bins.
+        arm: The fake arm.
+        tool: The fake tool.
+        camera: The fake camera.
+        detectors: The fake detectors by name.
         detector: The first detector.
+        ledger: The ledger, as in every cell.
 
     Raises:
         InputError: The workspace has no room for the objects, or `options` request a window.
