@@ -59,7 +59,8 @@ class Param:
         type: Python type of the value.
         unit: SI unit, or "".
         default: Value if the mission sets none; `...` if the mission must set one.
-        ge, le: Inclusive bounds, or None.
+        ge: Smallest allowed value, or None.
+        le: Largest allowed value, or None.
         choices: Allowed values, or None for any value.
         refers: Kind of thing that the value names (`bin`, `detector`, `pose`, `class`), or "".
         doc: Description of the param.

@@ -24,6 +24,7 @@ Generated from the docstrings of the protocols by `{COMMAND}`. The guide is [REA
 * Positions are in the world frame: z points up, and the top of the table is at z = 0.
 * `Array` is a NumPy array of floats, and `Item` the name of an item (`cube-2`).
 * `Box` contains the left, top, right and bottom side of a box in an image [pixel].
+* `Seconds`, `Metres` and `MetresPerSecond` are floats with a unit; so is `Annotated[float, "N"]`.
 * Exceptions are defined in `executive/errors.py`, `SkillFailed` in `executive/skill.py`.
 * The examples are taken from the shipped skills and from the functions that skills share.
 * All times and effects of faults are imported from `executive.testing.faults`.
@@ -51,6 +52,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("detector = cell.detectors[name]", "cell/protocols.py", "Detector"),
         ("request = detector.request(frame, view)", "cell/protocols.py", "Request"),
         ("answer = request.result()", "cell/detection.py", "Answer"),
+        ("answer.error_rates", "cell/error_rates.py", "ErrorRates"),
         ("detection = answer.found[0]", "cell/detection.py", "Detection"),
         ("detections = Detections(...)", "cell/detection.py", "Detections"),
     ],
@@ -218,11 +220,13 @@ def _find_use(node: ast.AST, text: str, name: str, variable: str) -> str:
     for child in ast.iter_child_nodes(node):
         if found := _find_use(child, text, name, variable):
             piece = _join_source(node, text)
-            is_call = isinstance(node, ast.Call) and node.func is child
+            is_call = (
+                isinstance(node, ast.Call) and node.func is child
+            )  # The arguments belong to the example.
             return piece if found in piece and (is_call or len(piece) <= MAX_EXAMPLE) else found
     match node:
-        case ast.Name(id=called) if not variable and called == name:
-            return name
+        case ast.Call(func=ast.Name(id=called)) if not variable and called == name:
+            return _join_source(node, text)
         case ast.Attribute(attr=attribute, value=ast.Name(id=owner) | ast.Attribute(attr=owner)):
             return _join_source(node, text) if (owner, attribute) == (variable, name) else ""
     return ""

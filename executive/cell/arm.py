@@ -26,7 +26,7 @@ class Goal:
 
     Attributes:
         position: Position of the tool centre point `(x, y, z)` [m].
-        yaw: Rotation about the vertical [rad], or None if any rotation will do.
+        yaw: Rotation about the vertical [rad], or None for any rotation.
         guarded: Length of the guarded last part, straight down [m]; 0 for none.
         speed: Largest tool speed of the guarded part [m/s].
     """

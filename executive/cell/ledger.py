@@ -46,7 +46,7 @@ class Ledger(Protocol):
         """Return the item in the tool, or None."""
 
     def is_current(self, frame: Frame) -> bool:
-        """Return True if no change after the capture of a frame may have moved all objects."""
+        """Return True if no change after the capture of a frame has put all positions in doubt."""
 
     def is_fresh(self, target: Target) -> bool:
         """Return True if no change after the last detection of a target may have moved it."""
@@ -115,13 +115,15 @@ class Ledger(Protocol):
         """Record that the tool may have moved any item that is not in a bin."""
 
     def mark_unseen_as_dropped(self) -> None:
-        """Search every item that no look has shown since `lose_track`, on the table and in the bins.
+        """Record as dropped every item that no look has shown since `lose_track`.
 
-        An item that is not found is rejected at the end of the run, because its place is unknown.
+        Looks search for the item on the table and in the bins. An item that is not found is rejected at the
+        end of the run, because its place is unknown.
         """
 
     def record_bin_contents(self) -> None:
         """Record an item for each object that most full looks since `lose_track` have shown in a bin.
 
-        Objects that the ledger knows to be in the bin do not count. The others become searched or new items.
+        Objects that the ledger knows to be in the bin do not count. Each other object is assigned to a
+        dropped item, or becomes a new item.
         """

@@ -150,7 +150,7 @@ class Operator(Protocol):
 class LeastTimes(Protocol):
     """Lower bounds of the times of actions in a cell [s].
 
-    An action with a shorter timeout fails for certain, whatever path the arm takes.
+    An action with a shorter timeout always fails.
     """
 
     @property
