@@ -13,7 +13,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from typing import TypeVar
 
 from executive.processes import Workers, kill_workers
-from executive.run.signals import SIGNALS, handle_signals
+from executive.run.signals import HALT_SIGNALS, handle_signals
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -52,7 +52,7 @@ def run_jobs(
     running: dict[Future[R], int] = {}
     pool, is_dead, is_halted, signalled = Workers(workers), False, False, threading.Event()
     try:
-        with handle_signals(SIGNALS, lambda *_: signalled.set()):
+        with handle_signals(HALT_SIGNALS, lambda *_: signalled.set()):
             while running or (waiting and not is_halted):
                 # No job waits in the pool, from which it could not be removed.
                 while waiting and len(running) < workers and not (is_dead or is_halted or signalled.is_set()):

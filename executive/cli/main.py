@@ -17,7 +17,7 @@ import click
 
 from executive.cli.streams import tolerant_streams
 from executive.errors import ExecutiveError, shorten_quotations
-from executive.run.signals import TERMINATION, handle_signals
+from executive.run.signals import TERMINATION_SIGNALS, handle_signals
 
 PATH_ERRORS = (
     errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
@@ -72,7 +72,7 @@ class Executive(click.Group):
         args = list(sys.argv[1:] if args is None else args)
         with tolerant_streams():
             try:
-                with handle_signals(TERMINATION, signal.default_int_handler):
+                with handle_signals(TERMINATION_SIGNALS, signal.default_int_handler):
                     code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
             except (Exception, KeyboardInterrupt) as error:
                 code = _show_error(error, debug="--debug" in args)

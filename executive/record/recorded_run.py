@@ -210,12 +210,12 @@ class Recording:
                 if self.remark:
                     view.note(self.remark)
             for observer in observers:
-                run.observe(observer)
+                run.add_observer(observer)
             for event in self.past:
                 for observer in observers:
                     observer(event)
-            run.record(self.recorder)
-            ended = run.execute(), run.audit()
+            run.add_recorder(self.recorder)
+            ended = run.execute(), run.count_ground_truth()
             completed = True
         finally:
             with contextlib.ExitStack() as closing:

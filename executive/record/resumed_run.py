@@ -94,11 +94,11 @@ def resume_run(
     with closing(run):
         if record.paused:
             run.control.pause()
-        replayed = run.replayed.log
+        replayed = run.replayed_cell.log
         recorder.remember(replayed.events)
         past = [timed for timed in replayed.events if isinstance(timed.event, NOT_REPEATED)]
         recording = Recording(
-            run, loaded, skills, directory, recorder, record.views, past, _describe_gap(run.replayed)
+            run, loaded, skills, directory, recorder, record.views, past, _describe_gap(run.replayed_cell)
         )
         return recording.execute(seed, began)
 

@@ -45,13 +45,13 @@ class Interruption:
         complete_steps: Number of control steps before the interruption that remain valid.
         last_action: Last action of the tool before the interruption, `open` or `close`; "" if there was none;
             `UNKNOWN_ACTION` if arm or tool did more than the journal knows.
-        reopens: True if the run had ended as INCOMPLETE, so that the tree starts again.
+        restarts_tree: True if the run had ended as INCOMPLETE, so that the tree starts again.
         resumed_at: Control step at which the run was resumed.
     """
 
     complete_steps: int
     last_action: str
-    reopens: bool
+    restarts_tree: bool
     resumed_at: int
 
 

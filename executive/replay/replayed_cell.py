@@ -68,10 +68,10 @@ class ReplayedCell(CellWrapper):
         return self.last is None and self.log.is_over(self._steps)
 
     @property
-    def is_reopened(self) -> bool:
+    def is_tree_restarted(self) -> bool:
         """True if the recorded run ended in this control step as INCOMPLETE and was resumed."""
         next_interruption = None if self.is_live else self._find_interruption(self._steps + 1)
-        return next_interruption is not None and next_interruption.reopens
+        return next_interruption is not None and next_interruption.restarts_tree
 
     def resume(self) -> None:
         """Continue after the interruption; after the last interruption, on the inner cell.
@@ -88,7 +88,7 @@ class ReplayedCell(CellWrapper):
         self.is_live = True
 
     @contextmanager
-    def mute(self) -> Iterator[None]:
+    def suppress_commands(self) -> Iterator[None]:
         """Answer with the last recorded answers in the `with` block; commands have no effect there."""
         is_live, self.is_live = self.is_live, False
         try:

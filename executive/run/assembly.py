@@ -1,4 +1,4 @@
-"""Assembly of a run: work cell, operator, tree and events of a loaded mission."""
+"""Assembly of the runs of a loaded mission: new, resumed and replayed runs."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from executive.mission.load import LoadedMission
 from executive.plugins import cell_kind
 from executive.replay.input_log import InputLog, Interruption
 from executive.replay.replayed_cell import ReplayedCell
+from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.operator import ScriptedOperator, TerminalOperator
-from executive.run.planning_ahead import PlanningAhead
 from executive.run.resume import ResumedRun
 from executive.run.run import Run
 from executive.run.run_context import RunContext
 from executive.run.run_control import RunControl
-from executive.run.versions import versions
+from executive.run.versions import list_versions
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard
 
@@ -32,14 +32,14 @@ class RunOptions:
 
     Attributes:
         seed: Seed of all random numbers.
-        requests: Answers of the operator; None: a person answers at the terminal or in a view.
+        requests: Requests of the operator; None: a person gives requests at the terminal or in a view.
         keyboard: True if a person can type at the terminal.
         gui: True to show the simulated world in a window.
         realtime: True to pace the run by the wall clock.
-        kind: Kind of the work cell; None: the installed kind that the cell file names.
+        kind: Constructor of the work cell; None: the installed kind that the cell file names.
         substitutes: Skills that replace the skills of nodes, by a pattern of the paths of the nodes
             (`*/Grasp`).
-        scene: File that changes the world of a simulated cell; None: as the cell file declares it.
+        scene: Scene file, which changes the world of a simulated cell; None: the world of the cell file.
     """
 
     seed: int
@@ -58,20 +58,20 @@ def assemble(
     options: RunOptions,
     observers: Sequence[Observer] = (),
 ) -> Run:
-    """Return a run of a mission from its start.
+    """Return a new run of a mission.
 
     Args:
         loaded: The mission and its cell.
         skills: Installed skills by name.
         options: Options of the run.
-        observers: Called with every event, in order.
+        observers: Observers of the events, in the order of their calls.
 
     Raises:
-        InputError: The cell is of a kind that is not installed, or a request names no class.
+        InputError: The kind of the cell is not installed, or a request is not a class of the mission.
     """
-    parts = _Parts(loaded, skills, options, observers)
-    workcell = parts.build_cell()
-    parts.context.connect(workcell, PlanningAhead(workcell.cell))
+    builder = _RunBuilder(loaded, skills, options, observers)
+    workcell = builder.build_cell()
+    builder.context.connect(workcell, LookaheadPlanner(workcell.cell))
     start = RunStarted(
         loaded.mission.name,
         str(loaded.path),
@@ -81,11 +81,11 @@ def assemble(
         options.requests,
         str(loaded.cell_path.parent.resolve()),
         workcell.cell.clock.step,
-        dict(versions()),
+        dict(list_versions()),
     )
-    root = parts.build_tree()
+    root = builder.build_tree()
     name = loaded.mission.name
-    return Run(parts.context, root, parts.control, name, start=start, realtime=options.realtime)
+    return Run(builder.context, root, builder.control, name, start=start, realtime=options.realtime)
 
 
 def assemble_resumed(
@@ -93,30 +93,30 @@ def assemble_resumed(
     skills: Mapping[str, type[Skill]],
     options: RunOptions,
     log: InputLog,
-    world: Path,
+    world_log: Path,
     *,
     is_complete: bool = True,
     has_ended: bool = False,
 ) -> ResumedRun:
-    """Return a run that replays a recorded run on its rebuilt cell and, if it was interrupted, continues.
+    """Return a run that replays a recorded run and, if the run was interrupted, continues on its cell.
 
     Args:
         loaded: The mission and its cell.
         skills: Installed skills by name.
         options: Options of the interrupted run.
         log: The recorded inputs.
-        world: File from which the cell rebuilds its world.
+        world_log: File from which the cell rebuilds its world.
         is_complete: True if the log holds all events of its last control step.
-        has_ended: True if the run is not continued.
+        has_ended: True if the recorded run had ended, so that it is only replayed.
 
     Raises:
-        InputError: The cell is of a kind that is not installed, or its world cannot be rebuilt.
+        InputError: The kind of the cell is not installed, or the world of the cell cannot be rebuilt.
     """
-    parts = _Parts(loaded, skills, options)
+    builder = _RunBuilder(loaded, skills, options)
     frames, pose_changes = (log.count_answers(f"camera.{name}") for name in ("frame", "next_pose"))
-    inner = parts.build_cell(ResumePoint(world, frames, pose_changes), log.count_events(RequestGiven))
+    inner = builder.build_cell(ResumePoint(world_log, frames, pose_changes), log.count_events(RequestGiven))
     last = log.find_interruption(inner.steps, inner.last_command, is_complete=is_complete)
-    return parts.build_resumed_run(inner, log, None if has_ended else last)
+    return builder.build_resumed_run(inner, log, None if has_ended else last)
 
 
 def assemble_replay(
@@ -126,17 +126,17 @@ def assemble_replay(
     seed: int,
     observers: Sequence[Observer] = (),
 ) -> ResumedRun:
-    """Return a run that only replays a recorded run, without a cell."""
+    """Return a run that replays a recorded run without hardware or simulation."""
     options = RunOptions(seed, requests=(), kind=CellWithoutHardware)
-    parts = _Parts(loaded, skills, options, observers)
-    return parts.build_resumed_run(parts.build_cell(), log)
+    builder = _RunBuilder(loaded, skills, options, observers)
+    return builder.build_resumed_run(builder.build_cell(), log)
 
 
-class _Parts:
-    """Builder of the parts of a run.
+class _RunBuilder:
+    """Builder of the builder of a run.
 
     Attributes:
-        context: Cell and events of the run; it is connected to the cell before the tree is built.
+        context: Recorded cell and events of the run; `connect` must precede `build_tree`.
         control: Stops, pauses and steps the run.
     """
 
@@ -151,19 +151,19 @@ class _Parts:
         self.context = RunContext(observers)
         self.control = RunControl()
 
-    def build_cell(self, resume: ResumePoint | None = None, served_requests: int = 0) -> Workcell:
+    def build_cell(self, resume: ResumePoint | None = None, request_count: int = 0) -> Workcell:
         """Return the work cell of the run.
 
         Args:
             resume: State in which an interrupted run left the cell; None for a new run.
-            served_requests: Number of requests that the operator of the interrupted run had given.
+            request_count: Number of requests that the operator gave before the interruption.
         """
         loaded, options, emit = self._loaded, self._options, self.context.emit
         operator: Operator
         if options.requests is None:
             operator = TerminalOperator(emit, self.control, keyboard=options.keyboard)
         else:
-            operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, served_requests)
+            operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, request_count)
         cell_options = CellOptions(
             operator, loaded.cell_path.parent, options.gui, resume=resume, scene=options.scene
         )
@@ -173,15 +173,15 @@ class _Parts:
         )
 
     def build_tree(self) -> TreeNode:
-        """Return the tree."""
+        """Return the behaviour tree of the mission on the cell of `context`."""
         cell, emit = self.context.cell, self.context.emit
         return build(self._loaded, self._skills, cell, Blackboard(), emit, self._options.substitutes)
 
     def build_resumed_run(
         self, inner: Workcell, log: InputLog, last: Interruption | None = None
     ) -> ResumedRun:
-        """Return a run that replays a log, and continues on the cell `inner` after a `last` interruption."""
-        replayed = ReplayedCell(inner, log, last)
-        self.context.connect(replayed)
+        """Return a run that replays a log and continues on `inner` after the interruption `last`."""
+        replayed_cell = ReplayedCell(inner, log, last)
+        self.context.connect(replayed_cell)
         root, name, realtime = self.build_tree(), self._loaded.mission.name, self._options.realtime
-        return ResumedRun(self.context, replayed, root, self.control, name, realtime=realtime)
+        return ResumedRun(self.context, replayed_cell, root, self.control, name, realtime=realtime)

@@ -1,4 +1,4 @@
-"""End of a run: its status, and the problems found at its end."""
+"""End of a run: its status, the check of its items, and problems that occur at the end."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from executive.tree.failure import Failure
 
 @dataclass(frozen=True)
 class LoopEnd:
-    """End of the tick loop; see `RunEnded`.
+    """End of the tick loop of a run.
 
     Attributes:
+        status, reason, message, node: As in `RunEnded`.
         traceback: Traceback of the exception that caused a fault, or "".
     """
 
@@ -27,18 +28,18 @@ class LoopEnd:
 
 
 HALTED = LoopEnd("HALTED", "halted", "halted by the user")
-"""End of a run that a person halted."""
+"""End of a tick loop that was halted by a person or by a signal."""
 
 
-def end_of_tree(failure: Failure | None) -> LoopEnd:
-    """Return the end of a run whose tree failed, or succeeded (None), before the check of the items."""
+def to_loop_end(failure: Failure | None) -> LoopEnd:
+    """Return the end of the tick loop for the failure of the tree, or for its success (None)."""
     if failure is None:
         return LoopEnd("SUCCESS")
     return LoopEnd("FAILURE", str(failure), failure.message, failure.path)
 
 
-def collect_problems(action: Callable[[], None]) -> list[str]:
-    """Call one part of the end of a run, and return its exception as text, so that the other parts follow."""
+def catch_problems(action: Callable[[], None]) -> list[str]:
+    """Call `action`, and return the message of its exception in a list, which is empty without exception."""
     try:
         action()
     except Exception as error:
@@ -46,8 +47,8 @@ def collect_problems(action: Callable[[], None]) -> list[str]:
     return []
 
 
-def judge_items(accounts: Accounts) -> LoopEnd:
-    """Return the end of a run whose tree succeeded; lost or rejected items change its status."""
+def check_items(accounts: Accounts) -> LoopEnd:
+    """Return the end of a run whose tree succeeded: FAILURE if items were lost, INCOMPLETE if rejected."""
     items = accounts.summaries()
     lost = [item.item for item in items if item.state == "lost"]
     if lost:
@@ -60,16 +61,16 @@ def judge_items(accounts: Accounts) -> LoopEnd:
     return LoopEnd("SUCCESS")
 
 
-def close_accounts(accounts: Accounts, *, completed: bool) -> None:
-    """Let the ledger decide the final state of each item, and check the balance.
+def finalize_items(accounts: Accounts, *, completed: bool) -> None:
+    """Let the ledger set the final state of each item, and check the sum of the counts.
 
     Raises:
-        Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost ones.
+        Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost items.
     """
     accounts.close(completed=completed)
     counts = accounts.count_states()
     if not is_balanced(counts):
-        listed = ", ".join(f"{number} {state}" for state, number in counts.items())
+        listed = ", ".join(f"{count} {state}" for state, count in counts.items())
         raise Fault(
-            f"the books do not balance: {listed}; seen must be what was placed, rejected, skipped and lost"
+            f"the item counts are inconsistent: {listed}; seen must be placed + rejected + skipped + lost"
         )

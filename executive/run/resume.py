@@ -1,4 +1,4 @@
-"""Resumption of an interrupted run: its recorded inputs are replayed, then the real cell takes over."""
+"""Resumption of an interrupted run: replay of its recorded inputs, then execution on the real cell."""
 
 from __future__ import annotations
 
@@ -15,38 +15,38 @@ from executive.events import Observer, RunEnded, RunResumed
 from executive.mission.build import TreeNode
 from executive.replay.input_log import UNKNOWN_ACTION, Interruption
 from executive.replay.replayed_cell import ReplayedCell
-from executive.run.planning_ahead import PlanningAhead
+from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.run import Run
-from executive.run.run_context import RunContext, come_to_rest
+from executive.run.run_context import RunContext, brake_arm
 from executive.run.run_control import RunControl
 from executive.run.scene_recovery import recover_scene
-from executive.run.versions import versions
+from executive.run.versions import list_versions
 from executive.tree.halting import halt
 from executive.tree.skill_leaf import SkillLeaf
 
 
 class ResumedRun(Run):
-    """Run on a cell that replays an interrupted run, and may continue on the real cell.
+    """Run that replays an interrupted run, and then may continue on the real cell.
 
-    At each recorded interruption, the run repeats the actions of the earlier resumption. Observers get all
-    events; recorders get only the events after the real cell has taken over.
+    At each earlier interruption, the run repeats the actions of the earlier resumption. Observers get the
+    events of the replay and of the real cell; recorders get only the events of the real cell.
 
     Args:
         context: Cell and events of the run.
-        replayed: Work cell of `context`, which replays the recorded run.
+        replayed_cell: Work cell of `context`, which replays the recorded run.
         root: The tree.
         control: Stops, pauses and steps the run.
         mission: Name of the mission.
-        realtime: True to pace the run by the wall clock after the real cell has taken over.
+        realtime: True to pace the run on the real cell by the wall clock.
 
     Attributes:
-        replayed: Work cell that replays the recorded run.
+        replayed_cell: Work cell that replays the recorded run.
     """
 
     def __init__(
         self,
         context: RunContext,
-        replayed: ReplayedCell,
+        replayed_cell: ReplayedCell,
         root: TreeNode,
         control: RunControl,
         mission: str,
@@ -54,96 +54,96 @@ class ResumedRun(Run):
         realtime: bool = False,
     ) -> None:
         super().__init__(context, root, control, mission)
-        self.replayed = replayed
+        self.replayed_cell = replayed_cell
         self._paces_live_part = realtime
         self._recorders: list[Observer] = []
         self._is_scene_known = True
-        self._planner = PlanningAhead(replayed.inner.cell)
-        context.observe(self._planner.observe)
-        control.between_ticks(self._follow_record)
+        self._planner = LookaheadPlanner(replayed_cell.inner.cell)
+        context.add_observer(self._planner.on_event)
+        control.call_between_ticks(self._follow_record)
 
-    def record(self, recorder: Observer) -> None:
-        """Call `recorder` with every event after the real cell has taken over."""
+    def add_recorder(self, recorder: Observer) -> None:
+        """Call `recorder` with every event of the real cell, before the observers."""
         self._recorders.append(recorder)
 
     def _execute_tree(self) -> RunEnded:
-        """Execute the tree, again after each recorded resumption of an INCOMPLETE end; return its end."""
+        """Execute the tree, and again if it ended as INCOMPLETE and was then resumed; return the last end."""
         outcome = super()._execute_tree()
-        while outcome.status == "INCOMPLETE" and self.replayed.is_reopened:
+        while outcome.status == "INCOMPLETE" and self.replayed_cell.is_tree_restarted:
             self._context.advance()
             outcome = super()._execute_tree()
         return outcome
 
     def _follow_record(self) -> None:
-        """Stop or resume in the same control step as the recorded run; called between two ticks."""
-        replayed = self.replayed
+        """Stop or resume the run in the same control step as the recorded run; called between two ticks."""
+        replayed = self.replayed_cell
         while not replayed.is_live and not replayed.is_over and replayed.interruption is not None:
             self._resume(replayed.interruption)
         if not replayed.is_live and replayed.is_over:
             self.control.stop()
 
     def _resume(self, interruption: Interruption) -> None:
-        """Continue after an interruption, during which nothing observed the cell.
+        """Continue after an interruption: restart the skills, brake the arm, and update the ledger.
 
         Raises:
             Fault: The arm did not come to rest.
         """
-        context, replayed = self._context, self.replayed
+        context, replayed = self._context, self.replayed_cell
         replayed.resume()
         if replayed.is_live:
-            # The braking is not recorded: after an interruption, the run is resumed at the same control step.
-            require_rest(lambda: come_to_rest(replayed.inner.cell, replayed.inner.advance))
+            # No event is recorded here: if the braking is interrupted, the run resumes at the same step.
+            brake_to_rest(lambda: brake_arm(replayed.inner.cell, replayed.inner.advance))
             for recorder in self._recorders:
-                context.observe(recorder, first=True)
+                context.add_observer(recorder, first=True)
             context.planner, self._realtime = self._planner, self._paces_live_part
         context.begin_step(replayed.steps)
         if replayed.is_live:
             self._wall_start = time.monotonic() - context.now
-            ticked, intent = interruption.complete_steps, interruption.last_action
-            context.emit(RunResumed(ticked, intent, dict(versions())))
+            step_count, action = interruption.complete_steps, interruption.last_action
+            context.emit(RunResumed(step_count, action, dict(list_versions())))
         self._is_scene_known &= interruption.last_action != UNKNOWN_ACTION
         if self._is_scene_known:
             restart_skills(self.root)
         else:
-            # The arm may be elsewhere than the journal says: a halted skill must not open the tool there.
-            with replayed.mute(), contextlib.suppress(Fault):
+            # A halted skill must not open the tool, because the journal may lack the last motions of the arm.
+            with replayed.suppress_commands(), contextlib.suppress(Fault):
                 restart_skills(self.root)
-        require_rest(context.come_to_rest)
-        if interruption.reopens:
+        brake_to_rest(context.brake_arm)
+        if interruption.restarts_tree:
             replayed.accounts.reopen()
         if self._is_scene_known:
-            reconcile(context.cell, interruption.last_action)
+            reconcile_ledger(context.cell, interruption.last_action)
         else:
             self._recover_scene()
 
     def _recover_scene(self) -> None:
-        """Observe the scene; the scene stays unknown if the run is interrupted or stopped meanwhile."""
+        """Observe the scene; the scene stays unknown if an interruption or a stop ends the recovery early."""
         for _ in recover_scene(self._context.cell):
             self._context.advance()
-            replayed = self.replayed
+            replayed = self.replayed_cell
             is_over = not replayed.is_live and (replayed.is_over or replayed.interruption is not None)
-            if self.control.stopped or is_over:
+            if self.control.is_stopped or is_over:
                 return
         self._is_scene_known = True
 
 
-def require_rest(brake: Callable[[], str]) -> None:
-    """Let an arm come to rest.
+def brake_to_rest(brake: Callable[[], str]) -> None:
+    """Call `brake`, which brakes an arm and returns a message if that failed, else "".
 
     Raises:
-        Fault: `brake` returns a problem.
+        Fault: `brake` returned a message.
     """
     if problem := brake():
         raise Fault(problem)
 
 
 def restart_skills(root: Behaviour) -> None:
-    """Halt every running skill, so that it starts again at the next tick.
+    """Halt every running skill, so that the next tick starts the skill again.
 
-    Control nodes keep their state: the count of attempts continues, and variables keep their values.
+    Control nodes keep their state, for instance the number of attempts; variables keep their values.
 
     Raises:
-        Fault: The clean-up of a skill failed; all other skills were halted nevertheless.
+        Fault: The clean-up of a skill failed; nevertheless all other running skills were halted.
     """
     running = [
         node for node in root.iterate() if isinstance(node, SkillLeaf) and node.status is Status.RUNNING
@@ -152,22 +152,22 @@ def restart_skills(root: Behaviour) -> None:
         raise Fault("; ".join(problems))
 
 
-def reconcile(cell: Cell, last_action: str) -> None:
-    """Correct the ledger by the sensor of the tool, and invalidate every position on the table.
+def reconcile_ledger(cell: Cell, last_action: str) -> None:
+    """Correct the ledger by the sensor of the tool, and mark the positions of all items as invalid.
 
-    Nothing observed the cell during the interruption: objects may have been moved, and the tool may have lost
-    its item.
+    During the interruption nothing observed the cell: a person may have moved objects, and the tool may have
+    dropped its item.
 
     Args:
         cell: The cell, with its arm at rest.
         last_action: Last action of the tool, `open` or `close`; "" if there was none.
     """
-    believed, holding = cell.ledger.find_held_item(), cell.tool.holding
-    if believed is None and holding:
-        # The run was interrupted between the seal and its record in the ledger, before the lift.
+    held_item, is_holding = cell.ledger.find_held_item(), cell.tool.holding
+    if held_item is None and is_holding:
+        # The interruption came after the tool gripped an object and before the ledger recorded the grasp.
         cell.tool.open()
-    elif believed is not None and not holding and last_action == "close":
+    elif held_item is not None and not is_holding and last_action == "close":
         cell.tool.open()
-        cell.ledger.record_drop(believed)
-    # After `open`, the restarted skill records where it released the item.
+        cell.ledger.record_drop(held_item)
+    # If the last action is `open`, the restarted skill records the released item.
     cell.ledger.invalidate_positions()

@@ -1,4 +1,4 @@
-"""One run of a mission: its tree is ticked once in every control step of a work cell."""
+"""Run of a mission: ticks its tree once in every control step of a work cell."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from executive.mission.build import TreeNode
 from executive.run.outcome import (
     HALTED,
     LoopEnd,
-    close_accounts,
-    collect_problems,
-    end_of_tree,
-    judge_items,
+    catch_problems,
+    check_items,
+    finalize_items,
+    to_loop_end,
 )
 from executive.run.run_context import RunContext
 from executive.run.run_control import RunControl
-from executive.run.signals import stopped_by_signals
+from executive.run.signals import halt_on_signals
 from executive.tree.halting import halt
 
 
@@ -35,7 +35,7 @@ class Run:
         root: The tree, which uses the cell and the events of `context`.
         control: Stops, pauses and steps the run.
         mission: Name of the mission.
-        start: The first event; None if the run continues an earlier one.
+        start: First event of the run; None if the run continues an interrupted run.
         realtime: True to pace the run by the wall clock.
 
     Attributes:
@@ -56,11 +56,11 @@ class Run:
     ) -> None:
         self.root, self.control, self.mission = root, control, mission
         self._context = context
-        self._start = start
+        self._start_event = start
         self._realtime = realtime
         self._wall_start = 0.0
-        """Wall time at time 0 of the run's clock, if the run is paced [s]."""
-        self._held_item, self._is_empty = "", False
+        """Wall time at time 0 of the run's clock [s]."""
+        self._held_item, self._is_table_empty = "", False
 
     @property
     def tick(self) -> int:
@@ -74,33 +74,33 @@ class Run:
 
     @property
     def workcell(self) -> Workcell:
-        """The work cell that the run drives."""
+        """The work cell of the run."""
         return self._context.workcell
 
-    def observe(self, observer: Observer) -> None:
+    def add_observer(self, observer: Observer) -> None:
         """Call `observer` with every event from now on."""
-        self._context.observe(observer)
+        self._context.add_observer(observer)
 
-    def record(self, recorder: Observer) -> None:
+    def add_recorder(self, recorder: Observer) -> None:
         """Call `recorder` with every event from now on, before the observers."""
-        self._context.observe(recorder, first=True)
+        self._context.add_observer(recorder, first=True)
 
     def execute(self) -> RunEnded:
-        """Tick the tree to its end and return the outcome; the arm is then at rest.
+        """Tick the tree until it ends, brake the arm, and return the end of the run.
 
-        Ctrl-C halts the tree and brakes the arm; a second one ends the process at once.
+        The first Ctrl-C halts the tree and brakes the arm; a second Ctrl-C ends the process at once.
         """
         outcome = self._execute_tree()
-        if problems := collect_problems(lambda: self._context.emit(outcome)):
+        if problems := catch_problems(lambda: self._context.emit(outcome)):
             outcome = replace(outcome, status="FAULT", reason="fault", message=problems[0], node="")
         return outcome
 
-    def items(self) -> dict[str, int]:
-        """Return the counts of the items by final state; see `Accounts.count_states`."""
+    def count_items(self) -> dict[str, int]:
+        """Return the number of items by final state; `seen` is the number of all items except phantoms."""
         return self.workcell.accounts.count_states()
 
-    def audit(self) -> Mapping[str, int] | None:
-        """Return the true final counts of the objects, or None if they are unknown; only after `execute`."""
+    def count_ground_truth(self) -> Mapping[str, int] | None:
+        """Return the true counts of the objects after `execute`, by a key of `PLACES`; None if unknown."""
         return self.workcell.audit()
 
     def close(self) -> None:
@@ -108,71 +108,71 @@ class Run:
         self.workcell.close()
 
     def _execute_tree(self) -> RunEnded:
-        """Tick the tree to its end, let the arm come to rest, close the ledger and return the outcome."""
+        """Tick the tree until it ends, brake the arm, finalize the items, and return the end of the run."""
         context = self._context
-        with stopped_by_signals(self.control):
-            ending = self._tick_to_end()
-            problems = [*halt(self.root), *filter(None, [context.come_to_rest()])]
-        if ending.traceback:
-            # The arm brakes first: a full disk must not prevent the braking.
-            problems += collect_problems(lambda: context.emit(FaultRaised(ending.traceback)))
-        succeeded = ending.status == "SUCCESS"
-        problems += collect_problems(self._note_held_item)
-        problems += collect_problems(self._note_empty_table)
-        problems += collect_problems(lambda: close_accounts(self.workcell.accounts, completed=succeeded))
-        if problems and ending.status == "FAULT":
-            ending = replace(ending, message="; ".join([ending.message, *problems]))
+        with halt_on_signals(self.control):
+            loop_end = self._tick_until_end()
+            problems = [*halt(self.root), *filter(None, [context.brake_arm()])]
+        if loop_end.traceback:
+            # This event follows the braking, because a full disk must not prevent the braking.
+            problems += catch_problems(lambda: context.emit(FaultRaised(loop_end.traceback)))
+        completed = loop_end.status == "SUCCESS"
+        problems += catch_problems(self._store_held_item)
+        problems += catch_problems(self._store_table_state)
+        problems += catch_problems(lambda: finalize_items(self.workcell.accounts, completed=completed))
+        if problems and loop_end.status == "FAULT":
+            loop_end = replace(loop_end, message="; ".join([loop_end.message, *problems]))
         elif problems:
-            ending = LoopEnd("FAULT", "fault", "; ".join(problems))
-        return self._outcome(ending)
+            loop_end = LoopEnd("FAULT", "fault", "; ".join(problems))
+        return self._make_run_ended(loop_end)
 
-    def _tick_to_end(self) -> LoopEnd:
+    def _tick_until_end(self) -> LoopEnd:
         """Tick the tree once in every control step until it ends, or until the run is stopped."""
         context, control, is_tree_ticked = self._context, self.control, False
         try:
-            if self._start is not None:
-                context.emit(self._start)
+            if self._start_event is not None:
+                context.emit(self._start_event)
             context.begin_step(context.tick)
             self._wall_start = time.monotonic() - context.now
-            control.wait()
-            while not control.stopped:
+            control.wait_while_paused()
+            while not control.is_stopped:
                 is_tree_ticked = True
                 self.root.tick_once()
-                if control.stopped:
+                if control.is_stopped:
                     break
                 if self.root.status is not Status.RUNNING:
-                    return end_of_tree(self.root.failure)
+                    return to_loop_end(self.root.failure)
                 context.plan_ahead()
                 context.advance()
                 is_tree_ticked = False
                 if self._realtime:
                     time.sleep(max(0.0, self._wall_start + context.now - time.monotonic()))
-                control.wait()
-            ending = HALTED
+                control.wait_while_paused()
+            loop_end = HALTED
         except Stopped:
-            ending = HALTED
+            loop_end = HALTED
         except Exception as error:
             message = str(error) if isinstance(error, ExecutiveError) else f"{type(error).__name__}: {error}"
             node = error.node if isinstance(error, Fault) else ""
-            ending = LoopEnd("FAULT", "fault", message, node, traceback.format_exc())
-        problems = collect_problems(lambda: context.emit(RunHalted(is_tree_ticked)))
-        if problems and ending.status != "FAULT":
-            ending = LoopEnd("FAULT", "fault", problems[0])
-        return ending
+            loop_end = LoopEnd("FAULT", "fault", message, node, traceback.format_exc())
+        problems = catch_problems(lambda: context.emit(RunHalted(is_tree_ticked)))
+        if problems and loop_end.status != "FAULT":
+            loop_end = LoopEnd("FAULT", "fault", problems[0])
+        return loop_end
 
-    def _note_held_item(self) -> None:
-        """Store the name of the item in the tool: `something` if the ledger knows no such item."""
+    def _store_held_item(self) -> None:
+        """Store the name of the item in the tool, or `something` if the ledger does not know the item."""
         cell = self._context.cell
         if cell.tool.holding:
             self._held_item = cell.ledger.find_held_item() or "something"
 
-    def _note_empty_table(self) -> None:
-        """Store whether the ledger believes that the table is empty."""
+    def _store_table_state(self) -> None:
+        """Store whether the ledger believes that the table is empty, and no look showed an unknown label."""
         ledger = self._context.cell.ledger
-        self._is_empty = ledger.is_table_empty() and not ledger.unknown
+        self._is_table_empty = ledger.is_table_empty() and not ledger.unknown
 
-    def _outcome(self, ending: LoopEnd) -> RunEnded:
-        if ending.status == "SUCCESS":
-            ending = judge_items(self.workcell.accounts)
-        end = (self._is_empty, self._held_item, self.tick, round(self.now, 6))
-        return RunEnded(ending.status, ending.reason, ending.message, ending.node, *end)
+    def _make_run_ended(self, loop_end: LoopEnd) -> RunEnded:
+        if loop_end.status == "SUCCESS":
+            loop_end = check_items(self.workcell.accounts)
+        end = (self._is_table_empty, self._held_item, self.tick, round(self.now, 6))
+        return RunEnded(loop_end.status, loop_end.reason, loop_end.message, loop_end.node, *end)

@@ -1,4 +1,4 @@
-"""State of one run: work cell, recorder of inputs, number of control steps, and observers."""
+"""State of a run: work cell, recorder of inputs, number of control steps, and observers."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from executive.cell.workcell import Workcell
 from executive.events import Event, Observer, TimedEvent
 from executive.replay.input_recorder import InputRecorder
 from executive.replay.recorded_cell import record_cell
-from executive.run.planning_ahead import PlanningAhead
+from executive.run.lookahead_planner import LookaheadPlanner
 
 MAX_BRAKING_TIME = 2.0
-"""Time after which an arm that was commanded to brake must be at rest [s]."""
+"""Maximum time from the command to brake until the arm is at rest [s]."""
 MAX_BRAKING_ATTEMPTS = 4
-"""Number of commands to brake; each observer may fail once to record such a command."""
+"""Maximum number of commands to brake; each command may raise the exception of another observer."""
 
 
 class RunContext:
-    """The cell of a run as its tree sees it, and the events of the run.
+    """Recorded cell and events of a run.
 
-    The context exists before its work cell, because the work cell emits events.
+    The context is created before the work cell, because the work cell emits events during its creation.
 
     Attributes:
         tick: Number of control steps so far.
         workcell: The work cell.
-        cell: Cell of the skills: all answers are recorded, and the clock shows the start of the control step.
-        planner: Plans motions ahead, or None.
+        cell: Cell for skills: all its inputs are recorded, and its clock shows the start of the control step.
+        planner: Planner of probable next motions, or None.
     """
 
     workcell: Workcell
@@ -35,29 +35,29 @@ class RunContext:
 
     def __init__(self, observers: Sequence[Observer] = ()) -> None:
         self.tick = 0
-        self.planner: PlanningAhead | None = None
+        self.planner: LookaheadPlanner | None = None
         self._observers = list(observers)
         self._recorder = InputRecorder(self.emit)
-        self._step = 0.0
-        self._ahead = 0.0
+        self._control_period = 0.0
+        self._clock_offset = 0.0
         """Time of the cell's clock minus the time of all control steps [s]; 0 in simulation."""
 
     @property
     def now(self) -> float:
         """Time on the run's clock at which this control step began [s]."""
-        return self.tick * self._step + self._ahead
+        return self.tick * self._control_period + self._clock_offset
 
-    def connect(self, workcell: Workcell, planner: PlanningAhead | None = None) -> None:
+    def connect(self, workcell: Workcell, planner: LookaheadPlanner | None = None) -> None:
         """Set the work cell and the planner of the run."""
         self.workcell, self.planner = workcell, planner
         if planner is not None:
-            self.observe(planner.observe)
-        self._step = workcell.cell.clock.step
-        clock = StepClock(lambda: self.now, self._step)
+            self.add_observer(planner.on_event)
+        self._control_period = workcell.cell.clock.step
+        clock = StepClock(lambda: self.now, self._control_period)
         self.cell = record_cell(workcell.cell, self._recorder, clock, self.emit)
 
-    def observe(self, observer: Observer, *, first: bool = False) -> None:
-        """Call `observer` with every event from now on; with `first`, before all other observers."""
+    def add_observer(self, observer: Observer, *, first: bool = False) -> None:
+        """Call `observer` with every event from now on; if `first` is True, before all other observers."""
         self._observers.insert(0 if first else len(self._observers), observer)
 
     def emit(self, event: Event) -> None:
@@ -67,31 +67,31 @@ class RunContext:
             observer(timed)
 
     def begin_step(self, tick: int) -> None:
-        """Begin the control step number `tick`, and read the clock."""
+        """Begin the control step number `tick`, and record the time of the cell's clock."""
         self.tick = tick
         self._recorder.begin_step()
-        clock, step_time = self.workcell.cell.clock, tick * self._step
-        self._ahead = self._recorder.read("clock", lambda: clock.now - step_time)
+        clock, step_time = self.workcell.cell.clock, tick * self._control_period
+        self._clock_offset = self._recorder.read("clock", lambda: clock.now - step_time)
 
     def advance(self) -> None:
-        """Let one control step pass, and begin the next one."""
+        """Execute one control step of the work cell, and begin the next control step."""
         self.workcell.advance()
         self.begin_step(self.tick + 1)
 
     def plan_ahead(self) -> None:
-        """Let the arm plan the probable next motion."""
+        """Let the planner plan the probable next motion."""
         if self.planner is not None:
-            self.planner.step()
+            self.planner.plan_next_motion()
 
-    def come_to_rest(self) -> str:
-        """Let the arm brake until it is at rest; return a problem, or ""."""
-        return come_to_rest(self.cell, self.advance)
+    def brake_arm(self) -> str:
+        """Brake the arm until it is at rest; return a message if that failed, else ""."""
+        return brake_arm(self.cell, self.advance)
 
 
-def come_to_rest(cell: Cell, advance: Callable[[], None]) -> str:
-    """Let the arm of a cell brake until it is at rest; return a problem, or "".
+def brake_arm(cell: Cell, advance: Callable[[], None]) -> str:
+    """Brake the arm of a cell until it is at rest; return a message if that failed, else "".
 
-    `advance` lets one control step pass.
+    `advance` executes one control step.
     """
     deadline = cell.clock.now + MAX_BRAKING_TIME
     problems: list[str] = []

@@ -16,20 +16,19 @@ from executive.errors import Blocked, Fault, NoDepth, Unavailable, Unreachable
 from executive.manipulation.obstacles import list_obstacles
 from executive.manipulation.tool_goals import DROP_HEIGHT, goal_aside
 
-LOOKS_PER_PLACE = 3
-"""Number of looks from each camera pose."""
+LOOKS_PER_POSE = 3
+"""Number of looks from each camera pose; a look is one image with its detections."""
 MIN_LOOKS = 5
-"""Smallest number of looks from the scan poses."""
-RELEASE_TIME = 0.1
-"""Time for the vacuum to decay [s]."""
+"""Minimum number of looks from all scan poses."""
+VACUUM_DECAY_TIME = 0.1
+"""Time for the vacuum to decay after the tool opened [s]."""
 
 
 def recover_scene(cell: Cell) -> Steps:
-    """Empty the tool, then look at the table and the bins.
+    """Empty the tool, and observe the table and the bins.
 
-    A camera on the arm looks into each bin from above. Afterwards the ledger knows every item that a look has
-    shown, on the table or in a bin. Looks of the mission search for the other items; an item that no look
-    finds is rejected.
+    A camera on the arm also observes each bin from above. Afterwards the ledger knows the place of every item
+    that was detected. The mission searches for the other items; items that it does not find are rejected.
 
     Raises:
         Fault: The tool holds an object that cannot be put down.
@@ -38,30 +37,30 @@ def recover_scene(cell: Cell) -> Steps:
     if cell.tool.holding:
         yield from _put_down(cell)
     cell.tool.open()
-    yield from cell.clock.sleep(RELEASE_TIME)
+    yield from cell.clock.sleep(VACUUM_DECAY_TIME)
     poses = cell.camera.scan_poses
     first_position, height = cell.camera.capture().X_WC.position, 0.0
     is_on_arm = False
-    for number in range(max(MIN_LOOKS, LOOKS_PER_PLACE * len(poses))):
-        frame = yield from _look(cell, poses[number % len(poses)])
+    for look_index in range(max(MIN_LOOKS, LOOKS_PER_POSE * len(poses))):
+        frame = yield from _look(cell, poses[look_index % len(poses)])
         is_on_arm |= not np.allclose(first_position, frame.X_WC.position)
         height = max(height, float(cell.arm.tool_pose.position[2]))
-        if number == 0:
+        if look_index == 0:
             cell.ledger.mark_unseen_as_dropped()
     for bin in cell.bins.values() if is_on_arm else ():
         x, y, _ = map(float, bin.position)
-        for _ in range(LOOKS_PER_PLACE):
+        for _ in range(LOOKS_PER_POSE):
             yield from _look(cell, Goal((x, y, height)))
     cell.ledger.record_bin_contents()
 
 
 def _put_down(cell: Cell) -> Steps:
-    """Carry the object in the tool, whose class is unknown, to a free place on the table."""
-    kind = max(cell.classes.values(), key=lambda kind: kind.height)
-    goal = goal_aside(cell, kind, DROP_HEIGHT)
+    """Transport the object in the tool, whose class is unknown, to a free position on the table."""
+    tallest = max(cell.classes.values(), key=lambda each: each.height)
+    goal = goal_aside(cell, tallest, DROP_HEIGHT)
     problems = []
-    # With the tallest class as the load, the arm may seem to be in collision in a bin or on the table.
-    for load in (Load(kind, cell.tool.bears), None):
+    # With the tallest class as the load, the start may seem to be in collision: then plan without a load.
+    for load in (Load(tallest, cell.tool.bears), None):
         try:
             yield from _move(cell, goal, Task(load, list_obstacles(cell)))
         except (Unreachable, Blocked) as error:
@@ -75,7 +74,7 @@ def _put_down(cell: Cell) -> Steps:
 
 
 def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
-    """Move to a goal if possible, observe the whole view of the camera, and return the frame."""
+    """Move to a goal if possible, observe the view `full` of the camera, and return the frame."""
     with suppress(Unreachable, Blocked):
         yield from _move(cell, goal, Task(around=list_obstacles(cell)))
     frame = cell.camera.capture()
@@ -88,17 +87,17 @@ def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
         observations = cell.localizer.localize(detections)
     except (Unavailable, NoDepth):
         return frame
-    # If the camera was moved, the look does not count; a skill of the mission reports the displacement.
+    # If the camera is displaced, this look is ignored; a skill of the mission reports the displacement.
     if not cell.camera.displacement(frame):
         cell.ledger.observe(detections, observations)
     return frame
 
 
 def _move(cell: Cell, goal: Goal | str, task: Task) -> Steps:
-    """Yield until the arm is at rest at a goal, or after a collision.
+    """Move the arm to a goal; yields until the arm is at rest at the goal or after a collision.
 
     Raises:
-        Unreachable, Blocked: No motion was found.
+        Unreachable, Blocked: The arm found no motion.
     """
     planning = cell.arm.plan(goal, task)
     while not planning.ready:

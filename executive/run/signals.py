@@ -1,4 +1,4 @@
-"""Signals that end a command or halt a run: Ctrl-C, SIGTERM and SIGHUP."""
+"""Handling of the signals that end a command or halt a run: SIGINT (Ctrl-C), SIGTERM and SIGHUP."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from types import FrameType
 
 from executive.run.run_control import RunControl
 
-TERMINATION = (signal.SIGTERM, signal.SIGHUP)
-"""Signals other than Ctrl-C that ask a process to end."""
-SIGNALS = (signal.SIGINT, *TERMINATION)
+TERMINATION_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
+"""Signals other than SIGINT that request the end of a process."""
+HALT_SIGNALS = (signal.SIGINT, *TERMINATION_SIGNALS)
 """Signals that halt a run."""
 
 
@@ -20,22 +20,22 @@ SIGNALS = (signal.SIGINT, *TERMINATION)
 def handle_signals(
     numbers: Sequence[int], handler: Callable[[int, FrameType | None], None]
 ) -> Iterator[Callable[[], None]]:
-    """Handle signals, and yield a function that restores the former handlers.
+    """Handle signals in the `with` block, and yield a function that restores the previous handlers.
 
-    SIGTERM and SIGHUP stay ignored if they were ignored at the start of the process (`nohup`). SIGINT does
-    not: workers ignore it while they wait, and a run in a worker must halt. Outside the main thread no signal
-    is handled, because Python does not allow it.
+    Ignored signals stay ignored (`nohup`), except SIGINT: a worker process ignores SIGINT while it waits, but
+    SIGINT must halt a run in a worker process. In other threads than the main thread, the function handles no
+    signal, because Python does not allow it.
     """
-    former = {}
+    previous = {}
     if threading.current_thread() is threading.main_thread():
-        former = {number: signal.getsignal(number) for number in numbers}
-        former = {n: old for n, old in former.items() if n == signal.SIGINT or old is not signal.SIG_IGN}
+        previous = {number: signal.getsignal(number) for number in numbers}
+        previous = {n: old for n, old in previous.items() if n == signal.SIGINT or old is not signal.SIG_IGN}
 
     def restore() -> None:
-        for number, old in former.items():
-            signal.signal(number, old)
+        for number, handler_before in previous.items():
+            signal.signal(number, handler_before)
 
-    for number in former:
+    for number in previous:
         signal.signal(number, handler)
     try:
         yield restore
@@ -44,13 +44,13 @@ def handle_signals(
 
 
 @contextmanager
-def stopped_by_signals(control: RunControl) -> Iterator[None]:
-    """Halt the run at the first signal; a second signal has its former effect."""
+def halt_on_signals(control: RunControl) -> Iterator[None]:
+    """Stop the run at the first signal; a second signal has the effect that it has outside the block."""
 
-    def halt(number: int, frame: FrameType | None) -> None:
+    def stop_run(number: int, frame: FrameType | None) -> None:
         del number, frame
         control.stop()
         restore()
 
-    with handle_signals(SIGNALS, halt) as restore:
+    with handle_signals(HALT_SIGNALS, stop_run) as restore:
         yield

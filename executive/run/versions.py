@@ -1,4 +1,4 @@
-"""Versions of the software of a run: this project, Python, the machine, and all required packages."""
+"""Software versions of a run: this project, Python, operating system, machine and required packages."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ DISTRIBUTION = "executive"
 
 
 @functools.cache
-def versions() -> Mapping[str, str]:
-    """Return the versions by name; packages that are not installed are left out."""
-    found = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
+def list_versions() -> Mapping[str, str]:
+    """Return the versions by name, without packages that are not installed."""
+    versions = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
     for name in (DISTRIBUTION, *list_requirements()):
         if version := find_version(name):
-            found[name] = version
-    return MappingProxyType(found)
+            versions[name] = version
+    return MappingProxyType(versions)
 
 
 def list_requirements(extra: str = "") -> tuple[str, ...]:
-    """Return the names of the packages that this project requires on this Python, or that an extra adds.
+    """Return the packages that this project requires on this Python, or only those of its extra `extra`.
 
-    Empty if the project is not installed.
+    The tuple is empty if the project is not installed.
     """
     try:
         requirements = [Requirement(line) for line in metadata.requires(DISTRIBUTION) or ()]
     except metadata.PackageNotFoundError:
         return ()
-    applicable = [one for one in requirements if one.marker is None or one.marker.evaluate({"extra": extra})]
-    return tuple(one.name for one in applicable if not extra or "extra" in str(one.marker))
+    needed = [each for each in requirements if each.marker is None or each.marker.evaluate({"extra": extra})]
+    return tuple(each.name for each in needed if not extra or "extra" in str(each.marker))
 
 
 def find_version(name: str) -> str:
-    """Return the version of a distribution, or "" if it is not installed."""
+    """Return the version of a distribution, or "" if the distribution is not installed."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
@@ -46,7 +46,7 @@ def find_version(name: str) -> str:
 
 
 def find_installer(name: str) -> str:
-    """Return the program that installed a distribution, for instance `pip`; "" if unknown."""
+    """Return the name of the program that installed a distribution, such as `pip`; "" if unknown."""
     try:
         return (metadata.distribution(name).read_text("INSTALLER") or "").strip()
     except metadata.PackageNotFoundError:

@@ -120,14 +120,14 @@ def run_mission(
     try:
         workcell.require_nodes([getattr(node, "path", node.name) for node in run.root.iterate()])
         _require_matching_substitutes(run, skills)
-        run.observe(workcell.hear)
+        run.add_observer(workcell.hear)
         outcome = run.execute()
         return MissionResult(
             **asdict(outcome),
             events=events,
-            items=run.items(),
+            items=run.count_items(),
             accounts=workcell.accounts,
-            audit=run.audit(),
+            audit=run.count_ground_truth(),
             cell=innermost(workcell),
         )
     finally:

@@ -249,7 +249,7 @@ class _RunWithHalts:
         halt["rest_s"] = (outcome.ticks - halt["tick"]) * workcell.cell.clock.step
         problems = [
             *check_journal(read_journal(self._journal_path), outcome),
-            *check_ledger(run.items(), run.audit()),
+            *check_ledger(run.count_items(), run.count_ground_truth()),
             *check_tool(outcome, workcell),
             *check_rest(workcell),
         ]

@@ -34,7 +34,7 @@ def measure(subject: Subject, runs: Path) -> Figures:
                 recorder(event)
                 times.append(time.perf_counter() - received)
 
-            run.observe(record)
+            run.add_observer(record)
             run.execute()
         wall = time.perf_counter() - began
     return {

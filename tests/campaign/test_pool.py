@@ -12,7 +12,7 @@ import pytest
 
 from executive.campaign.pool import run_jobs
 from executive.run.run_control import RunControl
-from executive.run.signals import SIGNALS, stopped_by_signals
+from executive.run.signals import HALT_SIGNALS, halt_on_signals
 
 
 def half(number: int) -> float:
@@ -38,9 +38,9 @@ def test_every_job_is_done_and_the_results_are_in_their_order() -> None:
 def halt(how: signal.Signals) -> str:
     """Do a job during which somebody wishes to halt, and which goes on until it is asked to halt itself."""
     control = RunControl()
-    with stopped_by_signals(control):
+    with halt_on_signals(control):
         os.kill(os.getppid(), how)
-        while not control.stopped:
+        while not control.is_stopped:
             time.sleep(0.01)
     return "halted in good order"
 
@@ -48,9 +48,9 @@ def halt(how: signal.Signals) -> str:
 @pytest.fixture
 def heard() -> Iterator[None]:
     """Hear SIGINT: what a shell runs in the background begins with it ignored."""
-    before = {number: signal.signal(number, signal.default_int_handler) for number in SIGNALS}
+    before = {number: signal.signal(number, signal.default_int_handler) for number in HALT_SIGNALS}
     yield
-    assert all(signal.getsignal(number) is signal.default_int_handler for number in SIGNALS)
+    assert all(signal.getsignal(number) is signal.default_int_handler for number in HALT_SIGNALS)
     for number, handler in before.items():
         signal.signal(number, handler)
 

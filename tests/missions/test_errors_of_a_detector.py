@@ -79,7 +79,7 @@ def test_everything_is_in_its_bin_and_the_books_are_right(
 ) -> None:
     run = assemble(loaded(tmp_path, "sort_overhead"), discover(), RunOptions(seed, kind=kind))
     try:
-        outcome, items, audit = run.execute(), run.items(), dict(run.audit() or {})
+        outcome, items, audit = run.execute(), run.count_items(), dict(run.count_ground_truth() or {})
     finally:
         run.close()
     assert (outcome.status, outcome.message) == ("SUCCESS", "")

@@ -59,7 +59,13 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
     run = assemble(mission, discover(), options, [observe])
     try:
         outcome = run.execute()
-        return Done(outcome, run.items(), run.workcell.accounts.summaries(), dict(run.audit() or {}), ahead)
+        return Done(
+            outcome,
+            run.count_items(),
+            run.workcell.accounts.summaries(),
+            dict(run.count_ground_truth() or {}),
+            ahead,
+        )
     finally:
         run.close()
 

@@ -139,7 +139,9 @@ def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
 
 def test_a_halt_at_a_question_says_so() -> None:
     run = FailedRun("pick_on_request", requests=None)
-    run.run.observe(lambda timed: run.run.control.stop() if isinstance(timed.event, OperatorAsked) else None)
+    run.run.add_observer(
+        lambda timed: run.run.control.stop() if isinstance(timed.event, OperatorAsked) else None
+    )
     assert run.tell().verdict == "halted by the user while the operator was asked"
 
 

@@ -43,8 +43,8 @@ def test_the_journal_of_a_run_gives_the_timeline_that_was_observed(mission, tmp_
     monkeypatch.chdir(tmp_path)
     run = FailedRun(mission, requests=["cube", "quit"])
     live, journal = Timeline(), Journal(Path("journal.jsonl"))
-    run.run.observe(live)
-    run.run.observe(lambda timed: None if isinstance(timed.event, FrameTaken) else journal(timed))
+    run.run.add_observer(live)
+    run.run.add_observer(lambda timed: None if isinstance(timed.event, FrameTaken) else journal(timed))
     run.slip(2)
     run.run.execute()
     journal.close()
@@ -218,7 +218,7 @@ def test_the_memory_of_a_live_run_grows_only_with_its_items(tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     run = FailedRun("sort_overhead")
     events: list[TimedEvent] = []
-    run.run.observe(events.append)
+    run.run.add_observer(events.append)
     run.slip(2)
     run.run.execute()
     timeline, sizes = Timeline(history=False), []

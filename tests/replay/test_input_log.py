@@ -119,7 +119,7 @@ def test_a_run_that_ended_as_incomplete_is_reopened() -> None:
     log = InputLog.from_events([START, sense(8, 1), at(9, run_ended("INCOMPLETE"))])
     assert log.find_interruption(9) == Interruption(10, "", True, 10)
     log = InputLog.from_events([*log.events, resume(10, 10), sense(11, 2)])
-    assert log.interruptions[10].reopens
+    assert log.interruptions[10].restarts_tree
 
 
 def test_the_start() -> None:

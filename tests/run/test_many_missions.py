@@ -22,7 +22,7 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
 from executive.record.trace import Trace
 from executive.run.assembly import RunOptions, assemble
-from executive.run.planning_ahead import PlanningAhead
+from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.run_context import RunContext
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard as Variables
@@ -44,7 +44,7 @@ class Interleaved:
         self._context = RunContext([self._trace])
         emit = self._context.emit
         self._fake = FakeCell(loaded.cell_config, seed=seed, routes=loaded.routes, emit=emit)
-        self._context.connect(self._fake, PlanningAhead(self._fake.cell))
+        self._context.connect(self._fake, LookaheadPlanner(self._fake.cell))
         self._context.begin_step(0)
         self._root = build(loaded, skills(), self._context.cell, Variables(), emit)
 
@@ -99,7 +99,7 @@ def story_of(name: str, seed: int) -> Story:
         outcome = run.execute()
         return (
             outcome.status, outcome.ticks, trace.hexdigest(), variables(run.root),
-            items_of(run.workcell), run.audit(),
+            items_of(run.workcell), run.count_ground_truth(),
         )  # fmt: skip
     finally:
         run.close()

@@ -19,7 +19,7 @@ from executive.plugins import discover
 from executive.record.replay import compare
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions, assemble
-from executive.run.operator import ScriptedOperator, TerminalOperator, interpret
+from executive.run.operator import ScriptedOperator, TerminalOperator, parse_request
 from executive.run.run_control import RunControl
 
 CHOICES = ("cube", "sphere", "duck")
@@ -34,7 +34,7 @@ CHOICES = ("cube", "sphere", "duck")
     ],
 )  # fmt: skip
 def test_what_a_word_means(word: str, meaning: str | None) -> None:
-    assert interpret(word, CHOICES) == meaning
+    assert parse_request(word, CHOICES) == meaning
 
 
 class Heard(list[Event]):
@@ -152,8 +152,8 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
 def test_requests_from_elsewhere_are_answers(before: list[str], after: list[str], answer: str) -> None:
     heard, control = Heard(), RunControl()
     for word in before:
-        control.request(word)
-    threading.Timer(0.2, lambda: [control.request(word) for word in after]).start()
+        control.add_request(word)
+    threading.Timer(0.2, lambda: [control.add_request(word) for word in after]).start()
     operator = TerminalOperator(heard, control, keyboard=False)
     assert operator.ask(CHOICES) == answer
     assert heard == [OperatorAsked(list(CHOICES)), RequestGiven(answer)]

@@ -6,7 +6,7 @@ import pytest
 from at_hand import look
 
 from executive.cells.fake.cell import FakeCell
-from executive.run.resume import reconcile
+from executive.run.resume import reconcile_ledger
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
 
@@ -37,7 +37,7 @@ def test_tool_and_ledger_agree_afterwards(
         fake.tool.close()
     if known:
         fake.ledger.record_grasp(item)
-    reconcile(fake.cell, intent)
+    reconcile_ledger(fake.cell, intent)
     (row,) = fake.ledger.summaries()
     assert (fake.tool.holding, fake.ledger.find_held_item() == item, row.state) == left
     assert row.attempts == (row.state == "dropped")
@@ -47,5 +47,5 @@ def test_everything_on_the_table_is_in_doubt(fake: FakeCell) -> None:
     fake.world.put("cube", 0.5, 0.0)
     (target,) = look(fake)
     assert fake.ledger.is_fresh(target)
-    reconcile(fake.cell, "")
+    reconcile_ledger(fake.cell, "")
     assert not fake.ledger.is_fresh(target)

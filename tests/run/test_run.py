@@ -41,7 +41,7 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     fake = fake_of(run)
     stubborn = fake.world.objects[0]
     fake.tool.is_sealing = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
-    outcome, items, audit = run.execute(), run.items(), run.audit()
+    outcome, items, audit = run.execute(), run.count_items(), run.count_ground_truth()
     assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
     named = next(row.item for row in run.workcell.accounts.summaries() if row.state == "rejected")
     why = "could not be picked (6 failed attempts)"
@@ -98,7 +98,7 @@ def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> No
     fake.world.objects.clear()
     for label, x, y in (("cube", 0.45, -0.1), ("cube", 0.55, 0.1), ("duck", 0.5, 0.0)):
         fake.world.put(label, x, y)
-    outcome, items, audit = run.execute(), run.items(), run.audit()
+    outcome, items, audit = run.execute(), run.count_items(), run.count_ground_truth()
     assert outcome.status == "SUCCESS"
     assert [one.event.wanted for one in events if isinstance(one.event, RequestGiven)] == [
         "cube",
@@ -143,7 +143,7 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
         assert fake.steps < 60_000, "the mission tries for ever"
 
     fake.advance = slipping  # type: ignore[method-assign]
-    outcome, items, audit = run.execute(), run.items(), run.audit()
+    outcome, items, audit = run.execute(), run.count_items(), run.count_ground_truth()
     assert outcome.status == "INCOMPLETE", outcome
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
@@ -158,7 +158,7 @@ def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:
     outcome = run.execute()
     assert outcome.status == "FAULT"
     assert outcome.message == (
-        "the books do not balance: 3 seen, 1 placed, 0 rejected, 0 skipped, 1 lost, 0 phantom; "
-        "seen must be what was placed, rejected, skipped and lost"
+        "the item counts are inconsistent: 3 seen, 1 placed, 0 rejected, 0 skipped, 1 lost, 0 phantom; "
+        "seen must be placed + rejected + skipped + lost"
     )
     assert isinstance(events[-1].event, RunEnded)

@@ -65,7 +65,7 @@ def test_a_record_that_breaks_at_the_very_end_is_a_fault_with_an_outcome(
     def refuse(timed: TimedEvent) -> None:
         if timed.tick >= 100:
             run.control.stop()
-        if run.control.stopped and isinstance(timed.event, kind):
+        if run.control.is_stopped and isinstance(timed.event, kind):
             raise Fault("the disk is full")
         if kind is FaultRaised and timed.tick >= 100:
             raise Fault("the disk is full")
@@ -78,8 +78,8 @@ def test_a_record_that_breaks_at_the_very_end_is_a_fault_with_an_outcome(
 
 def test_something_is_done_between_ticks_and_while_the_run_stands_still() -> None:
     control, done = RunControl(), []
-    control.between_ticks(lambda: done.append(control.paused))
-    control.wait()
+    control.call_between_ticks(lambda: done.append(control.is_paused))
+    control.wait_while_paused()
     assert done == [False]
     control.pause()
 
@@ -87,14 +87,14 @@ def test_something_is_done_between_ticks_and_while_the_run_stands_still() -> Non
         if len(done) == 4:
             control.resume()
 
-    control.between_ticks(go_on_after_three)
-    control.wait()
+    control.call_between_ticks(go_on_after_three)
+    control.wait_while_paused()
     assert done == [False, True, True, True]
 
 
 def test_what_is_asked_for_is_told_once_in_order() -> None:
     control = RunControl()
     assert control.take_request() is None
-    control.request("cube")
-    control.request("duck")
+    control.add_request("cube")
+    control.add_request("duck")
     assert [control.take_request() for _ in range(3)] == ["cube", "duck", None]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import platform
 
-from executive.run.versions import find_version, list_requirements, versions
+from executive.run.versions import find_version, list_requirements, list_versions
 
 
 def test_names_this_project_python_and_every_package_asked_for_but_no_extras() -> None:
-    found = versions()
+    found = list_versions()
     assert found["executive"] == find_version("executive") != ""
     assert found["python"] == platform.python_version()
     assert set(list_requirements()) <= set(found)

@@ -73,7 +73,7 @@ def rehearse(subject: Subject) -> Rehearsal:
         outcome = run.execute()
         if outcome.status == "HALTED":
             raise KeyboardInterrupt
-        items, audit = run.items(), run.audit()
+        items, audit = run.count_items(), run.count_ground_truth()
     description = f"without a fault, {subject.name} with seed {subject.seed}"
     if outcome.status != "SUCCESS":
         raise InputError(

@@ -86,7 +86,7 @@ class _TrialRun:
         self.run = assemble(subject.loaded, subject.skills, self.options, [self._note, self._activations])
         workcell = self.run.workcell
         assert isinstance(workcell, FaultyCell)
-        self.run.observe(workcell.hear)
+        self.run.add_observer(workcell.hear)
 
     @property
     def outcome(self) -> RunEnded:
@@ -96,7 +96,7 @@ class _TrialRun:
     def judge(self, outcome: RunEnded) -> Trial:
         """Check the run after its end and return the trial."""
         run = self.run
-        items, audit = run.items(), run.audit()
+        items, audit = run.count_items(), run.count_ground_truth()
         taken = judgement.count_faults(self._events, "object_removed")
         raised = any(self._has_raised(fault) for fault in self._faults.values() if fault.ends_run)
         faults = tuple(self._faults.values())

@@ -151,7 +151,7 @@ def with_faults(
 ) -> Callable[..., FaultyCell]:
     """Return a kind of cell with a fault script, for `RunOptions.kind`.
 
-    The cell must observe the run: `run.observe(run.workcell.hear)`.
+    The cell must observe the run: `run.add_observer(run.workcell.hear)`.
 
     Args:
         kind: The kind of cell without faults.

@@ -112,7 +112,7 @@ class LivePage:
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(SceneChange(shapes=shapes))
         self._enqueue(Change(tree=draw_svg(nodes, mission, blank)))
-        run.control.between_ticks(self._send_state)
+        run.control.call_between_ticks(self._send_state)
         self._send_state()
 
     def __call__(self, timed: TimedEvent) -> None:
@@ -162,7 +162,7 @@ class LivePage:
             return
         self._next_poses_at = now + self._period
         with self._errors_noted():
-            if self._run.control.paused != self._paused:
+            if self._run.control.is_paused != self._paused:
                 self._paused = not self._paused
                 self._enqueue(Change(paused=self._paused))
             if self._watchers and self._is_queue_short and self._visuals is not None:
@@ -225,6 +225,6 @@ class LivePage:
             if self._watchers and self._last_look is not None:
                 self._enqueue(self._last_look)
         elif control is not None and command.do == "request":
-            control.request(command.word)
+            control.add_request(command.word)
         elif control is not None:
             getattr(control, command.do)()

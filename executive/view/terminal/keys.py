@@ -66,6 +66,6 @@ class Keys:
 
     def _apply(self, key: str) -> None:
         if key in PAUSE:
-            (self._control.resume if self._control.paused else self._control.pause)()
+            (self._control.resume if self._control.is_paused else self._control.pause)()
         elif key in STEP:
             self._control.step()

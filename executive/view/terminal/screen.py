@@ -89,7 +89,7 @@ class Terminal:
             title = "" if started is None else f"{started.mission}  seed {started.seed}"
             head = Text(f"{title}  {self.timeline.clock:.1f} s", style="bold")
             if self._keys is not None:
-                paused = self._control is not None and self._control.paused
+                paused = self._control is not None and self._control.is_paused
                 head.append(f"   {HELP_PAUSED if paused else HELP}", style="yellow" if paused else "dim")
             return Group(head, page)
 

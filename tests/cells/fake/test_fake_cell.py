@@ -171,7 +171,10 @@ def test_a_mission_is_rehearsed_in_a_cell_of_kind_fake_and_its_trays_fill_evenly
     outcome = run.execute()
     assert outcome.status == "SUCCESS", outcome
     bins = [row.bin for row in run.workcell.accounts.summaries() if row.bin]
-    assert (sorted(bins), dict(run.audit() or {})["right"]) == (["tray_1", "tray_1", "tray_2", "tray_2"], 4)
+    assert (sorted(bins), dict(run.count_ground_truth() or {})["right"]) == (
+        ["tray_1", "tray_1", "tray_2", "tray_2"],
+        4,
+    )
 
 
 @pytest.mark.parametrize(

@@ -90,7 +90,7 @@ def sort(arrange, stub):
         loaded = load_mission(path, discover(), overrides)
         run = assemble(loaded, discover(), RunOptions(1), [restart_server])
         with contextlib.closing(run):
-            outcome, truth = run.execute(), run.audit()
+            outcome, truth = run.execute(), run.count_ground_truth()
         assert SECRET not in repr(events)
         return outcome.status, truth["right"], truth["wrong_bin"] + truth["elsewhere"]
 

@@ -32,7 +32,7 @@ class Keyboard:
         """Press keys, and wait until the run is paused or goes on."""
         os.write(self.master, text.encode())
         end = time.monotonic() + PATIENCE
-        while self.control.paused is not paused:
+        while self.control.is_paused is not paused:
             assert time.monotonic() < end, f"{text!r} had no effect"
             time.sleep(0.005)
 
@@ -61,10 +61,10 @@ def test_a_key_pauses_the_run_and_lets_it_go_on_and_others_mean_nothing(keyboard
 
 def test_a_key_takes_one_step(keyboard: Keyboard) -> None:
     keyboard.press("s", True)
-    keyboard.control.wait()
+    keyboard.control.wait_while_paused()
     threading.Timer(0.1, keyboard.control.stop).start()
-    keyboard.control.wait()
-    assert keyboard.control.stopped
+    keyboard.control.wait_while_paused()
+    assert keyboard.control.is_stopped
 
 
 def test_the_keyboard_is_given_back_as_it_was(keyboard: Keyboard) -> None:

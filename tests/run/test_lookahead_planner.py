@@ -14,7 +14,7 @@ from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.events import MotionPlanned, TargetSelected, TimedEvent
 from executive.manipulation.tool_goals import nearest_first
-from executive.run.planning_ahead import PlanningAhead
+from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.run_context import RunContext
 from executive.skill import Skill, SkillFailed
 from skills.approach import Approach
@@ -41,7 +41,7 @@ class Bench:
         self.decisions: list[str] = []
         self.context = RunContext([self.note])
         self.fake = FakeCell(emit=self.context.emit)
-        self.context.connect(self.fake, PlanningAhead(self.fake.cell))
+        self.context.connect(self.fake, LookaheadPlanner(self.fake.cell))
         self.context.begin_step(0)
         self.look = partial(at_hand.look, self.fake)
         self.fake.world.put("cube", 0.5, 0.0)
