@@ -13,15 +13,15 @@ class LogFile:
 
     Args:
         path: Path of the file.
-        content: Name of the content, for the message of a fault.
-        length: Length to which an existing file is truncated [byte]; None: the file is not truncated.
+        content_name: Name of the content, for the message of a fault.
+        length: Length to which an existing file is truncated [byte], or None to keep its content.
 
     Raises:
         InputError: The file cannot be opened.
     """
 
-    def __init__(self, path: Path, content: str, length: int | None = None) -> None:
-        self._path, self._content = path, content
+    def __init__(self, path: Path, content_name: str, length: int | None = None) -> None:
+        self._path, self._content_name = path, content_name
         with explain_os_errors(InputError, f'cannot write "{path}"'):
             self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
             if length is not None:
@@ -32,8 +32,8 @@ class LogFile:
         """True until the file is closed, or until a write fails."""
         return self._file is not None
 
-    def write(self, data: bytes, position: int) -> None:
-        """Write all data at a position [byte]; do nothing if the file is closed.
+    def write(self, data: bytes, offset: int) -> None:
+        """Write all data at an offset in the file [byte]; do nothing if the file is closed.
 
         Raises:
             Fault: The disk does not accept the data. Later writes do nothing and raise no fault, so
@@ -41,13 +41,13 @@ class LogFile:
         """
         try:
             while data and self._file is not None:
-                count = os.pwrite(self._file, data, position)
-                data, position = data[count:], position + count
+                written_count = os.pwrite(self._file, data, offset)
+                data, offset = data[written_count:], offset + written_count
         except OSError as error:
             self.close()
             raise Fault(
-                f'{self._content} "{self._path}" cannot be written: {describe_os_error(error)}; '
-                "the run stops because it could not be resumed"
+                f'{self._content_name} "{self._path}" cannot be written: {describe_os_error(error)}; '
+                "the run stops, because without this file it could not be resumed after an interruption"
             ) from error
 
     def close(self) -> None:

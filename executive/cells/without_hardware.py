@@ -1,4 +1,4 @@
-"""Cell of a cell file without hardware: base of the kinds of cells, and the cell for a replay."""
+"""Cell without arm, tool and camera: base class of the simulated and the fake cell, and cell of a replay."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ class CellWithoutHardware:
     Args:
         config: The cell file.
         seed: Random seed of the run; not used.
-        routes: Names of the right bins of each class.
+        routes: Names of the permitted bins of each class.
         emit: Receives the events of the cell.
         options: Options of the run.
 
     Attributes:
         config: The cell file.
-        routes: Names of the right bins of each class.
+        routes: Names of the permitted bins of each class.
         accounts: The ledger of the run.
         cell: The cell as skills use it.
         steps: Number of control steps since the run began.
-        last_command: Control step of the last command to arm or tool in the log of the world, or 0.
+        last_command: Control step of the last logged command to arm or tool; 0 if there is none.
     """
 
     def __init__(

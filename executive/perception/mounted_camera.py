@@ -61,7 +61,7 @@ class MountedCamera:
         """Capture a frame."""
         self._frames += 1
         X_WC = self._pose()
-        image, depth = self._sense()
+        image, depth = self._capture_images()
         return Frame(
             id=self._frames,
             camera=self.name,
@@ -70,15 +70,15 @@ class MountedCamera:
             matrix=self.matrix,
             X_WC=X_WC,
             stamp=self._clock.now,
-            visible=self._find_visible(X_WC),
+            visible=self._compute_visibility_mask(X_WC),
             epoch=self._epoch(),
         )
 
-    def _sense(self) -> tuple[NDArray[np.uint8], Array | None]:
+    def _capture_images(self) -> tuple[NDArray[np.uint8], Array | None]:
         """Return the image `(H, W, 3)` and the depth `(H, W)` [m] of a new frame."""
         raise NotImplementedError
 
-    def _find_visible(self, X_WC: Pose) -> NDArray[np.bool_]:
+    def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
         """Return the mask `(H, W)` of the pixels in which the arm does not hide the scene."""
         raise NotImplementedError
 

@@ -80,9 +80,9 @@ class TruthCamera(SimCamera):
         frame = super().capture()
         return TrueFrame(**vars(frame), truth=self._find_true_detections())
 
-    def _sense(self) -> tuple[Image, Array | None]:
+    def _capture_images(self) -> tuple[Image, Array | None]:
         if self._rendered or self.config.depth:
-            return super()._sense()
+            return super()._capture_images()
         return np.zeros((self.config.height, self.config.width, 3), np.uint8), None
 
     def _find_true_detections(self) -> tuple[Detection, ...]:

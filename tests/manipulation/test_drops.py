@@ -49,7 +49,7 @@ def held(fake: FakeCell) -> str:
 
 def test_the_ledger_is_told_once(fake: FakeCell, held: str) -> None:
     assert not record_drop(fake.cell, held)
-    fake.tool.part()
+    fake.tool.break_seal()
     assert record_drop(fake.cell, held)
     assert record_drop(fake.cell, held)
     (row,) = fake.ledger.summaries()
@@ -65,7 +65,7 @@ def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
 ) -> None:
     run_skill(Transit(held=held, bin="red_bin"), fake)
     monkeypatch.setattr(type(fake.arm), "tool_velocity", np.array((0.0, speed, 0.0)))
-    fake.tool.part()
+    fake.tool.break_seal()
     assert record_drop(fake.cell, held)
     fake.ledger.close(completed=True)
     assert [row.state for row in fake.ledger.summaries()] == [state]

@@ -53,7 +53,7 @@ def test_what_is_carried_is_the_load_and_in_nobodys_way(fake: FakeCell, targets:
     assert task.load is not None
     assert (task.load.kind.label, task.load.bears) == ("cube", 7.9)
     assert [obstacle.name for obstacle in task.around] == ["duck-1"]
-    fake.tool.strength = 3.0
+    fake.tool.breakaway_force = 3.0
     assert task_of_moving(fake.cell).load.bears == 3.0  # type: ignore[union-attr]
 
 

@@ -26,7 +26,7 @@ class UnkindCell(FakeCell):
         self.has_dropped = False
         self._longest = self._unkindness.randrange(1, LONGEST) if self._happens(0.2) else LONGEST
         self._sees_all, self._plan, self._open = self.camera.is_table_visible, self.arm.plan, self.tool.open
-        self.tool.is_sealing = lambda: not self._happens(0.2)
+        self.tool.can_seal = lambda: not self._happens(0.2)
         self.camera.is_table_visible = lambda: not self._happens(0.1) and self._sees_all()
         self.arm.plan, self.tool.open = self._plan_or_not, self._open_or_not  # type: ignore[method-assign]
         for detector in self.detectors.values():

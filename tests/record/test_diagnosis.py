@@ -93,7 +93,7 @@ def test_an_undeclared_reason_is_told_at_the_line_of_its_skill() -> None:
     def seals() -> bool:
         raise discover()["MoveToScan"]().failure("tired", "no more")
 
-    run.fake.tool.is_sealing = seals
+    run.fake.tool.can_seal = seals
     story = run.tell()
     assert 'raised the undeclared reason "tired"' in story.verdict
     assert re.fullmatch(r"record/test_diagnosis\.py:\d+, in seals", story.raised_at)
@@ -115,7 +115,7 @@ def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm(at_rest, 
     def broken() -> bool:
         raise ZeroDivisionError("vacuum gauge")
 
-    run.fake.tool.is_sealing = broken
+    run.fake.tool.can_seal = broken
     story = run.tell(at_rest)
     assert (story.arm, story.verdict) == (arm, "Grasp: ZeroDivisionError: vacuum gauge")
     assert story.next[0].startswith(first)
@@ -128,7 +128,7 @@ def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
 
     def let_go_and_stop() -> None:
         if run.fake.world.held and run.height > 0.1:
-            run.fake.tool.part()
+            run.fake.tool.break_seal()
             run.run.control.stop()
 
     run.at_every_step(let_go_and_stop)
@@ -156,7 +156,7 @@ def test_a_halt_at_a_question_says_so() -> None:
 )  # fmt: skip
 def test_whatever_goes_wrong_its_story_can_be_told(breaks, slips, misses, gone, stop) -> None:
     run = FailedRun("sort_overhead", overrides={"attempts": "2"})
-    run.fake.tool.is_sealing = lambda: breaks.random() >= misses
+    run.fake.tool.can_seal = lambda: breaks.random() >= misses
     run.fake.detector.answers = lambda look, true: "gone" if breaks.random() < gone else true
     run.slip(slips, vanish=breaks.random() < 0.5)
     if stop is not None:

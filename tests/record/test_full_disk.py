@@ -110,7 +110,7 @@ def test_wherever_the_world_cannot_be_kept_the_run_ends_at_rest_and_says_so(run,
     assert shown.exit_code == (3 if room else 2)
     if room:
         assert json.loads(shown.stdout) == json.loads((left / "result.json").read_text())
-        assert json.loads(shown.stdout)["message"].endswith("because it could not be resumed")
+        assert json.loads(shown.stdout)["message"].endswith("could not be resumed after an interruption")
 
 
 def test_a_run_whose_directory_is_deleted_ends_at_rest_and_says_so(run, monkeypatch, cells):

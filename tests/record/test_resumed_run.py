@@ -338,7 +338,7 @@ def unwilling(lets_go: bool) -> Any:
             super().__init__(*args, **options)
             first = self.world.objects[0]
             if not lets_go:
-                self.tool.is_sealing = lambda: (
+                self.tool.can_seal = lambda: (
                     self.world.find_touched_object(self.arm.tool_pose.position) is not first
                 )
 
@@ -366,7 +366,7 @@ def test_a_camera_that_was_moved_before_a_run_is_resumed_ends_it(missions: Path,
     class Moved(FakeCell):
         def __init__(self, *args: Any, **options: Any) -> None:
             super().__init__(*args, **options)
-            self.camera.displacement_text = "camera overhead is not where the cell file says"
+            self.camera.displacement_message = "camera overhead is not where the cell file says"
 
     path = cut_off(load(missions, "sort_overhead"), tmp_path, 1200)
     result = resumed(path, kind=Moved)

@@ -146,10 +146,10 @@ def test_a_carry_to_another_bin_is_waited_for_and_the_approach_after_it_is_not(b
 
 def test_a_grasp_after_a_missed_one_is_planned_ahead_like_the_first(bench: Bench) -> None:
     targets = bench.look()
-    bench.fake.tool.is_sealing = lambda: False
+    bench.fake.tool.can_seal = lambda: False
     with pytest.raises(SkillFailed, match="no seal"):
         bench.grasp(targets)
-    bench.fake.tool.is_sealing = lambda: True
+    bench.fake.tool.can_seal = lambda: True
     selected = bench.run(SelectTarget(targets=bench.look()))
     bench.run(Approach(target=selected.target))
     for _ in range(2):

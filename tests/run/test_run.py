@@ -40,7 +40,7 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     run, _ = make(missions)
     fake = fake_of(run)
     stubborn = fake.world.objects[0]
-    fake.tool.is_sealing = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
+    fake.tool.can_seal = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
     outcome, items, audit = run.execute(), run.count_items(), run.count_ground_truth()
     assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
     named = next(row.item for row in run.workcell.accounts.summaries() if row.state == "rejected")
@@ -69,7 +69,7 @@ def test_a_bug_in_a_part_is_a_fault_and_the_arm_is_at_rest(missions: Path) -> No
     def broken() -> bool:
         raise ZeroDivisionError("vacuum gauge")
 
-    fake.tool.is_sealing = broken
+    fake.tool.can_seal = broken
     outcome = run.execute()
     assert (outcome.status, outcome.node.rpartition("/")[2]) == ("FAULT", "Grasp")
     assert "vacuum gauge" in outcome.message and fake.arm.at_rest

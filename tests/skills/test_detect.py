@@ -92,13 +92,13 @@ def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:
 def test_what_is_seen_of_things_behind_the_arm_is_not_believed(fake: FakeCell) -> None:
     behind, beside = (Detection("cube", 0.9, (x, 200, x + 20, 220)) for x in (300, 400))
     fake.detector.answers = lambda look, true: [behind, beside]
-    fake.camera.hidden_parts.append((290, 190, 310, 230))
+    fake.camera.occluded_regions.append((290, 190, 310, 230))
     assert run_skill(Detect(hidden="pass"), fake).outputs["detections"].found == (beside,)
 
 
 def test_a_moved_camera_is_noticed_in_every_look(fake: FakeCell) -> None:
     for displaced in ("", "camera overhead is not where the cell file says") * 5:
-        fake.camera.displacement_text = displaced
+        fake.camera.displacement_message = displaced
         result = run_skill(Detect(), fake)
         if not displaced:
             assert result.status == "SUCCESS"

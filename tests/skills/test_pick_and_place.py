@@ -121,7 +121,7 @@ def test_grasp_holds_and_the_ledger_knows(fake: FakeCell, held: str) -> None:
 
 
 def test_a_grasp_without_a_seal_is_missed_and_lets_go(fake: FakeCell, target: Target) -> None:
-    fake.tool.is_sealing = lambda: False
+    fake.tool.can_seal = lambda: False
     run_skill(Approach(target=target), fake)
     result = run_skill(Grasp(target=target), fake)
     assert (result.reason, result.message) == ("missed", "no seal on cube-1 0.10 s after contact")

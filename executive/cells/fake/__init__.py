@@ -1,1 +1,1 @@
-"""Fake cell: a kinematic cell without physics, for tests and rehearsals."""
+"""Fake cell: a kinematic cell without physics, for tests of missions and skills."""

@@ -24,18 +24,18 @@ from executive.motion.arms import build_kinematics
 from executive.motion.plans import Plan, Plans
 
 MAX_REACH = 0.85
-"""Maximum distance of the fake tool from the base [m]."""
+"""Maximum distance of the tool of the fake arm from the base [m]."""
 
-TOOL_SPEED = 1.0
-"""Maximum tool speed of the fake arm, and default speed of a goal [m/s]."""
+MAX_TOOL_SPEED = 1.0
+"""Maximum tool speed of the fake arm, and its speed outside of guarded motions [m/s]."""
 
-SEAL_STRENGTH = 7.9
-"""Default breakaway force of the seal of the fake tool [N]."""
+DEFAULT_BREAKAWAY_FORCE = 7.9
+"""Breakaway force of the seals of the fake tool, unless a test changes it [N]."""
 
 
 @dataclass(frozen=True, eq=False)
 class FakeMotion:
-    """A motion of the fake arm: one tool pose for each control step."""
+    """A motion of the fake arm; `path` has one tool pose for each control step."""
 
     path: Sequence[Pose]
 
@@ -46,10 +46,10 @@ class FakeMotion:
 
 
 class FakeArm:
-    """An arm without links: the tool moves straight up, across and down at constant speed.
+    """An arm without links, whose tool moves along straight lines at constant speed.
 
-    The arm stops at once. Its reach is limited, and neither the tool tip nor the lower end of the load may
-    enter the table or the bins. Objects are no obstacles.
+    The arm stops without braking. Its reach is limited, and neither the tool tip nor the lower end of the
+    load may enter the table or the bins. Objects on the table are no obstacles.
 
     Args:
         world: The world that contains the held object.
@@ -59,19 +59,19 @@ class FakeArm:
 
     Attributes:
         poses: Tool pose of each named pose; a run begins at `home`.
-        next_obstacle: Obstacle that stops the arm half way through its next motion, or None; set by tests.
-        commands: Names of the commands `start` and `stop` in order, for tests.
+        next_obstacle: Obstacle that stops the arm in the middle of its next motion, or None; set by tests.
+        commands: Names of the executed commands, `start` or `stop`, in order, for tests.
     """
 
     def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit = ignore) -> None:
-        self.poses = named_poses(config)
+        self.poses = compute_named_poses(config)
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
         self._height = travel_height(config)
         self._joint_count = config.arm.joint_count
         self._obstacles = FakeObstacles(config)
-        self._plans = Plans(self._solve, clock, config.motion.planning, emit)
+        self._plans = Plans(self._plan_motion, clock, config.motion.planning, emit)
         self._tool = self.poses["home"]
         self._path: list[Pose] = []
         self._half_length = 0
@@ -104,19 +104,19 @@ class FakeArm:
 
     @property
     def met(self) -> str | None:
-        """Obstacle that stopped the last motion, in words, or None."""
+        """Description of the obstacle that stopped the last motion, or None."""
         return self._met_obstacle
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
-        """Begin to plan a motion to a goal or a named pose; a plan made ahead is complete at once.
+        """Begin to plan a motion to a goal or a named pose; a plan from `plan_ahead` is complete at once.
 
         The result raises Unreachable for a goal beyond `MAX_REACH` from the base, and Blocked if the tool tip
-        or the load would enter the table or a bin, even on the guarded part, as with the simulated arm.
+        or the load would enter the table or a bin; as for the simulated arm, also on the guarded part.
         """
         return self._plans.plan(self.destination, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
-        """Plan a motion from the end of the running motion, before `plan` is called for it."""
+        """Plan the next motion, from the end of the running motion, before `plan` requests it."""
         self._plans.plan_ahead(self.destination, goal, task)
 
     def start(self, motion: Motion) -> None:
@@ -136,12 +136,12 @@ class FakeArm:
         self._half_length = len(self._path) // 2
         self._met_obstacle = None
 
-    def put(self, pose: Pose) -> None:
-        """Place the tool at a pose, at rest."""
+    def set_tool_pose(self, pose: Pose) -> None:
+        """Move the tool to a pose at once; the arm is then at rest."""
         self._tool, self._path = pose, []
 
     def stop(self) -> None:
-        """Stop the arm at once."""
+        """End the running motion without braking."""
         if self._path:
             self.commands.append("stop")
         self._path = []
@@ -153,9 +153,9 @@ class FakeArm:
             self.stop()
 
     def advance(self) -> None:
-        """Move tool and held object one step along the path; stop if the object meets table or bins."""
-        if self._path and (collision := self._find_collision_of_held(self._path[0])):
-            self.run_into(f"{collision.part} ran into {collision.obstacle}, {collision.place}")
+        """Move tool and held object one step along the path; stop before the object enters table or bins."""
+        if self._path and (collision := self._find_load_collision(self._path[0])):
+            self.run_into(f"{collision.part} ran into {collision.obstacle}, {collision.tool_position_text}")
         elif self._path:
             self._tool = self._path.pop(0)
             if self.next_obstacle is not None and len(self._path) <= self._half_length:
@@ -166,15 +166,18 @@ class FakeArm:
             height = self._world.classes[held.label].height
             held.position = self._tool.position - np.array([0.0, 0.0, height / 2])
 
-    def _find_collision_of_held(self, pose: Pose) -> Collision | None:
-        """Return the collision of the held object on the way to a pose, also if the plan lacks the object."""
+    def _find_load_collision(self, pose: Pose) -> Collision | None:
+        """Return the collision of the held object in a motion to `pose`, or None.
+
+        The plan may lack this object, so `_plan_motion` may not have found the collision.
+        """
         held = self._world.held
         if held is None:
             return None
         tips = np.array([self._tool.position, pose.position])
         return self._obstacles.find_collision(tips, self._world.classes[held.label])
 
-    def _solve(self, start: Array, goal: Goal | str, task: Task) -> FakeMotion:
+    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> FakeMotion:
         load = task.load.kind if task.load else None
         collisions = []
         for path in self._generate_paths(start, goal):
@@ -183,44 +186,45 @@ class FakeArm:
             if collision is None:
                 return FakeMotion(path)
             collisions.append(collision)
-        part, obstacle, depth, place = collisions[-1]
-        raise Blocked(f"the motion would bring {part} {depth:.3f} m into {obstacle}, {place}")
+        part, obstacle, depth, tool_position_text = collisions[-1]
+        raise Blocked(f"the motion would bring {part} {depth:.3f} m into {obstacle}, {tool_position_text}")
 
     def _generate_paths(self, start: Array, goal: Goal | str) -> Iterator[list[Pose]]:
-        """Yield paths to a goal, best first: straight to a named pose, then at travel height."""
-        raised = np.array([*start[:2], max(start[2], self._height)])
+        """Yield candidate paths, best first: straight if the goal is a named pose, then at travel height."""
+        raised_position = np.array([*start[:2], max(start[2], self._height)])
         if isinstance(goal, str):
             end = self.poses[goal]
-            place = above = end.position
-            rotation, speed = end.rotation, TOOL_SPEED
-            yield [*_straight_path(start, place, rotation, TOOL_SPEED)[:-1], end]
+            end_position = guarded_start = end.position
+            rotation, speed = end.rotation, MAX_TOOL_SPEED
+            yield [*_make_straight_path(start, end_position, rotation, MAX_TOOL_SPEED)[:-1], end]
         else:
-            place = np.array(goal.position)
-            check_reachable(place)
-            above = np.array([*place[:2], place[2] + goal.guarded])
-            rotation, speed = tool_down(place, goal.yaw or 0.0).rotation, min(goal.speed, TOOL_SPEED)
-        over = np.array([*place[:2], max(above[2], self._height)])
+            end_position = np.array(goal.position)
+            check_reachable(end_position)
+            guarded_start = np.array([*end_position[:2], end_position[2] + goal.guarded])
+            rotation = tool_down(end_position, goal.yaw or 0.0).rotation
+            speed = min(goal.speed, MAX_TOOL_SPEED)
+        position_over_goal = np.array([*end_position[:2], max(guarded_start[2], self._height)])
         fast_part = [
             pose
-            for a, b in pairwise([start, raised, over, above])
-            for pose in _straight_path(a, b, rotation, TOOL_SPEED)
+            for a, b in pairwise([start, raised_position, position_over_goal, guarded_start])
+            for pose in _make_straight_path(a, b, rotation, MAX_TOOL_SPEED)
         ]
-        yield [*fast_part, *_straight_path(above, place, rotation, speed)]
+        yield [*fast_part, *_make_straight_path(guarded_start, end_position, rotation, speed)]
 
 
 class FakeTool:
-    """A suction cup that seals on every object that it touches, unless a test sets `is_sealing`.
+    """A suction cup that seals on every object that it touches, unless `can_seal` returns False.
 
     Attributes:
-        is_sealing: Returns True if the cup can seal on the touched object; set by tests.
-        strength: Breakaway force of the seals [N].
+        can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
+        breakaway_force: Force that every seal withstands [N].
     """
 
     def __init__(self, world: FakeWorld, tip: Callable[[], Array]) -> None:
         self._world = world
         self._tip = tip
-        self.is_sealing: Callable[[], bool] = lambda: True
-        self.strength = SEAL_STRENGTH
+        self.can_seal: Callable[[], bool] = lambda: True
+        self.breakaway_force = DEFAULT_BREAKAWAY_FORCE
 
     @property
     def touching(self) -> bool:
@@ -235,49 +239,49 @@ class FakeTool:
     @property
     def bears(self) -> float:
         """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
-        return self.strength if self.holding else 0.0
+        return self.breakaway_force if self.holding else 0.0
 
     def close(self) -> None:
         """Seal the cup on the touched object."""
         self._world.is_commanded = True
         touched = self._world.find_touched_object(self._tip())
-        if touched is not None and self.is_sealing():
-            self._world.held, touched.fell = touched, False
+        if touched is not None and self.can_seal():
+            self._world.held, touched.is_dropped = touched, False
 
     def open(self) -> None:
         """Release the held object; it falls straight down."""
         self._world.is_commanded = True
         self._release()
 
-    def part(self) -> None:
-        """Let the seal fail: the held object falls straight down, and rolls off whatever it falls on."""
+    def break_seal(self) -> None:
+        """Break the seal: the held object falls straight down, and rolls off other objects and bin walls."""
         dropped = self._world.held
         self._release()
         if dropped is not None:
-            dropped.fell = True
-            self._world.roll_off(dropped)
-            dropped.stood[-1] = dropped.position.copy()
+            dropped.is_dropped = True
+            self._world.roll_to_free_position(dropped)
+            dropped.rest_positions[-1] = dropped.position.copy()
 
     def _release(self) -> None:
         released, self._world.held = self._world.held, None
         if released is not None:
             released.position[2] = self._world.classes[released.label].height / 2
-            released.stood.append(released.position.copy())
+            released.rest_positions.append(released.position.copy())
 
 
-def named_poses(config: CellConfig) -> dict[str, Pose]:
+def compute_named_poses(config: CellConfig) -> dict[str, Pose]:
     """Return the tool pose of each named pose of a cell file."""
     kinematics = build_kinematics(config)
     return {name: kinematics.forward(np.radians(pose)) for name, pose in config.arm.poses_deg.items()}
 
 
-def check_reachable(place: Array) -> None:
+def check_reachable(position: Array) -> None:
     """Check that the fake tool reaches a position `(3,)` [m].
 
     Raises:
         Unreachable: The position is farther than `MAX_REACH` from the base.
     """
-    distance = float(np.linalg.norm(place))
+    distance = float(np.linalg.norm(position))
     if distance > MAX_REACH:
         raise Unreachable(f"{distance:.2f} m from the base is more than the arm's {MAX_REACH:.2f} m")
 
@@ -288,7 +292,7 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
     return places_out_of_reach(config, lambda place, _: check_reachable(np.array([*place, height])))
 
 
-def _straight_path(start: Array, end: Array, rotation: Array, speed: float) -> list[Pose]:
-    """Return the poses of a straight path from `start` (excluded) to `end`, positions `(3,)` [m]."""
+def _make_straight_path(start: Array, end: Array, rotation: Array, speed: float) -> list[Pose]:
+    """Return the tool poses of a straight path from the position `start`, excluded, to `end`, `(3,)` [m]."""
     count = math.ceil(float(np.linalg.norm(end - start)) / speed / STEP)
     return [Pose(rotation, start + (end - start) * (i + 1) / count) for i in range(count)]

@@ -19,16 +19,17 @@ from executive.geometry import Pose
 from executive.perception.mounted_camera import MountedCamera
 
 MIN_CONFIDENCE = 0.9
-"""Confidence of the detections of a fake detector, unless its threshold is higher."""
+"""Confidence of the detections of a fake detector, unless the threshold of its cell file is higher."""
 
 
 class FakeCamera(MountedCamera):
     """A camera at the pose of the cell file, with blank images.
 
     Attributes:
-        is_table_visible: Returns True if the whole workspace is in view; the fake arm hides nothing.
-        hidden_parts: Parts of the image that are hidden [pixel]; set by tests.
-        displacement_text: Displacement of the camera that its frames show, in words; set by tests.
+        is_table_visible: Function that returns True if the whole workspace is in the image; set by tests. By
+            default it ignores occlusion.
+        occluded_regions: Regions of the image without visible objects [pixel]; set by tests.
+        displacement_message: Message about a displacement of the camera, "" for none; set by tests.
     """
 
     def __init__(
@@ -41,31 +42,31 @@ class FakeCamera(MountedCamera):
         epoch: Callable[[], int],
     ) -> None:
         super().__init__(name, config, flange, clock, epoch)
-        self.is_table_visible: Callable[[], bool] = self._has_whole_table_in_image
-        self.hidden_parts: list[Box] = []
-        self.displacement_text = ""
+        self.is_table_visible: Callable[[], bool] = self._is_table_in_image
+        self.occluded_regions: list[Box] = []
+        self.displacement_message = ""
         self._corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
 
     def sees_table(self) -> bool:
-        """Return the value of `is_table_visible`."""
+        """Return the result of `is_table_visible`."""
         return self.is_table_visible()
 
     def displacement(self, frame: Frame) -> str:
-        """Return the value of `displacement_text`."""
+        """Return the value of `displacement_message`."""
         del frame
-        return self.displacement_text
+        return self.displacement_message
 
-    def _sense(self) -> tuple[NDArray[np.uint8], None]:
+    def _capture_images(self) -> tuple[NDArray[np.uint8], None]:
         return np.zeros((self.config.height, self.config.width, 3), dtype=np.uint8), None
 
-    def _find_visible(self, X_WC: Pose) -> NDArray[np.bool_]:
+    def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
         del X_WC
         visible = np.ones((self.config.height, self.config.width), dtype=bool)
-        for left, top, right, bottom in self.hidden_parts:
+        for left, top, right, bottom in self.occluded_regions:
             visible[int(top) : int(bottom), int(left) : int(right)] = False
         return visible
 
-    def _has_whole_table_in_image(self) -> bool:
+    def _is_table_in_image(self) -> bool:
         corners = self._pose().inverse().apply(self._corners) @ self.matrix.T
         pixels = corners[:, :2] / corners[:, 2:]
         inside = (pixels >= 0) & (pixels < (self.config.width, self.config.height))
@@ -74,9 +75,9 @@ class FakeCamera(MountedCamera):
 
 @dataclass(frozen=True)
 class FakeRequest:
-    """A request that is answered at a fixed time `due` [s]."""
+    """A request whose answer, the detections or a message, is available from the time `due_time` [s]."""
 
-    due: float
+    due_time: float
     clock: Clock
     answer: Sequence[Detection] | str
     detector: str
@@ -85,7 +86,7 @@ class FakeRequest:
     @property
     def ready(self) -> bool:
         """True if the answer is available."""
-        return self.clock.now >= self.due
+        return self.clock.now >= self.due_time
 
     def result(self) -> Answer:
         """Return the detections, or raise Unavailable if `answer` is a message."""
@@ -94,50 +95,52 @@ class FakeRequest:
         return Answer(self.detector, tuple(self.answer), self.error_rates)
 
 
-def _answer_truthfully(look: int, true: Sequence[Detection]) -> Sequence[Detection]:
-    del look
-    return true
+def _return_true_detections(request_number: int, true_detections: Sequence[Detection]) -> Sequence[Detection]:
+    del request_number
+    return true_detections
 
 
 @dataclass(eq=False)
 class FakeDetector:
-    """A detector that finds every object in front of the camera, unless `answers` changes the detections.
+    """A detector that finds every object in a view, unless `answers` changes the detections.
 
     Attributes:
         name: Name of the detector in the cell file.
         config: Section of the detector in the cell file.
         world: The world with the true objects.
         clock: Clock of the run.
-        area: Returns the part of the image that a view names [pixel].
-        answers: Returns detections, or a message if the detector is unavailable; its arguments are the
-            number of the look (from 1) and the true detections.
-        looks: Number of looks so far.
+        get_view_region: Returns the region of the image of a view, which is `table` or `full` [pixel].
+        answers: Returns the detections, or a message if the detector is unavailable; its arguments are the
+            number of the request (from 1) and the true detections.
+        request_count: Number of requests so far.
     """
 
     name: str
     config: DetectorConfig
     world: FakeWorld
     clock: Clock
-    area: Callable[[str], Box]
-    answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _answer_truthfully
-    looks: int = 0
+    get_view_region: Callable[[str], Box]
+    answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _return_true_detections
+    request_count: int = 0
 
     def request(self, frame: Frame, view: str) -> Request:
         """Return a request for the objects in a view of a frame; the cell file sets its latency."""
-        self.looks += 1
-        left, top, right, bottom = self.area(view)
-        true = []
+        self.request_count += 1
+        left, top, right, bottom = self.get_view_region(view)
+        true_detections = []
         for fake_object in self.world.objects:
             x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
             if depth <= 0 or fake_object is self.world.held:
                 continue
             column, row = x / depth, y / depth
             if left <= column < right and top <= row < bottom:
-                true.append(self._make_detection(fake_object.label, column, row, frame.matrix[0, 0] / depth))
+                true_detections.append(
+                    self._make_detection(fake_object.label, column, row, frame.matrix[0, 0] / depth)
+                )
         return FakeRequest(
             self.clock.now + self.config.latency,
             self.clock,
-            self.answers(self.looks, true),
+            self.answers(self.request_count, true_detections),
             self.name,
             self.config.error_rates,
         )

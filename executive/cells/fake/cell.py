@@ -16,7 +16,7 @@ from executive.cell.workcell import CellOptions, KeyPath
 from executive.cells.audit import FinalObject, audit_objects
 from executive.cells.fake.arm import FakeArm, FakeTool, find_places_out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
-from executive.cells.fake.command_log import FakeLog, restore
+from executive.cells.fake.command_log import FakeLog, restore_world
 from executive.cells.fake.least_times import FakeTimes
 from executive.cells.fake.visuals import FakeVisuals
 from executive.cells.fake.world import FakeObject, FakeWorld
@@ -31,17 +31,17 @@ from executive.perception.detectors.screening import screen_detectors
 from executive.perception.localization import build_localizer
 
 ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
-"""Bins of the classes of the shipped cells."""
+"""Permitted bins of each class of the shipped cells."""
 
 
 class SilentOperator:
-    """Operator without a terminal: requests the classes in a list, then quits."""
+    """Operator without a terminal, who requests the classes of a list in order, and then quits."""
 
     def __init__(self, requests: Sequence[str] = ()) -> None:
         self._requests = list(requests)
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the next request, or None."""
+        """Return the next request of the list, or None at its end."""
         del choices
         return self._requests.pop(0) if self._requests else None
 
@@ -49,15 +49,15 @@ class SilentOperator:
 class FakeCell(CellWithoutHardware):
     """The cell of a cell file without physics; implements `executive.cell.workcell.Workcell`.
 
-    Bins, classes, table, poses, camera, detectors and ledger follow the cell file. The arm moves in straight
-    lines, table and bins are solid, the tool always seals, and detectors of every kind find all objects.
+    Bins, classes, table, poses, camera, detectors and ledger follow the cell file. The arm moves along
+    straight lines, table and bins are obstacles, the tool always seals, and every detector finds all objects.
 
     Args:
-        config: The cell file; by default `bare_table`.
+        config: The cell file; by default `load_empty_cell`.
         seed: Random seed of the classes and positions of the objects.
-        routes: Names of the right bins of each class.
+        routes: Names of the permitted bins of each class.
         emit: Receives the events of the cell.
-        options: Options of the run; by default with an operator without requests.
+        options: Options of the run; by default with an operator who requests nothing.
 
     Attributes:
         world: Objects and bins.
@@ -81,7 +81,7 @@ class FakeCell(CellWithoutHardware):
         emit: Emit = ignore,
         options: CellOptions | None = None,
     ) -> None:
-        config = config or bare_table()
+        config = config or load_empty_cell()
         options = options or CellOptions(SilentOperator(), base=Path())
         if options.gui:
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
@@ -89,7 +89,7 @@ class FakeCell(CellWithoutHardware):
         classes, clock, bins = self.cell.classes, self.cell.clock, tuple(self.cell.bins.values())
         self.ledger = self.accounts
         self.world = FakeWorld(classes, bins=bins)
-        scatter(self.world, config, seed)
+        put_random_objects(self.world, config, seed)
         self.arm = FakeArm(self.world, config, clock, emit)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
         name, camera = next(iter(config.cameras.items()))
@@ -109,7 +109,7 @@ class FakeCell(CellWithoutHardware):
         self.detector = next(iter(self.detectors.values()))
         self._log: FakeLog | None = None
         if options.resume is not None:
-            self.steps, self.last_command = restore(options.resume.log, self.world, self.arm)
+            self.steps, self.last_command = restore_world(options.resume.log, self.world, self.arm)
             self.camera.skip(options.resume.frames, options.resume.turns)
             self.log_to(options.resume.log)
         self.cell = replace(
@@ -123,11 +123,11 @@ class FakeCell(CellWithoutHardware):
 
     @staticmethod
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return findings for an unsupported arm, places out of reach, and more objects than fit."""
+        """Return a finding for an unsupported arm, each place out of reach, and more objects than fit."""
         del base
         if unsupported := tuple(find_unsupported_arm(config)):
             return unsupported
-        problem = _find_lack_of_room(config, config.table.objects[1])
+        problem = _describe_lack_of_room(config, config.table.objects[1])
         return (*find_places_out_of_reach(config), *([(("table", "objects"), problem)] if problem else []))
 
     @staticmethod
@@ -142,14 +142,14 @@ class FakeCell(CellWithoutHardware):
         return FakeTimes(config)
 
     def log_to(self, path: Path) -> None:
-        """Write the state of the world to a log, now and after every control step."""
+        """Write the state of the world to a log file, now and after every control step."""
         self._log = FakeLog(path)
         try:
-            self.note()
+            self.log_state()
         except Fault as fault:
             raise InputError(str(fault)) from fault
 
-    def note(self) -> None:
+    def log_state(self) -> None:
         """Write the current state of the world to the log."""
         if self._log is not None:
             self._log.write_state(self.steps, self.last_command, self.world, self.arm)
@@ -160,27 +160,28 @@ class FakeCell(CellWithoutHardware):
             self.last_command, self.world.is_commanded = self.steps, False
         self.arm.advance()
         super().advance()
-        self.note()
+        self.log_state()
 
     def visuals(self) -> FakeVisuals:
-        """Return the shapes in the cell, for display only."""
+        """Return the shapes in the cell for display."""
         return FakeVisuals(self.config, self.world, lambda: self.arm.tool_pose)
 
     def audit(self) -> dict[str, int]:
         """Return the counts of `executive.cells.audit.audit_objects` for the objects of the cell."""
         world = self.world
         objects = []
-        for is_removed, group in ((False, world.objects), (True, world.removed)):
+        for is_removed, group in ((False, world.objects), (True, world.removed_objects)):
             for obj in group:
                 bin = self._find_bin(obj)
-                # The first position of an item that a resumed run first saw in a bin is the bin's centre.
-                places = [*obj.stood, self.cell.bins[bin].position] if bin else obj.stood
-                objects.append(FinalObject(obj.label, bin, places, obj.fell, obj is world.held, is_removed))
+                # If a resumed run first detects an item in a bin, its first position is the bin's centre.
+                centres = [self.cell.bins[bin].position] if bin else []
+                positions, is_held = [*obj.rest_positions, *centres], obj is world.held
+                objects.append(FinalObject(obj.label, bin, positions, obj.is_dropped, is_held, is_removed))
         return audit_objects(objects, self.ledger.records, self.routes, self.config.ledger.gate)
 
     def _find_bin(self, fake_object: FakeObject) -> str:
         """Return the name of the bin in which an object lies, or ""."""
-        # An object on the wall of a bin counts as in the bin, unless it is inside another bin.
+        # An object on the wall of a bin counts as being in the bin, unless it is inside another bin.
         wall = BIN_THICKNESS + self.cell.classes[fake_object.label].radius / 2
         for margin in (0.0, wall):
             for name, bin in self.cell.bins.items():
@@ -196,28 +197,28 @@ class FakeCell(CellWithoutHardware):
 
 
 @functools.cache
-def bare_table() -> CellConfig:
-    """Return the shipped overhead cell without objects, for tests of single skills."""
+def load_empty_cell() -> CellConfig:
+    """Return the shipped cell `overhead` as a fake cell without objects, for tests of single skills."""
     path = shipped_folder() / "cells" / "overhead.yaml"
     return load_cell(path, {"cell.kind": "fake", "cell.table.objects": "[0, 0]"})
 
 
-def scatter(world: FakeWorld, config: CellConfig, seed: int) -> None:
-    """Put objects of random classes on random points of a grid; the cell file sets their number.
+def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
+    """Put objects of random classes on random points of a grid; their number is in the cell file's range.
 
     Raises:
         InputError: The workspace has no room for this number of objects.
     """
     random = np.random.default_rng(seed)
     count = int(random.integers(*config.table.objects, endpoint=True))
-    if problem := _find_lack_of_room(config, count):
+    if problem := _describe_lack_of_room(config, count):
         raise InputError(problem)
-    places, _ = _grid_points(config)
-    for index in random.permutation(len(places))[:count]:
-        world.put(str(random.choice(list(config.objects))), *places[index])
+    points, _ = _compute_grid_points(config)
+    for index in random.permutation(len(points))[:count]:
+        world.put(str(random.choice(list(config.objects))), *points[index])
 
 
-def _grid_points(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
+def _compute_grid_points(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
     """Return the grid points for objects on the table [m], and the distance between them [m]."""
     pitch = 2 * max(kind.radius for kind in config.objects.values()) + config.table.gap
     sides = config.table.x, config.table.y
@@ -225,11 +226,11 @@ def _grid_points(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
     return [(float(x), float(y)) for x in xs for y in ys], pitch
 
 
-def _find_lack_of_room(config: CellConfig, count: int) -> str:
-    """Return a message if the table lacks room for `count` objects, or ""."""
-    places, pitch = _grid_points(config)
+def _describe_lack_of_room(config: CellConfig, count: int) -> str:
+    """Return a message if the workspace lacks room for `count` objects, else ""."""
+    points, pitch = _compute_grid_points(config)
     message = (
-        f"{count} objects find no room on the workspace of cell {config.cell}, which has {len(places)} "
+        f"{count} objects find no room on the workspace of cell {config.cell}, which has {len(points)} "
         f"places {pitch:.3f} m apart; ask for fewer or widen table.x and table.y"
     )
-    return message if count > len(places) else ""
+    return message if count > len(points) else ""

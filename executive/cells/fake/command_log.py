@@ -1,4 +1,4 @@
-"""Log with the last state of a fake world, which suffices to rebuild a world without physics."""
+"""Log with the last state of a fake world, from which the world of an interrupted run is restored."""
 
 from __future__ import annotations
 
@@ -24,7 +24,13 @@ class FakeLog(LogFile):
         self._length = 0
 
     def write_state(self, steps: int, last_command: int, world: FakeWorld, arm: FakeArm) -> None:
-        """Write the current state, after a number of control steps.
+        """Replace the content of the file by the current state; do nothing if the file is closed.
+
+        Args:
+            steps: Number of control steps of the run.
+            last_command: Control step of the last command to arm or tool.
+            world: The world.
+            arm: The arm.
 
         Raises:
             Fault: The disk does not accept the state.
@@ -34,18 +40,18 @@ class FakeLog(LogFile):
         state = {
             "steps": steps,
             "last_command": last_command,
-            "objects": [vars(obj) for obj in world.objects],
-            "removed": [vars(obj) for obj in world.removed],
+            "objects": list(map(_to_json, world.objects)),
+            "removed": list(map(_to_json, world.removed_objects)),
             "held": next((n for n, obj in enumerate(world.objects) if obj is world.held), None),
             "tool": [arm.tool_pose.rotation, arm.tool_pose.position],
         }
         text = json.dumps(state, default=np.ndarray.tolist).encode()
-        # No write is shorter than an earlier write, so that the file holds one state, followed by blanks.
+        # No write is shorter than an earlier one, so that the file contains one state, followed by blanks.
         self._length = max(self._length, len(text))
         self.write(text.ljust(self._length), 0)
 
 
-def restore(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]:
+def restore_world(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]:
     """Restore world and arm to the state in a log, with the arm at rest.
 
     Returns:
@@ -57,10 +63,10 @@ def restore(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]:
     try:
         state: Mapping[str, Any] = json.loads(path.read_bytes())
         world.objects[:] = [_read_object(**fields) for fields in state["objects"]]
-        world.removed[:] = [_read_object(**fields) for fields in state["removed"]]
+        world.removed_objects[:] = [_read_object(**fields) for fields in state["removed"]]
         world.held = None if state["held"] is None else world.objects[state["held"]]
         rotation, position = map(_read_array, state["tool"])
-        arm.put(Pose(rotation.reshape(3, 3), position.reshape(3)))
+        arm.set_tool_pose(Pose(rotation.reshape(3, 3), position.reshape(3)))
         return int(state["steps"]), int(state["last_command"])
     except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
         raise InputError(
@@ -68,10 +74,16 @@ def restore(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]:
         ) from error
 
 
+def _to_json(written: FakeObject) -> Mapping[str, Any]:
+    """Return an object with the keys of the log, which are the arguments of `_read_object`."""
+    state = {"label": written.label, "position": written.position}
+    return {**state, "stood": written.rest_positions, "fell": written.is_dropped}
+
+
 def _read_array(value: object) -> Array:
     return np.array(value, dtype=np.float64)
 
 
 def _read_object(label: str, position: object, stood: Sequence[object], fell: bool) -> FakeObject:
-    places = [_read_array(place).reshape(3) for place in stood]
-    return FakeObject(str(label), _read_array(position).reshape(3), places, bool(fell))
+    rest_positions = [_read_array(place).reshape(3) for place in stood]
+    return FakeObject(str(label), _read_array(position).reshape(3), rest_positions, bool(fell))

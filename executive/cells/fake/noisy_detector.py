@@ -21,9 +21,9 @@ from executive.perception.detectors.setting import (
 )
 
 MAX_CONFUSED_CONFIDENCE = 0.75
-"""Largest confidence of a detection with a wrong class."""
+"""Maximum confidence of a detection with a wrong class, 0 to 1."""
 FALSE_BOX_SIDE_RANGE = (15.0, 40.0)
-"""Smallest and largest side of the box of a false detection [pixel]."""
+"""Minimum and maximum side of the box of a false detection [pixel]."""
 
 
 class NoisyOptions(Section):
@@ -32,16 +32,16 @@ class NoisyOptions(Section):
     of: str
     """Name of the detector of the cell to whose answers errors are added."""
     classes: tuple[str, ...]
-    """Classes of wrong and false detections."""
+    """Possible classes of detections with a wrong class and of false detections."""
 
 
 class NoisyDetector:
     """Adds errors to the answers of another detector; implements `executive.cell.protocols.Detector`.
 
-    The errors of each look are random and depend on the seed. The detector omits a share `misses` of the
-    detections, gives a share `confused` a wrong class with low confidence, shifts each box along each axis
-    by a normal deviate with standard deviation `jitter`, and adds `invented` boxes on average. The ledger
-    assumes the same rates, because they come from the same section of the cell file.
+    The errors in each frame are random and depend on the seed. The detector omits the fraction `misses` of
+    the detections, gives the fraction `confused` a wrong class with low confidence, shifts each box along
+    each axis by a normal deviate with the standard deviation `jitter`, and adds `invented` boxes on average.
+    The ledger assumes the same rates, because they come from the same section of the cell file.
 
     Attributes:
         is_fake: True: the error rates in the cell file are exact and need not be measured.
@@ -66,11 +66,11 @@ class NoisyDetector:
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
-        """Yield each wrong option, with a message."""
+        """Yield each invalid option, with a message."""
         del base
-        wrong = list(find_wrong_options(NoisyOptions, config))
-        yield from wrong
-        if not wrong and config.options["of"] not in others:
+        invalid_options = list(find_wrong_options(NoisyOptions, config))
+        yield from invalid_options
+        if not invalid_options and config.options["of"] not in others:
             yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(others)}'
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
@@ -82,30 +82,31 @@ class NoisyDetector:
         """Do nothing: the detector holds no resources."""
 
     def _add_errors(self, answer: Answer, frame: Frame, view: str) -> Answer:
-        """Return an answer with errors that depend on the seed and the number of the frame."""
+        """Return the answer with random errors, which depend on the seed, the frame and the view."""
         random = np.random.default_rng([self._setting.seed, frame.id, len(view)])
         kept = [detection for detection in answer.found if random.random() >= self._config.misses]
-        found = [self._shift(self._confuse(detection, random), random) for detection in kept]
-        found += [self._invent(frame, view, random) for _ in range(random.poisson(self._config.invented))]
+        found = [self._shift_box(self._replace_class(detection, random), random) for detection in kept]
+        false_count = random.poisson(self._config.invented)
+        found += [self._make_false_detection(frame, view, random) for _ in range(false_count)]
         found.sort(key=lambda detection: -detection.confidence)
         return Answer(self._setting.name, tuple(found), self._config.error_rates)
 
-    def _confuse(self, detection: Detection, random: np.random.Generator) -> Detection:
+    def _replace_class(self, detection: Detection, random: np.random.Generator) -> Detection:
         if random.random() >= self._config.confused:
             return detection
-        wrong = [label for label in self._options.classes if label != detection.label]
+        wrong_labels = [label for label in self._options.classes if label != detection.label]
         return replace(
             detection,
-            label=str(random.choice(wrong)),
+            label=str(random.choice(wrong_labels)),
             confidence=self._draw_confidence(MAX_CONFUSED_CONFIDENCE, random),
         )
 
-    def _shift(self, detection: Detection, random: np.random.Generator) -> Detection:
+    def _shift_box(self, detection: Detection, random: np.random.Generator) -> Detection:
         right, down = random.normal(0.0, self._config.jitter, 2)
         x0, y0, x1, y1 = detection.box
         return replace(detection, box=(x0 + right, y0 + down, x1 + right, y1 + down))
 
-    def _invent(self, frame: Frame, view: str, random: np.random.Generator) -> Detection:
+    def _make_false_detection(self, frame: Frame, view: str, random: np.random.Generator) -> Detection:
         height, width = frame.image.shape[:2]
         left, top, right, bottom = (
             self._setting.camera.table_view if view == "table" else (0, 0, width, height)

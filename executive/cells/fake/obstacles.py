@@ -1,4 +1,4 @@
-"""Obstacles of the fake cell: table top and bins, for the tool tip and its load."""
+"""Collision check of the fake cell: tool tip or load against table top and bins."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from executive.motion.clearance_model import MAX_PENETRATION
 
 
 class Collision(NamedTuple):
-    """The deepest penetration of a path into an obstacle.
+    """The deepest penetration of an obstacle along a path.
 
     Attributes:
-        part: The colliding part: the tool or its load.
-        obstacle: The table, or the name of a bin.
+        part: Name of the colliding part: the tool or its load.
+        obstacle: Name of the obstacle: the table or a bin.
         depth: Depth of the part inside the obstacle [m].
-        place: Position of the tool in words, for the message of an error.
+        tool_position_text: Position of the tool, as the end of an error message.
     """
 
     part: str
     obstacle: str
     depth: float
-    place: str
+    tool_position_text: str
 
 
 class FakeObstacles:
@@ -39,18 +39,18 @@ class FakeObstacles:
     def __init__(self, config: CellConfig) -> None:
         self._cup_radius = config.tool.cup_radius
         parts = [(name, bin, *wall) for name, bin in config.bins.items() for wall in bin_walls(bin.size)]
-        middles = np.array([np.add(bin.position, middle) for _, bin, _, middle in parts]).reshape(-1, 3)
-        halves = np.array([half for _, _, half, _ in parts]).reshape(-1, 3)
+        centres = np.array([np.add(bin.position, centre) for _, bin, _, centre in parts]).reshape(-1, 3)
+        half_sizes = np.array([half_size for _, _, half_size, _ in parts]).reshape(-1, 3)
         # Index 0 is the table: an infinite box with its top at height 0.
         self._names = ["the table", *(name for name, *_ in parts)]
-        self._low = np.vstack([[-np.inf, -np.inf], (middles - halves)[:, :2]])
-        self._high = np.vstack([[np.inf, np.inf], (middles + halves)[:, :2]])
-        self._top = np.concatenate([[0.0], (middles + halves)[:, 2]])
+        self._lower_corners = np.vstack([[-np.inf, -np.inf], (centres - half_sizes)[:, :2]])
+        self._upper_corners = np.vstack([[np.inf, np.inf], (centres + half_sizes)[:, :2]])
+        self._top_heights = np.concatenate([[0.0], (centres + half_sizes)[:, 2]])
 
     def find_collision(self, tips: Array, load: ObjectClass | None) -> Collision | None:
         """Return the deepest collision along a path of the tool tip, or None.
 
-        The path may start inside an obstacle, but must not go deeper into this obstacle.
+        The path may start inside an obstacle, but must not penetrate this obstacle deeper than at the start.
 
         Args:
             tips: Positions of the tool tip along the path `(N, 3)` [m]; the first is the current position.
@@ -59,13 +59,14 @@ class FakeObstacles:
         """
         height, radius = (load.height, load.radius + load.ring) if load else (0.0, self._cup_radius)
         x_y = tips[:, None, :2]
-        outside = np.maximum(self._low - x_y, x_y - self._high)
+        outside = np.maximum(self._lower_corners - x_y, x_y - self._upper_corners)
         distance = np.linalg.norm(np.maximum(outside, 0.0), axis=2) + np.minimum(outside.max(axis=2), 0.0)
-        depth = np.minimum(radius - distance, self._top - (tips[:, 2:] - height))
+        depth = np.minimum(radius - distance, self._top_heights - (tips[:, 2:] - height))
         excess = depth - np.maximum(depth[0], MAX_PENETRATION)
         i, obstacle = (int(index) for index in np.unravel_index(np.argmax(excess), excess.shape))
         if excess[i, obstacle] <= 0:
             return None
         x, y, z = tips[i]
-        part, place = f"the held {load.label}" if load else "the tool", f"({x:.3f}, {y:.3f}, {z:.3f}) m"
-        return Collision(part, self._names[obstacle], float(depth[i, obstacle]), f"with the tool at {place}")
+        part = f"the held {load.label}" if load else "the tool"
+        tool_position_text = f"with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
+        return Collision(part, self._names[obstacle], float(depth[i, obstacle]), tool_position_text)

@@ -12,12 +12,14 @@ from executive.cell.visuals import Shape
 from executive.cells.fake.world import FakeObject, FakeWorld
 from executive.geometry import Pose
 
-TOOL, TOOL_COLOUR = "tool", (0.25, 0.28, 0.32)
-TABLE_COLOUR = (0.86, 0.78, 0.66)
+TOOL_NAME = "tool"
+"""Name of the tool as a body of the displayed scene."""
+TOOL_COLOUR, TABLE_COLOUR = (0.25, 0.28, 0.32), (0.86, 0.78, 0.66)
+"""Colours of the displayed tool and table: red, green and blue, each 0 to 1."""
 TABLE_THICKNESS = 0.02
 """Thickness of the displayed table [m]."""
 TABLE_MARGIN = 0.12
-"""Width of the displayed table around the workspace [m]."""
+"""Width of the part of the displayed table on each side of the workspace [m]."""
 
 
 class FakeVisuals:
@@ -35,7 +37,8 @@ class FakeVisuals:
         self._names: dict[FakeObject, str] = {
             fake_object: f"object {number}" for number, fake_object in enumerate(world.objects)
         }
-        self._shapes = (*_fixed_shapes(config), *_tool_shapes(config), *self._object_shapes(config))
+        tool_shapes = _make_tool_shapes(config)
+        self._shapes = (*_make_fixed_shapes(config), *tool_shapes, *self._make_object_shapes(config))
 
     @property
     def shapes(self) -> Sequence[Shape]:
@@ -44,29 +47,29 @@ class FakeVisuals:
 
     def poses(self) -> Mapping[str, Pose]:
         """Return the poses of the tool and of the objects, by name."""
-        places = {self._names[obj]: Pose.of(obj.position) for obj in self._world.objects}
-        return {TOOL: self._tool(), **places}
+        object_poses = {self._names[obj]: Pose.of(obj.position) for obj in self._world.objects}
+        return {TOOL_NAME: self._tool(), **object_poses}
 
-    def _object_shapes(self, config: CellConfig) -> Iterator[Shape]:
+    def _make_object_shapes(self, config: CellConfig) -> Iterator[Shape]:
         for fake_object, name in self._names.items():
             object_class = config.objects[fake_object.label]
             size = (2 * object_class.radius, 2 * object_class.radius, object_class.height)
             yield Shape(name, "cylinder", size, Pose.of((0.0, 0.0, 0.0)), object_class.colours[0])
 
 
-def _fixed_shapes(config: CellConfig) -> Iterator[Shape]:
+def _make_fixed_shapes(config: CellConfig) -> Iterator[Shape]:
     """Yield the shapes of the table and of the bins."""
     (left, right), (near, far) = config.table.x, config.table.y
     size = (right - left + 2 * TABLE_MARGIN, far - near + 2 * TABLE_MARGIN, TABLE_THICKNESS)
     middle = Pose.of(((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2))
     yield Shape("", "box", size, middle, TABLE_COLOUR)
     for bin in config.bins.values():
-        for (x, y, z), place in bin_walls(bin.size):
+        for (x, y, z), centre in bin_walls(bin.size):
             size = 2 * x, 2 * y, 2 * z
-            yield Shape("", "box", size, Pose.of(np.add(bin.position, place)), bin.colour)
+            yield Shape("", "box", size, Pose.of(np.add(bin.position, centre)), bin.colour)
 
 
-def _tool_shapes(config: CellConfig) -> Iterator[Shape]:
-    """Yield the shape of the tool; its frame is at the tip, with z out of the tool."""
+def _make_tool_shapes(config: CellConfig) -> Iterator[Shape]:
+    """Yield the shape of the tool; the origin of its frame is the tip, and z points out of the tool."""
     size = (2 * TOOL_RADIUS, 2 * TOOL_RADIUS, config.tool.length)
-    yield Shape(TOOL, "cylinder", size, Pose.of((0.0, 0.0, -config.tool.length / 2)), TOOL_COLOUR)
+    yield Shape(TOOL_NAME, "cylinder", size, Pose.of((0.0, 0.0, -config.tool.length / 2)), TOOL_COLOUR)

@@ -1,4 +1,4 @@
-"""World without physics: a table with objects that the tool picks, carries and releases."""
+"""World without physics: a table with objects that the tool can pick, transport and release."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from executive.geometry import Array
 from executive.mission.findings import alternatives
 
 MAX_SEAL_OFFSET = 0.012
-"""Largest horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
+"""Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
 
 TOUCH_DISTANCE = 0.002
-"""Largest vertical distance between the cup and the top of an object for contact [m]."""
+"""Maximum vertical distance between the cup and the top of an object for contact [m]."""
 
 
 @dataclass(eq=False)
@@ -27,14 +27,14 @@ class FakeObject:
     Attributes:
         label: Class of the object.
         position: Centre of the object `(3,)` [m].
-        stood: Positions `(3,)` [m] at the start, and after each fall and each placement.
-        fell: True if the object fell from the tool and was not in the tool again.
+        rest_positions: Positions `(3,)` [m] at the start, and after each fall and each placement.
+        is_dropped: True if the object fell from the tool and has not been picked up since.
     """
 
     label: str
     position: Array
-    stood: list[Array]
-    fell: bool = False
+    rest_positions: list[Array]
+    is_dropped: bool = False
 
 
 @dataclass(eq=False)
@@ -44,15 +44,15 @@ class FakeWorld:
     Attributes:
         classes: Classes of the objects, by label.
         objects: The objects, in the order in which they were added.
-        removed: The removed objects.
+        removed_objects: The removed objects.
         bins: The bins of the cell.
-        held: The object at the tool, or None.
-        is_commanded: True if arm or tool was commanded in this control step.
+        held: The object that the tool holds, or None.
+        is_commanded: True if arm or tool received a command in this control step.
     """
 
     classes: Mapping[str, ObjectClass]
     objects: list[FakeObject] = field(default_factory=list)
-    removed: list[FakeObject] = field(default_factory=list)
+    removed_objects: list[FakeObject] = field(default_factory=list)
     bins: Collection[Bin] = ()
     held: FakeObject | None = None
     is_commanded: bool = False
@@ -81,14 +81,14 @@ class FakeWorld:
     def remove(self, fake_object: FakeObject) -> None:
         """Remove an object that is not held."""
         self.objects.remove(fake_object)
-        self.removed.append(fake_object)
+        self.removed_objects.append(fake_object)
 
-    def roll_off(self, fallen: FakeObject) -> None:
+    def roll_to_free_position(self, fallen: FakeObject) -> None:
         """Move a fallen object from the wall of a bin into that bin, or off other objects on the table.
 
-        The object is moved off each of the other objects once. An object inside a bin is not moved.
+        The object is moved once per object that it overlaps. An object inside a bin is not moved.
         """
-        if self._fall_into_bin(fallen):
+        if self._move_into_bin(fallen):
             return
         radius = self.classes[fallen.label].radius
         for other in self.objects:
@@ -98,31 +98,28 @@ class FakeWorld:
             if other is not fallen and distance < min_distance:
                 direction = direction / distance if distance else np.array((1.0, 0.0))
                 fallen.position[:2] = other.position[:2] + min_distance * direction
-        self._fall_into_bin(fallen)
+        self._move_into_bin(fallen)
 
-    def _fall_into_bin(self, fallen: FakeObject) -> bool:
-        """Move an object from the wall of a bin into the bin; return True if the object is now in a bin."""
+    def _move_into_bin(self, fallen: FakeObject) -> bool:
+        """Move an object on the wall of a bin into the bin; return True if the object is now in a bin."""
         radius = self.classes[fallen.label].radius
         if any(bin.contains(fallen.position) for bin in self.bins):
             return True
         for bin in self.bins:
             if bin.contains(fallen.position, BIN_THICKNESS + radius / 2):
-                inside = np.maximum(bin.size[:2] / 2 - radius, 0.0)
+                max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)
                 offset = fallen.position[:2] - bin.position[:2]
-                fallen.position[:2] = bin.position[:2] + np.clip(offset, -inside, inside)
+                fallen.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
                 return True
         return False
-
-    def top(self, fake_object: FakeObject) -> float:
-        """Return the height of the top of an object [m]."""
-        return float(fake_object.position[2]) + self.classes[fake_object.label].height / 2
 
     def find_touched_object(self, tip: Array) -> FakeObject | None:
         """Return the object whose top a cup at `tip` `(3,)` [m] touches, or None."""
         for fake_object in self.objects:
-            radius = float(np.linalg.norm(fake_object.position[:2] - tip[:2]))
-            offset = abs(radius - self.classes[fake_object.label].ring)
-            is_near = offset <= MAX_SEAL_OFFSET and abs(self.top(fake_object) - tip[2]) <= TOUCH_DISTANCE
-            if is_near and fake_object is not self.held:
+            distance = float(np.linalg.norm(fake_object.position[:2] - tip[:2]))
+            offset = abs(distance - self.classes[fake_object.label].ring)
+            top = float(fake_object.position[2]) + self.classes[fake_object.label].height / 2
+            is_touched = offset <= MAX_SEAL_OFFSET and abs(top - tip[2]) <= TOUCH_DISTANCE
+            if is_touched and fake_object is not self.held:
                 return fake_object
         return None

@@ -209,7 +209,7 @@ class SimCamera(MountedCamera):
         """Return the true camera matrix and the true pose `X_WC`."""
         return compute_calibration(self._true)[0], camera_pose(self._world, self._true)
 
-    def _sense(self) -> tuple[Image, Array | None]:
+    def _capture_images(self) -> tuple[Image, Array | None]:
         """Return the image and, with a depth sensor, the depth of the current frame."""
         clean = render(self._world, *self._true_view(), (0, 0, *self._size), self._light)
         image = add_noise(clean.image, self._true.noise, np.random.default_rng([self._seed, self._frames]))
@@ -218,7 +218,7 @@ class SimCamera(MountedCamera):
         rng = np.random.default_rng([self._seed, self._frames, DEPTH_STREAM])
         return image, add_depth_noise(clean.depth, self.config.depth, rng)
 
-    def _find_visible(self, X_WC: Pose) -> Mask:
+    def _compute_visibility_mask(self, X_WC: Pose) -> Mask:
         if self._shadow is None:
             return np.ones(self._size[::-1], np.bool_)
         return self._shadow.visible(self.matrix, X_WC, self._size)

@@ -38,7 +38,7 @@ class SimLeastTimes(CellLeastTimes):
         self._kinematics = build_kinematics(config)
         self._carries: dict[str, float] = {}
 
-    def _min_carry_time(self, bin: str) -> float:
+    def _compute_min_transport_time(self, bin: str) -> float:
         if bin not in self._carries:
             slots = as_bin(bin, self._config.bins[bin]).slots
             low, high = np.transpose([self._config.table.x, self._config.table.y])

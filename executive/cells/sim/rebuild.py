@@ -96,7 +96,7 @@ class Rebuilding:
         elif kind == log.REMOVE:
             world.remove_object(int(numbers[0]))
         else:
-            {log.CLOSE: tool.close, log.OPEN: tool.open, log.PART: tool.part}[kind]()
+            {log.CLOSE: tool.close, log.OPEN: tool.open, log.PART: tool.break_seal}[kind]()
 
 
 def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> InterruptedArm:

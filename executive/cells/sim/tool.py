@@ -102,7 +102,7 @@ class SuctionTool:
             self._world.stood.setdefault(body, []).append(self._world.object_pose(body).position)
         self._release()
 
-    def part(self) -> None:
+    def break_seal(self) -> None:
         """Break the seal, as too large a pull does; the held body falls."""
         self._world.log.note(command_log.PART)
         if self._grip is not None:
@@ -122,7 +122,7 @@ class SuctionTool:
         force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
         grip.pull += PULL_SMOOTHING * (force - grip.pull)
         if float(np.linalg.norm(grip.pull)) > grip.bears:
-            self.part()
+            self.break_seal()
 
     def _seal(self) -> None:
         """Hold a body within reach if its seal is strong enough."""

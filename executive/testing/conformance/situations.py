@@ -13,7 +13,7 @@ import numpy as np
 from executive.cell.detection import Detections
 from executive.cell.objects import Item, Target
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import ROUTES, FakeCell, SilentOperator, bare_table
+from executive.cells.fake.cell import ROUTES, FakeCell, SilentOperator, load_empty_cell
 from executive.geometry import tool_down
 from executive.mission.model.port_types import describe_type
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
@@ -183,7 +183,7 @@ def set_up(skill: type[Skill], *, holding: bool) -> Stage:
         holding: True if the tool holds an object that the ledger knows; False if the tool is empty.
     """
     fake = FakeCell(options=CellOptions(SilentOperator(list(ROUTES)), base=Path()))
-    table, labels = bare_table().table, list(fake.cell.classes)
+    table, labels = load_empty_cell().table, list(fake.cell.classes)
     for label, y in zip(labels, np.linspace(*table.y, len(labels) + 2)[1:-1], strict=True):
         fake.world.put(label, sum(table.x) / 2, float(y))
     detections, targets = look(fake)
@@ -191,7 +191,7 @@ def set_up(skill: type[Skill], *, holding: bool) -> Stage:
     if holding or _works_on_target(skill):
         kind = fake.cell.classes[targets[0].label]
         top = targets[0].position + np.array([kind.ring, 0.0, kind.height / 2])
-        fake.arm.put(tool_down(top, 0.0))
+        fake.arm.set_tool_pose(tool_down(top, 0.0))
     if holding:
         fake.tool.close()
         fake.ledger.record_touch(item)

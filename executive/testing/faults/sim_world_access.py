@@ -51,7 +51,7 @@ class SimWorldAccess(WorldAccess):
 
     def break_seal(self) -> None:
         """Break the seal of the tool."""
-        self._tool.part()
+        self._tool.break_seal()
 
     def block_arm(self, message: str) -> None:
         """Let the arm run into an obstacle."""

@@ -89,11 +89,11 @@ class FakeWorldAccess(WorldAccess):
         """Displace an object."""
         self.drop(moved)
         moved.body.position[:2] += np.array(by)
-        moved.body.stood.append(moved.body.position.copy())
+        moved.body.rest_positions.append(moved.body.position.copy())
 
     def break_seal(self) -> None:
         """Break the seal of the tool."""
-        self._fake.tool.part()
+        self._fake.tool.break_seal()
 
     def block_arm(self, message: str) -> None:
         """Let the arm run into an obstacle."""
@@ -101,7 +101,7 @@ class FakeWorldAccess(WorldAccess):
 
     def settle(self) -> None:
         """Write the objects into the log; nothing moves by itself in a fake world."""
-        self._fake.note()
+        self._fake.log_state()
 
 
 def open_world(workcell: Workcell) -> WorldAccess:

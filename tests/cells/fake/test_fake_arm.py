@@ -11,12 +11,12 @@ from executive.cell.arm import Goal, Motion, Task
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.objects import Load, Obstacle
-from executive.cells.fake.arm import TOOL_SPEED
-from executive.cells.fake.cell import FakeCell, bare_table
+from executive.cells.fake.arm import MAX_TOOL_SPEED
+from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
 from executive.geometry import Array, tool_down
 
-LATENCY = bare_table().motion.planning
+LATENCY = load_empty_cell().motion.planning
 BESIDE = Goal((0.5, 0.2, 0.03), guarded=0.02, speed=0.05)
 
 
@@ -46,8 +46,8 @@ def test_it_goes_up_across_and_down_and_the_last_part_slowly(fake: FakeCell) -> 
     assert places[across & beside, 2] == pytest.approx(0.16), "load over wall, with clearance"
     speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / STEP
     guarded = places[1:, 2] < 0.05 - 1e-9
-    assert speeds.max() <= TOOL_SPEED + 1e-9
-    assert speeds[~guarded].max() > 0.9 * TOOL_SPEED
+    assert speeds.max() <= MAX_TOOL_SPEED + 1e-9
+    assert speeds[~guarded].max() > 0.9 * MAX_TOOL_SPEED
     assert speeds[guarded] == pytest.approx(0.05, rel=0.02)
 
 
@@ -89,7 +89,7 @@ def test_what_is_out_of_reach_is_said_when_the_plan_is_known(fake: FakeCell) -> 
 def hold_cube(fake: FakeCell) -> Task:
     """Let the tool hold a cube that stands on the table, and return the task of carrying it."""
     fake.world.held = fake.world.put("cube", 0.5, 0.0)
-    fake.arm.put(tool_down((0.5, 0.0, 0.05)))
+    fake.arm.set_tool_pose(tool_down((0.5, 0.0, 0.05)))
     return Task(Load(fake.cell.classes["cube"]))
 
 
@@ -133,7 +133,7 @@ def test_a_load_may_lie_on_the_table_and_on_the_floor_of_a_bin(fake: FakeCell) -
 
 def test_what_is_pressed_into_the_table_can_be_lifted_and_not_be_pressed_deeper(fake: FakeCell) -> None:
     task = hold_cube(fake)
-    fake.arm.put(tool_down((0.5, 0.0, 0.045)))
+    fake.arm.set_tool_pose(tool_down((0.5, 0.0, 0.045)))
     with pytest.raises(Blocked, match=r"the held cube 0\.006 m into the table"):
         motion_to(fake, Goal((0.5, 0.0, 0.044)), task)
     assert go(fake, Goal((0.5, 0.0, 0.1)), task)[-1, 2] == pytest.approx(0.1)
@@ -144,7 +144,7 @@ def test_a_load_that_the_plan_did_not_know_of_stops_the_arm_where_it_touches(fak
     places = go(fake, Goal((0.5, 0.0, 0.02)))
     assert fake.arm.met is not None
     assert fake.arm.met.startswith("the held cube ran into the table, with the tool at (0.500, 0.000, 0.04")
-    assert places[:, 2].min() == pytest.approx(0.05, abs=TOOL_SPEED * STEP)
+    assert places[:, 2].min() == pytest.approx(0.05, abs=MAX_TOOL_SPEED * STEP)
     assert places[:, 2].min() >= 0.05
     assert fake.arm.commands == ["start", "stop"]
     go(fake, Goal((0.5, 0.0, 0.1)))

@@ -183,7 +183,7 @@ def test_a_mission_is_rehearsed_in_a_cell_of_kind_fake_and_its_trays_fill_evenly
 def test_what_fell_between_two_bins_is_in_the_nearer(load: Load, x: float, what: str) -> None:
     """The premium crate ends at 0.36 m, and the market crate begins at 0.37 m."""
     cell = FakeCell(load("fruit", table__objects="[0, 0]"), routes={"banana": ("premium_crate",)})
-    cell.world.put("banana", x, 0.4).fell = True
+    cell.world.put("banana", x, 0.4).is_dropped = True
     assert {count: n for count, n in cell.audit().items() if n and count not in PLACES[-2:]} == {what: 1}
 
 
@@ -196,7 +196,7 @@ def test_what_falls_on_the_wall_of_a_bin_falls_into_the_bin(load: Load, beside: 
         cell.world.put("cube", x, edge + beside)
     cube = cell.world.put("cube", x, edge + 0.01)
     cell.world.held = cube
-    cell.tool.part()
+    cell.tool.break_seal()
     assert bin.contains(cube.position)
     assert beside is not None or np.allclose(cube.position[:2], (x, edge - radius))
 

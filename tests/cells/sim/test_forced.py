@@ -36,12 +36,12 @@ def test_a_seal_gives_way_and_the_object_falls(rig: Rig, held: int) -> None:
     assert rig.tool.held_body == held, "a leak takes nothing that is held"
     rig.tool.leaks = False
     assert height(rig, held) > 0.1
-    rig.tool.part()
+    rig.tool.break_seal()
     assert not rig.tool.holding
     rig.step(120)
     assert height(rig, held) == pytest.approx(0.025, abs=0.002)
     assert not rig.tool.holding, "the vacuum is on and nothing is near"
-    rig.tool.part()
+    rig.tool.break_seal()
     assert not rig.tool.holding, "where there is no seal none gives way"
 
 

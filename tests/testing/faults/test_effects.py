@@ -304,7 +304,7 @@ def test_an_object_that_is_moved_is_out_of_the_tool_and_at_rest_elsewhere() -> N
     duck = cell.fake.world.objects[2]
     assert duck.position[:2] == pytest.approx([0.55, 0.15])
     assert not cell.fake.tool.holding
-    assert duck.stood[-1] == pytest.approx(duck.position)
+    assert duck.rest_positions[-1] == pytest.approx(duck.position)
 
 
 def test_with_a_share_an_object_waits_until_the_arm_is_so_far() -> None:

@@ -47,7 +47,7 @@ def unnumbered(told: str) -> str:
 def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
     run = FailedRun(PICK, objects=CUBE)
     seals = iter([False])
-    run.fake.tool.is_sealing = lambda: next(seals, True)
+    run.fake.tool.can_seal = lambda: next(seals, True)
     run.slip()
     assert (
         text(run)
@@ -87,7 +87,7 @@ def test_an_exception_in_a_part(abroad) -> None:
     def broken() -> bool:
         raise ZeroDivisionError("vacuum gauge")
 
-    run.fake.tool.is_sealing = broken
+    run.fake.tool.can_seal = broken
     assert (
         text(run, tail=TAIL + GO_ON)
         == """\
@@ -120,7 +120,7 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
 
 def test_a_camera_that_was_moved_is_mounted_again_and_its_failure_not_caught(at_home) -> None:
     run = FailedRun("sort_overhead", objects=CUBE)
-    run.fake.camera.displacement_text = "camera overhead is not where the cell file says"
+    run.fake.camera.displacement_message = "camera overhead is not where the cell file says"
     story = run.tell()
     assert story.reason == "Detect.camera_moved"
     assert story.next == ["mount camera and bins as the cell file says, or measure the pose again"]
