@@ -28,7 +28,7 @@ class FakeCamera(MountedCamera):
     Attributes:
         is_table_visible: Function that returns True if the whole workspace is in the image; set by tests. By
             default it ignores occlusion.
-        occluded_regions: Regions of the image without visible objects [pixel]; set by tests.
+        occluded_regions: Regions of the image that frames mark as occluded [pixel]; set by tests.
         displacement_message: Message about a displacement of the camera, "" for none; set by tests.
     """
 
