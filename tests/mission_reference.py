@@ -30,7 +30,7 @@ from executive.perception.detectors.roboflow.options import RoboflowOptions
 from executive.plugins import discover
 from executive.tree.keys import KeySection, Kind
 from executive.tree.node import ControlNode
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 PATH = MISSIONS / "reference.md"
@@ -100,7 +100,7 @@ def _mission_files() -> Iterator[str]:
 
 
 def _control_nodes() -> Iterator[str]:
-    for word, node in control_nodes().items():
+    for word, node in load_control_nodes().items():
         yield f"### `{word}`\n\n{inspect.getdoc(node)}"
         if node.any_of:
             yield f"At least one of {_listed(node.any_of)} is required."
@@ -114,7 +114,7 @@ def _key_rows(owner: str, node: type[ControlNode | KeySection], prefix: str = ""
         written = f"`{prefix}{name}`" + (f", beside `{owner}`" if key.is_sibling else "")
         if key.is_shorthand:
             written = (f"{written}, or " if find_inner_keys(node) else "") + f"the value of `{owner}`"
-        value = KINDS.get(key.kind) or _value(key.adapter().json_schema())
+        value = KINDS.get(key.kind) or _value(key.make_validator().json_schema())
         value += f", at most {key.max_count}" if key.max_count else ""
         yield [written, value, _default(key.default), key.doc]
         if key.kind in (Kind.SECTION, Kind.SECTIONS):

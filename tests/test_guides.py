@@ -32,7 +32,7 @@ from executive.plugins import cell_kind, discover
 from executive.record.result import EXIT_CODES
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 
 LONGEST = 300.0
 """Time on the run's clock within which every mission shown is done on the fake cell [s]."""
@@ -93,7 +93,7 @@ def test_the_mission_on_the_front_page_does_its_work(tmp_path: Path) -> None:
 def test_an_editor_marks_nothing_in_the_missions_of_the_mission_guides(name: str) -> None:
     root, _ = parse_yaml(Source(name, FILES[name].text))
     assert root is not None
-    jsonschema.validate(plain(root), mission_schema(discover(), control_nodes()))
+    jsonschema.validate(plain(root), mission_schema(discover(), load_control_nodes()))
 
 
 @pytest.mark.parametrize("name", MISTAKES)

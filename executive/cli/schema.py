@@ -24,10 +24,10 @@ def command(cell: bool, library: bool, journal: bool) -> None:
         from executive.mission.schema.types import cell_schema
         from executive.plugins import discover
         from executive.record.journal_format import journal_schema
-        from executive.tree.registry import control_nodes
+        from executive.tree.registry import load_control_nodes
 
         if cell or journal:
             schema = cell_schema() if cell else journal_schema()
         else:
-            schema = (library_schema if library else mission_schema)(discover(), control_nodes())
+            schema = (library_schema if library else mission_schema)(discover(), load_control_nodes())
     print_json(schema)

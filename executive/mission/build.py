@@ -18,7 +18,7 @@ from executive.mission.model.wiring import find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.blackboard import Blackboard
 from executive.tree.node import ControlNode, NodeContext
-from executive.tree.registry import ControlNodes, control_nodes
+from executive.tree.registry import ControlNodes, load_control_nodes
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 
 TreeNode = ControlNode | SkillLeaf
@@ -59,7 +59,7 @@ class Builder:
     emit: Emit
     substitutes: Mapping[str, type[Skill]] = field(default_factory=dict)
     matched_patterns: list[str] = field(default_factory=list)
-    node_classes: ControlNodes = field(default_factory=control_nodes)
+    node_classes: ControlNodes = field(default_factory=load_control_nodes)
 
     def build_node(self, node: Node) -> TreeNode:
         """Return the behaviour for a node."""

@@ -25,7 +25,7 @@ from executive.mission.parse.validate import mark_of
 from executive.mission.text.files import find_mission, shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured
 from executive.skill import Skill
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 
 Kinds = Callable[[str], CellKind]
 """Function that returns the installed kind of cell with a name, or raises InputError."""
@@ -90,7 +90,7 @@ def load_mission(
         MissionError: Mission or cell have errors; the exception contains every finding.
         InputError: The mission does not exist.
     """
-    file, control = find_mission(path), control_nodes()
+    file, control = find_mission(path), load_control_nodes()
     files = read_mission(file, overrides or {}, skills, control, cell)
     mission, config = files.mission, files.cell.config if files.cell else None
     findings = list(files.findings)

@@ -151,7 +151,7 @@ def _slot(place: str, parent: Behaviour, node: Behaviour, title: str, subtrees: 
             del parts[-1]
     if not parts and isinstance(parent, ControlNode):
         for key in parent.keys.values():
-            if not key.is_in_path and node in parent.children_of(key.name):
+            if not key.is_in_path and node in parent.list_children(key.name):
                 return key.name
     return " ".join(parts)
 

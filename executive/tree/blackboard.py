@@ -1,4 +1,4 @@
-"""The variables of one run."""
+"""Blackboard: the variables of one run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ class Blackboard(Mapping[str, object]):
     """The variables of one run by name; skills read inputs at their start and write outputs on success.
 
     Every run has its own blackboard, so that one process can execute several missions. All subtrees share
-    the blackboard; arguments of subtrees are not variables: they are substituted before the tree is built.
+    the blackboard. Arguments of subtrees are not variables: they are substituted before the tree is built.
     """
 
     def __init__(self) -> None:
@@ -25,7 +25,7 @@ class Blackboard(Mapping[str, object]):
         return len(self._values)
 
     def write(self, values: Mapping[str, object]) -> None:
-        """Set all these variables at once."""
+        """Set variables; `values` maps their names to their new values."""
         self._values.update(values)
 
     def remove(self, name: str) -> None:

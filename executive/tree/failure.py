@@ -1,4 +1,4 @@
-"""Failures of nodes, and the names `Skill.reason` and `label.reason` that a mission gives them."""
+"""Failures of nodes, and the names by which missions refer to them: `Skill.reason` and `label.reason`."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Reason:
-    """Name of a failure in a mission.
+    """Name by which a mission refers to failures: `Grasp.missed`.
 
     Attributes:
-        source: Name of a skill, keyword of a control node, or label.
-        reason: A declared reason of the source.
+        source: Name of a skill, keyword of a control node, or label of a node.
+        reason: Declared cause of a failure of the source.
     """
 
     source: str
@@ -24,14 +24,14 @@ class Reason:
 
 @dataclass(frozen=True)
 class Failure:
-    """A declared failure that is propagated up the tree.
+    """A failure with a declared reason, which is propagated up the tree.
 
     Attributes:
         reason: One of the declared reasons of the skill or of the control node.
         message: One sentence with the measured values that explain the failure.
         source: Name of the skill, or the keyword of the control node, that failed.
         path: Path of the node that failed.
-        labels: Labels of the failed node and of the nodes above it that passed the failure on.
+        labels: Labels of the failed node and of the ancestors that passed the failure on.
     """
 
     reason: str
@@ -51,5 +51,5 @@ class Failure:
         )
 
     def with_label(self, label: str) -> Failure:
-        """Return the failure after a node with this label passed it on; "" for a node without label."""
+        """Return the failure as passed on by a node with this label; "" for a node without label."""
         return replace(self, labels=(*self.labels, label)) if label else self

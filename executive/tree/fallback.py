@@ -1,4 +1,4 @@
-"""Alternatives that are tried in order."""
+"""Control node that tries alternatives in order."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
@@ -36,41 +36,41 @@ class Fallback(ControlNode):
             status = self.run_child(child)
             if status is not Status.FAILURE:
                 return status
-            failure = self.failure_of(child)
+            failure = self.get_failure(child)
             self._next += 1
             if self._next == len(self.do):
                 return self.fail(failure)
             self.report_choice(f"choice {self._next + 1} of {len(self.do)}", failure)
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Enter each child in the states after the failures of the one before it."""
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends; each child is entered in the states after a failure of the previous."""
         success = halted = None
         failures: Mapping[PossibleFailure, FlowState] = {}
         entry: FlowState | None = state
         for choice in self.do:
             if entry is None:
                 break
-            flow = enter(choice, entry)
+            flow = flow_of(choice, entry)
             success, halted = join_states((success, flow.success)), join_states((halted, flow.halted))
             failures = flow.failures
-            entry = join_states(after.after_handling(failure) for failure, after in failures.items())
+            entry = join_states(end.after_handling(failure) for failure, end in failures.items())
         return Flow(success, failures, halted)
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
-        """Return the time of the fastest child."""
+        """Return the minimum time of the fastest child [s]."""
         return min(map(min_time_of, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause, an earlier child."""
+        """Return the cause: an earlier child cannot fail."""
         del child
         return "an earlier child never fails"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the failures of all children."""
-        others = ", ".join(f"{reason} ({message})" for reason, message in failure.messages.items())
+        """Return a text with the failures of all other children."""
+        others = ", ".join(f"{reason} ({message})" for reason, message in failure.last_messages.items())
         return f"all {len(self.do)} choices failed" + (f"; the others with {others}" if others else "")
 
-    def contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield every child but the first."""
+    def list_contingencies(self) -> Iterator[tuple[str, Child]]:
+        """Yield all children except the first, each with its number in a text."""
         for number, choice in enumerate(self.do[1:], 2):
             yield f"choice {number}", choice

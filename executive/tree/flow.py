@@ -1,4 +1,4 @@
-"""Abstract interpretation of a tree: the states in which a node may be entered, and how it may end."""
+"""Abstract interpretation of a tree: possible states at the start of a node, and its possible ends."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from executive.tree.failure import Reason
 from executive.tree.keys import Child
 
 UNKNOWN_NAME = "*"
-"""Source or reason of a failure about which nothing is known."""
+"""Source or reason of a failure of unknown origin."""
 
 
 @dataclass(frozen=True)
-class PossibleTool:
-    """A possible state of the tool, and how it came about.
+class PossibleToolState:
+    """A possible state of the tool, and its history.
 
     Attributes:
         tool: EMPTY or HOLDING.
         cause: Path of the skill that caused this state; "" for the beginning of the run.
-        handled_failure: Last failure that was handled since then, or "".
-        is_arm_moved: True if the arm may have moved since then.
+        handled_failure: Last failure that a control node handled in this state of the tool, or "".
+        is_arm_moved: True if the arm may have moved in this state of the tool.
     """
 
     tool: ToolState
@@ -32,8 +32,8 @@ class PossibleTool:
     is_arm_moved: bool = False
 
 
-PossibleTools = frozenset[PossibleTool] | None
-"""All possible states of the tool; None if unknown."""
+ToolStates = frozenset[PossibleToolState] | None
+"""All possible states of the tool at a point in the tree; None if unknown."""
 
 
 @dataclass(frozen=True)
@@ -41,24 +41,23 @@ class FlowState:
     """Facts that hold on every execution path to a point in the tree.
 
     Attributes:
-        written: Variables that are certainly written; None if unknown, which is treated as all variables.
+        written: Variables that are certainly written; None if unknown, so that every variable may be read.
         tools: All possible states of the tool; None if unknown.
     """
 
     written: frozenset[str] | None
-    tools: PossibleTools
+    tools: ToolStates
 
     def join(self, other: FlowState) -> FlowState:
-        """Return the facts that hold after either of two states."""
+        """Return the facts that hold in both states."""
         if self == other:
             return self
         written = self.written if other.written is None else other.written
         if self.written is not None and other.written is not None:
             written = self.written & other.written
-        known = self.tools is not None and other.tools is not None
-        return FlowState(
-            written, (self.tools or frozenset()) | (other.tools or frozenset()) if known else None
-        )
+        are_tools_known = self.tools is not None and other.tools is not None
+        tools = (self.tools or frozenset()) | (other.tools or frozenset()) if are_tools_known else None
+        return FlowState(written, tools)
 
     def with_variables(self, names: Iterable[str]) -> FlowState:
         """Return the state after these variables are written."""
@@ -68,12 +67,12 @@ class FlowState:
         """Return the state after a variable is removed."""
         return self if self.written is None else replace(self, written=self.written - {name})
 
-    def with_tools(self, tools: PossibleTools) -> FlowState:
+    def with_tools(self, tools: ToolStates) -> FlowState:
         """Return the state with other possible states of the tool."""
         return replace(self, tools=tools)
 
     def after_handling(self, failure: PossibleFailure) -> FlowState:
-        """Return the state after a control node handled the failure that led to it."""
+        """Return the state after a control node handled `failure`, which led to this state."""
         tools = [replace(possible, handled_failure=str(failure)) for possible in self.tools or ()]
         return self if self.tools is None else self.with_tools(frozenset(tools))
 
@@ -82,14 +81,14 @@ class FlowState:
         tools = [replace(possible, is_arm_moved=True) for possible in self.tools or ()]
         return self if self.tools is None else self.with_tools(frozenset(tools))
 
-    def find_tool(self, tool: ToolState) -> PossibleTool | None:
-        """Return one way in which the tool may have got into this state; None if it cannot be in it."""
+    def find_tool_state(self, tool: ToolState) -> PossibleToolState | None:
+        """Return a possible state in which the tool is EMPTY or HOLDING as given; None if there is none."""
         found = [possible for possible in self.tools or () if possible.tool is tool]
         return min(found, key=lambda possible: (possible.cause, possible.handled_failure)) if found else None
 
 
-INITIAL_STATE = FlowState(frozenset(), frozenset({PossibleTool(ToolState.EMPTY)}))
-"""State at the start of a run: no variables, an empty tool."""
+INITIAL_STATE = FlowState(frozenset(), frozenset({PossibleToolState(ToolState.EMPTY)}))
+"""State at the start of a run: no variables are written, and the tool is empty."""
 
 UNKNOWN = FlowState(None, None)
 """State after a part of the tree whose effects are unknown."""
@@ -101,9 +100,9 @@ class PossibleFailure:
 
     Attributes:
         source: Name of the skill, or the keyword of the control node, that fails.
-        reason: Reason of the failure.
+        reason: Declared cause of the failure.
         origin: Path of the node that fails.
-        labels: Labels of the nodes that passed the failure on.
+        labels: Labels of the failing node and of the ancestors that passed the failure on.
     """
 
     source: str
@@ -113,17 +112,20 @@ class PossibleFailure:
 
     def may_match(self, names: Iterable[Reason]) -> bool:
         """Return True if one of the names may denote this failure."""
-        return any(self._matches(name, unknown=True) for name in names)
+        return any(self._matches(name, unknown_matches=True) for name in names)
 
     def must_match(self, names: Iterable[Reason]) -> bool:
         """Return True if one of the names certainly denotes this failure."""
-        return any(self._matches(name, unknown=False) for name in names)
+        return any(self._matches(name, unknown_matches=False) for name in names)
 
-    def _matches(self, name: Reason, unknown: bool) -> bool:
-        """Return True if a name denotes this failure; with `unknown`, every name matches an unknown part."""
+    def _matches(self, name: Reason, unknown_matches: bool) -> bool:
+        """Return True if a name denotes this failure.
+
+        With `unknown_matches`, an unknown source or reason of this failure matches every name.
+        """
         sources = {self.source, *self.labels}
-        return (name.reason == self.reason or (unknown and self.reason == UNKNOWN_NAME)) and (
-            name.source in sources or (unknown and self.source == UNKNOWN_NAME)
+        return (name.reason == self.reason or (unknown_matches and self.reason == UNKNOWN_NAME)) and (
+            name.source in sources or (unknown_matches and self.source == UNKNOWN_NAME)
         )
 
     def __str__(self) -> str:
@@ -132,7 +134,7 @@ class PossibleFailure:
 
 @dataclass(frozen=True)
 class Flow:
-    """Possible ends of a node that is entered in a certain state.
+    """Result of the abstract execution of a node from one state: its possible ends.
 
     Attributes:
         success: State after success; None if the node cannot succeed.
@@ -145,7 +147,7 @@ class Flow:
     halted: FlowState | None
 
     def with_label(self, label: str) -> Flow:
-        """Return the flow of the node with a label."""
+        """Return the same possible ends of a node with a label; "" for no label."""
         if not label:
             return self
         failures: dict[PossibleFailure, FlowState] = {}
@@ -155,78 +157,94 @@ class Flow:
         return replace(self, failures=failures)
 
 
-Enter: TypeAlias = Callable[[Child, FlowState], Flow]
-"""Function that returns how a child may end if it is entered in a state."""
+FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]
+"""Function that returns the possible ends of a child that is entered in a state."""
 
 
 def find_fixed_point(
-    enter: Enter, child: Child, state: FlowState, next_entry: Callable[[Flow], FlowState | None]
+    flow_of: FlowFunction, child: Child, state: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
 ) -> tuple[Flow, FlowState]:
-    """Return how a repeatedly entered child may end, and the state that holds at every entry.
+    """Return the possible ends of a child that is entered repeatedly, and the facts that hold at every entry.
 
-    `next_entry` returns the state of the next entry, given the possible ends of the child; None for no entry.
+    Args:
+        flow_of: Returns the possible ends of a child.
+        child: The child.
+        state: State at the first entry.
+        get_next_entry: Returns the state at the next entry, given the possible ends of the child; None if
+            the child is not entered again.
     """
     entry = state
     while True:
-        flow = enter(child, entry)
-        # Each round removes variables or adds states of the tool, so the loop ends.
-        widened = entry.join(next_entry(flow) or entry)
+        flow = flow_of(child, entry)
+        # Each iteration removes variables or adds states of the tool, so the loop ends.
+        widened = entry.join(get_next_entry(flow) or entry)
         if widened == entry:
             return flow, entry
         entry = widened
 
 
 def join_states(states: Iterable[FlowState | None]) -> FlowState | None:
-    """Return the join of all states; None stands for a path that is never taken, also in the result."""
+    """Return the facts that hold in all states; a state None cannot occur and is ignored; None if all are."""
     reached = [state for state in states if state is not None]
     return reduce(FlowState.join, reached) if reached else None
 
 
-def apply_precondition(tools: PossibleTools, required: ToolState, path: str) -> PossibleTools:
-    """Return the states of the tool that a skill requires; if none is possible, the violation is ignored.
+def apply_precondition(tools: ToolStates, required: ToolState, path: str) -> ToolStates:
+    """Return the possible states of the tool that fulfil the precondition of a skill.
 
-    A violated precondition counts as fulfilled, so that one mistake in a mission is reported once.
+    A precondition that no state fulfils counts as fulfilled, so that one mistake is reported only once.
+
+    Args:
+        tools: Possible states of the tool before the skill.
+        required: State that the skill requires; ANY for no precondition.
+        path: Path of the skill.
     """
     if required is ANY or tools is None:
         return tools
-    return frozenset(one for one in tools if one.tool is required) or frozenset(
-        {PossibleTool(required, path)}
-    )
+    fulfilling = frozenset(possible for possible in tools if possible.tool is required)
+    return fulfilling or frozenset({PossibleToolState(required, path)})
 
 
-def tools_after_success(tools: PossibleTools, after: ToolState, path: str) -> PossibleTools:
-    """Return the possible states of the tool after the success of a skill; ANY leaves them unchanged."""
+def get_tools_after_success(tools: ToolStates, after: ToolState, path: str) -> ToolStates:
+    """Return the possible states of the tool after the success of a skill.
+
+    `after` is the declared state; ANY leaves the states unchanged.
+    """
     if after is ANY or (tools is not None and all(possible.tool is after for possible in tools)):
         return tools
-    return frozenset({PossibleTool(after, path)})
+    return frozenset({PossibleToolState(after, path)})
 
 
-def tools_after_failure(tools: PossibleTools, after: ToolState | None, path: str) -> PossibleTools:
+def get_tools_after_failure(tools: ToolStates, after: ToolState | None, path: str) -> ToolStates:
     """Return the possible states of the tool after a failure of a skill.
 
-    `after` None leaves them unchanged; `after` ANY adds EMPTY and HOLDING.
+    `after` is the declared state; None leaves the states unchanged, ANY adds EMPTY and HOLDING.
     """
     if after is None or tools is None:
         return tools
     if after is ANY:
-        return tools | {PossibleTool(EMPTY, path), PossibleTool(HOLDING, path)}
-    return frozenset({PossibleTool(after, path)})
+        return tools | {PossibleToolState(EMPTY, path), PossibleToolState(HOLDING, path)}
+    return frozenset({PossibleToolState(after, path)})
 
 
-def find_tools_at_end(flow: Flow, state: FlowState, halts: bool) -> PossibleTools:
-    """Return the possible states of the tool after the end of a branch; `halts` if it may also be halted."""
-    ends = join_states((flow.success, *flow.failures.values(), *((flow.halted, state) if halts else ())))
-    return state.tools if ends is None else ends.tools
+def find_tools_at_end(flow: Flow, entry: FlowState, may_be_halted: bool) -> ToolStates:
+    """Return the possible states of the tool at the end of a branch that was entered in the state `entry`."""
+    halts = (flow.halted, entry) if may_be_halted else ()
+    end = join_states((flow.success, *flow.failures.values(), *halts))
+    return entry.tools if end is None else end.tools
 
 
-def combine_branches(before: PossibleTools, ends: Iterable[PossibleTools]) -> PossibleTools:
-    """Return the possible states of the tool after parallel branches, at most one of which uses it."""
-    changed = [end for end in ends if _without_history(end) != _without_history(before)]
+def combine_tools(before: ToolStates, ends: Iterable[ToolStates]) -> ToolStates:
+    """Return the possible states of the tool after parallel branches, at most one of which uses the tool.
+
+    `before` are the states before the branches, `ends` the states at the end of each branch.
+    """
+    changed = [end for end in ends if _remove_history(end) != _remove_history(before)]
     if any(end is None for end in changed):
         return None
     return frozenset(possible for end in changed for possible in end or ()) if changed else before
 
 
-def _without_history(tools: PossibleTools) -> frozenset[tuple[ToolState, str]] | None:
+def _remove_history(tools: ToolStates) -> frozenset[tuple[ToolState, str]] | None:
     """Return the possible states of the tool and their causes, without handled failures and motions."""
     return None if tools is None else frozenset((possible.tool, possible.cause) for possible in tools)

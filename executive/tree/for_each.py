@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from executive.cell.objects import Target
 from executive.errors import Fault
-from executive.tree.flow import Enter, Flow, FlowState, find_fixed_point, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Child, Elements, VariableName, key
 from executive.tree.loop import Loop
@@ -25,13 +25,13 @@ class ForEach(Loop):
     keyword_hints: ClassVar = {"for": "It is called for_each here."}
     symbol = "∀"
 
-    each: VariableName = key(element_of="in", doc="Variable that holds the current element.")
+    each: VariableName = key(list_key="in", doc="Variable that holds the current element.")
     in_: Elements = key(doc="List, or variable that holds a list.")
     do: Child = key(doc="Body of the loop.")
 
     @property
     def detail(self) -> str:
-        """The variable and the source of its values."""
+        """The variable and its list as a text."""
         source = self.in_
         elements = f"${source}" if isinstance(source, VariableName) else f"[{', '.join(map(str, source))}]"
         return f"${self.each} in {elements}"
@@ -40,7 +40,7 @@ class ForEach(Loop):
         """Read the list and its first element.
 
         Raises:
-            Fault: The variable was never written, or holds no list.
+            Fault: The variable with the list was never written, or its value is not a list.
         """
         super().start()
         self._elements, self._next = self._read_list(), 0
@@ -48,23 +48,23 @@ class ForEach(Loop):
             self._write_element()
 
     def step(self) -> Status:
-        """Tick the body; take the next element in the same tick if the round took at least one tick."""
+        """Tick the body; take the next element in the same tick if the iteration took at least one tick."""
         while self._next < len(self._elements):
-            status = self.run_round(self.do)
+            status = self.run_iteration(self.do)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
-                return self.fail(self.failure_of(self.do))
+                return self.fail(self.get_failure(self.do))
             self._next += 1
             if self._next == len(self._elements):
                 break
             self._write_element()
-            if not self.begin_round():
+            if not self.begin_iteration():
                 return Status.RUNNING
         return Status.SUCCESS
 
     def clean_up(self) -> None:
-        """Remove the variable."""
+        """Remove the variable that holds the current element."""
         self.blackboard.remove(self.each)
 
     def _write_element(self) -> None:
@@ -91,17 +91,17 @@ class ForEach(Loop):
             )
         return tuple(value)
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends: the body is entered until its entry states reach a fixed point."""
         if self.in_ == ():
             return Flow(state, {}, None)
         is_known = not isinstance(self.in_, VariableName)
         body, entry = find_fixed_point(
-            enter, self.do, state.with_variables([self.each]), lambda flow: flow.success
+            flow_of, self.do, state.with_variables([self.each]), lambda flow: flow.success
         )
         success = join_states((body.success, None if is_known else state))
         failures = {failure: after.without_variable(self.each) for failure, after in body.failures.items()}
-        # A round that takes no time is followed by a wait for the next tick.
+        # The loop may wait for the next tick before it enters the body, and can be halted then.
         halted = join_states((body.halted, entry))
         return Flow(
             success and success.without_variable(self.each),
@@ -110,7 +110,7 @@ class ForEach(Loop):
         )
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
-        """Return the minimum time of all rounds [s]; 0 if their number is unknown."""
+        """Return the minimum time of all iterations [s]; 0 if their number is unknown."""
         return 0.0 if isinstance(self.in_, VariableName) else len(self.in_) * min_time_of(self.do)
 
     def explain_unreachable(self, child: Child) -> str:
@@ -119,12 +119,12 @@ class ForEach(Loop):
         return "the body runs 0 times"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the element at which the body failed."""
-        return f"failed at {failure.choice}"
+        """Return a text with the element at which the body failed."""
+        return f"failed at {failure.last_choice}"
 
 
 def _describe(element: object) -> str:
-    """Return an element in a few characters: the item of a target, a plain value, or the name of the type."""
+    """Return a short text for an element: the item of a target, a plain value, or the name of the type."""
     if isinstance(element, Target):
         return element.item
     is_plain = element is None or isinstance(element, str | int | float)

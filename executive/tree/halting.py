@@ -13,7 +13,7 @@ from executive.errors import Fault
 
 
 def halt(root: Behaviour) -> list[str]:
-    """End every running node in and below `root`, children first; return the messages of failed clean-ups."""
+    """End every running node of the tree `root`, children first; return the messages of failed clean-ups."""
     problems = []
     for node in root.iterate():
         if node.status is Status.RUNNING:

@@ -20,10 +20,11 @@ class NodeFinding:
     """A mistake in the mission that a control node finds.
 
     Attributes:
-        place: Key, or name of a failure, that contains the mistake; "" for the node itself.
-        code: Code of the finding.
-        message: The mistake, one sentence.
-        hint: Remedy, or "".
+        place: Key of the node, or failure name under one of its keys, that contains the mistake; "" for the
+            node itself.
+        code: Code of the finding, such as `short-timeout`.
+        message: Description of the mistake, one sentence.
+        hint: Description of a remedy, or "".
         is_warning: True if the mission can run nevertheless.
     """
 
@@ -35,62 +36,62 @@ class NodeFinding:
 
 
 class NodeFacts(Protocol):
-    """The checker's knowledge of a node in a mission."""
+    """Facts about a control node in a mission, and about its children, that the checker has found."""
 
     @property
     def is_halted_by_sibling(self) -> bool:
         """True if the node is halted when a concurrent node has ended."""
 
-    def flow(self, child: Child) -> Flow | None:
-        """Return how a child may end; None if the child never runs."""
+    def get_flow(self, child: Child) -> Flow | None:
+        """Return the possible ends of a child; None if the child never runs."""
 
-    def name(self, child: Child) -> str:
+    def get_name(self, child: Child) -> str:
         """Return the name of a child in paths."""
 
-    def place(self, reason: Reason, seen_from: Reason) -> str:
-        """Return the place of a failure name for a message about the failure name `seen_from`: `line 12`."""
+    def describe_place(self, reason: Reason, reported: Reason) -> str:
+        """Return the place of a failure name for a finding about the failure name `reported`: `line 12`."""
 
     def is_literal(self, key: str) -> bool:
         """Return True if the node gives the value of a key literally, not through a param or an argument."""
 
-    def min_time(self, child: Child) -> float:
+    def get_min_time(self, child: Child) -> float:
         """Return a lower bound of the time in which a child can succeed [s]."""
 
-    def skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
+    def list_skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
         """Return the names and minimum times [s] of the skills in and below a child."""
 
-    def skills(self) -> Sequence[type[Skill] | None]:
+    def list_skills(self) -> Sequence[type[Skill] | None]:
         """Return the skills below the node; None stands for a skill that is not installed."""
 
 
 @dataclass(frozen=True)
 class PropagatedFailure:
-    """A failure that ended a run, at a control node that it passed or in which it began.
+    """A failure that ended a run, as seen by a control node that passed it on or raised it.
 
     Attributes:
-        child: The child that passed the failure on; None if the failure began in the node.
+        child: The child that passed the failure on; None if the node itself raised the failure.
         reason: Name of the failure: `Grasp.missed`.
         names: All names of the failure at this node: `Skill.reason`, and one `label.reason` per label.
-        handled: Number of failures that the node handled before, by name.
-        messages: The last message of each handled failure, by name.
-        last: Name of the failure that the node handled last, or "".
-        choice: Last decision of the node.
+        handled_counts: Number of failures that the node handled before, by name.
+        last_messages: The last message of each handled failure, by name.
+        last_handled: Name of the failure that the node handled last, or "".
+        last_choice: Last decision of the node as a text: `attempt 2 of 3`.
         duration: Time from the start of the node to its end [s].
-        has_failed: Returns True if a child ran and failed in this activation of the node.
+        has_child_failed: Function that returns True if a child ran and failed in this activation of the node.
     """
 
     child: Child | None
     reason: str
     names: frozenset[Reason]
-    handled: Mapping[str, int]
-    messages: Mapping[str, str]
-    last: str
-    choice: str
+    handled_counts: Mapping[str, int]
+    last_messages: Mapping[str, str]
+    last_handled: str
+    last_choice: str
     duration: float
-    has_failed: Callable[[Child], bool]
+    has_child_failed: Callable[[Child], bool]
 
     def is_one_of(self, reasons: Sequence[Reason]) -> bool:
-        """Return True if one of the names denotes the failure."""
+        """Return True if one of `reasons` is a name of the failure."""
         return any(Reason(name.source, name.reason) in self.names for name in reasons)
 
 
@@ -99,9 +100,9 @@ class Advice:
     """A change of the mission after which a failure would not end the run.
 
     Attributes:
-        text: Description of the change, without its place, which the message adds.
-        key: Key to change, or "".
-        child: Child to change; None for the node itself.
+        text: Description of the change, without the line number, which the diagnosis adds.
+        key: Key of the node that is to be changed, or "".
+        child: Child that is to be changed; None for the node itself.
     """
 
     text: str
@@ -110,5 +111,5 @@ class Advice:
 
 
 def format_reasons(reasons: Sequence[Reason]) -> str:
-    """Return names of failures as a text: `Grasp.missed, look.unsure`."""
+    """Return a text with all failure names: `Grasp.missed, look.unsure`."""
     return ", ".join(map(str, reasons))

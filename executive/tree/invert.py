@@ -1,10 +1,10 @@
-"""Exchange of success and failure."""
+"""Control node that exchanges success and failure of its body."""
 
 from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
@@ -22,12 +22,12 @@ class Invert(ControlNode):
         """Tick the body."""
         status = self.run_child(self.do)
         if status is Status.SUCCESS:
-            return self.fail_for("inverted", f"{self.do.name} succeeded")
+            return self.fail_with_reason("inverted", f"{self.do.name} succeeded")
         return Status.SUCCESS if status is Status.FAILURE else status
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Exchange success and failure of the body."""
-        body = enter(self.do, state)
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends: those of the body with success and failure exchanged."""
+        body = flow_of(self.do, state)
         inverted = PossibleFailure(self.keyword, "inverted", self.path)
         failures = {} if body.success is None else {inverted: body.success}
         return Flow(join_states(body.failures.values()), failures, body.halted)

@@ -1,4 +1,4 @@
-"""Keys of control nodes, declared in the bodies of their classes for parser, schema, checks and builder."""
+"""Declarations of the keys of control nodes, from which parser, schema, checks and builder are derived."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pydantic import Field, TypeAdapter
 from executive.tree.failure import Reason
 
 Child: TypeAlias = Behaviour
-"""Child of a control node. In the checker and the diagnosis it is a `StandIn` for a node of the mission."""
+"""Child of a control node; in the checker and the diagnosis, a `StandIn` that represents it."""
 
 
 class VariableName(str):
@@ -25,11 +25,11 @@ class VariableName(str):
 Children: TypeAlias = tuple[Child, ...]
 Reasons: TypeAlias = tuple[Reason, ...]
 Elements: TypeAlias = tuple[object, ...] | VariableName
-"""A list in the mission file, or the variable that holds a list."""
+"""A list from the mission file, or the name of the variable that holds a list."""
 
 
 class Kind(Enum):
-    """Kind of value that a key holds; follows from the type annotation of the attribute."""
+    """Kind of the value of a key, derived from the type annotation of its attribute."""
 
     NODE = auto()
     NODES = auto()
@@ -49,15 +49,15 @@ class Key:
         doc: Meaning of the key, one sentence.
         default: Value if the key is missing; `...` for a required key.
         ge, gt: Inclusive and exclusive lower bound of a number, or None.
-        max_of: Name of the key whose number of nodes is the upper bound of this number, or "".
-        max_count: Largest number of nodes in a list, or None.
-        is_shorthand: True if the value may stand directly under the keyword of the node or section.
-        is_sibling: True if the key stands at the level of the keyword of the node, as `catch` beside `try`.
+        max_key: For a number: key whose number of nodes is the maximum of the number, or "".
+        max_count: For a list of nodes: maximum number of nodes, or None.
+        is_shorthand: True if the key may be omitted and its value written directly under the keyword.
+        is_sibling: True if the key is written at the level of the keyword, as `catch` beside `try`.
         is_in_path: False if the paths of the nodes under the key do not contain the key.
-        raised_under: For a list of reasons: key that holds the nodes which raise these failures.
-        element_of: For a variable: key with the list whose elements the variable takes in turn; or "".
-        name: Name in the mission file.
-        attribute: Name in the class.
+        raising_key: For a list of reasons: key of the nodes that raise these failures.
+        list_key: For a variable: key of the list whose elements the variable holds in turn, or "".
+        name: Name of the key in the mission file.
+        attribute: Name of the attribute in the class.
         kind: Kind of the value.
         value_type: Type of a constant, or class of a section.
     """
@@ -66,13 +66,13 @@ class Key:
     default: object = ...
     ge: float | None = None
     gt: float | None = None
-    max_of: str = ""
+    max_key: str = ""
     max_count: int | None = None
     is_shorthand: bool = False
     is_sibling: bool = False
     is_in_path: bool = True
-    raised_under: str = "do"
-    element_of: str = ""
+    raising_key: str = "do"
+    list_key: str = ""
     name: str = ""
     attribute: str = ""
     kind: Kind = Kind.CONSTANT
@@ -80,7 +80,7 @@ class Key:
 
     @property
     def is_required(self) -> bool:
-        """True if the mission must give a value."""
+        """True if the key has no default, so that the mission must give a value."""
         return self.default is ...
 
     @property
@@ -88,9 +88,9 @@ class Key:
         """The class of the section or sections under the key."""
         return cast("type[KeySection]", self.value_type)
 
-    def adapter(self, max_value: int | None = None) -> TypeAdapter[object]:
+    def make_validator(self, max_value: int | None = None) -> TypeAdapter[object]:
         """Return the validator of a constant; `max_value` is the upper bound of a number, or None."""
-        return _make_adapter(self.value_type, self.ge, self.gt, max_value)
+        return _make_validator(self.value_type, self.ge, self.gt, max_value)
 
 
 def key(
@@ -99,27 +99,27 @@ def key(
     default: object = ...,
     ge: float | None = None,
     gt: float | None = None,
-    max_of: str = "",
+    max_key: str = "",
     max_count: int | None = None,
     shorthand: bool = False,
     sibling: bool = False,
     in_path: bool = True,
-    raised_under: str = "do",
-    element_of: str = "",
+    raising_key: str = "do",
+    list_key: str = "",
 ) -> Any:
-    """Declare a key; see `Key` for the meaning of the arguments.
+    """Return the declaration of a key, to be assigned to an attribute; see `Key` for the arguments.
 
-    The key has the name of the attribute, without a trailing underscore.
+    The name of the key is the name of the attribute, without a trailing underscore.
     """
-    return Key(doc, default, ge, gt, max_of, max_count, shorthand, sibling, in_path, raised_under, element_of)
+    return Key(doc, default, ge, gt, max_key, max_count, shorthand, sibling, in_path, raising_key, list_key)
 
 
 class KeyOwner:
     """Base of classes that declare keys.
 
     Attributes:
-        keys: The declared keys by their name in the mission file.
-        any_of: Keys of which a mission must give at least one.
+        keys: Declarations of the keys, by their names in the mission file.
+        any_of: Names of keys of which a mission must give at least one; empty for no such rule.
     """
 
     keys: ClassVar[Mapping[str, Key]] = {}
@@ -134,16 +134,16 @@ class KeyOwner:
             raise TypeError(f"{name} has no annotation: write its type before `= key(...)`")
         keys = dict(cls.keys)
         for attribute, value in declared.items():
-            complete = _complete(value, attribute, hints[attribute])
+            complete = _complete_declaration(value, attribute, hints[attribute])
             keys[complete.name] = complete
             delattr(cls, attribute)
         cls.keys = keys
 
     def set_keys(self, values: Mapping[str, object]) -> None:
-        """Set the attributes of all keys; `values` maps attributes to values; others get their defaults.
+        """Set the attributes of all keys to `values`, by the names of the attributes, or to their defaults.
 
         Raises:
-            TypeError: A required value is missing, or a value belongs to no key.
+            TypeError: A required value is missing, or an attribute in `values` belongs to no key.
         """
         remaining = dict(values)
         for declaration in self.keys.values():
@@ -156,17 +156,21 @@ class KeyOwner:
 
 
 class KeySection(KeyOwner):
-    """Mapping below a key of a control node: a subclass declares its keys."""
+    """Base class of the mappings under a key of a control node; a subclass declares the keys of a mapping."""
 
     def __init__(self, **values: object) -> None:
         self.set_keys(values)
 
 
-def _complete(declaration: Key, attribute: str, hint: object) -> Key:
-    """Return a key with name, attribute, kind and type, as its attribute and annotation declare them."""
-    if get_origin(hint) in (Union, types.UnionType) and types.NoneType in get_args(hint):
-        hint = Union[tuple(part for part in get_args(hint) if part is not types.NoneType)]  # noqa: UP007
-    base = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+def _complete_declaration(declaration: Key, attribute: str, annotation: object) -> Key:
+    """Return the declaration with the name, attribute, kind and type of the key.
+
+    `attribute` is the name of the attribute, and `annotation` its type annotation.
+    """
+    if get_origin(annotation) in (Union, types.UnionType) and types.NoneType in get_args(annotation):
+        parts = tuple(part for part in get_args(annotation) if part is not types.NoneType)
+        annotation = Union[parts]  # noqa: UP007
+    base = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
     element = get_args(base)[0] if get_origin(base) is tuple else None
     kinds: dict[object, Kind] = {
         Child: Kind.NODE,
@@ -183,10 +187,10 @@ def _complete(declaration: Key, attribute: str, hint: object) -> Key:
 
 
 @cache
-def _make_adapter(
+def _make_validator(
     declared: object, ge: float | None, gt: float | None, le: float | None
 ) -> TypeAdapter[object]:
-    """Return the validator of a type whose numbers have these bounds."""
+    """Return the validator of the type `declared`, whose numbers must lie within the bounds."""
     parts = get_args(declared) if get_origin(declared) in (Union, types.UnionType) else (declared,)
     bounds = Field(ge=ge, gt=gt, le=le)
     bounded = [Annotated[part, bounds] if part in (int, float) else part for part in parts]

@@ -9,30 +9,30 @@ from executive.tree.node import ControlNode
 
 
 class Loop(ControlNode):
-    """Base of the loops: runs rounds and records whether a round took time.
+    """Base class of loops: runs iterations, and records whether an iteration took at least one tick.
 
-    After a round that began and ended within one tick, the next round waits for the next tick; otherwise a
-    body that always ends at once would keep the tick from ending. After a round that took time, the next
-    round begins in the same tick, so that a loop causes no idle ticks.
+    After an iteration that began and ended within one tick, the next iteration waits for the next tick;
+    otherwise a body that always ends at once would keep the tick from ending. After a longer iteration, the
+    next iteration begins in the same tick, so that a loop causes no idle ticks.
 
     Attributes:
-        took_time: True if the current round was RUNNING at the end of a tick.
+        was_running: True if the current iteration was RUNNING at the end of a tick.
     """
 
     symbol, shape = "↻", "hexagon"
 
     def start(self) -> None:
-        """Begin the first round."""
-        self.took_time = False
+        """Begin the first iteration."""
+        self.was_running = False
 
-    def run_round(self, child: Child) -> Status:
-        """Tick a child as part of the current round."""
+    def run_iteration(self, child: Child) -> Status:
+        """Tick a child as part of the current iteration."""
         status = self.run_child(child)
         if status is Status.RUNNING:
-            self.took_time = True
+            self.was_running = True
         return status
 
-    def begin_round(self) -> bool:
-        """Begin the next round; return True if the last round took time and the next may run in this tick."""
-        took_time, self.took_time = self.took_time, False
-        return took_time
+    def begin_iteration(self) -> bool:
+        """Begin the next iteration; return True if it may run in the current tick."""
+        was_running, self.was_running = self.was_running, False
+        return was_running

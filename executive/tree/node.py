@@ -1,8 +1,8 @@
 """Base class of control nodes: a py_trees behaviour that ticks its children directly.
 
-A control node is one class in one file, registered by an entry point. The class declares its keys and writes
-`start` and `step` for the run, `flow` and `min_time` for the checker, and `explain` for the diagnosis.
-`tick_once` costs one call per level and never walks over finished children.
+A control node is one class in one file, registered by an entry point. The class declares its keys and
+implements `start` and `step` for the run, `compute_flow` and `min_time` for the checker, and `explain` for
+the diagnosis. `tick_once` makes one call per level of the tree, and visits no child that has ended.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from executive.errors import Fault, InputError
 from executive.events import BranchChosen, Emit, NodeEnded, NodeStarted, ignore
 from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Failure
-from executive.tree.flow import Enter, Flow, FlowState
+from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.halting import halt
 from executive.tree.inspection import Advice, MinTimeFunction, NodeFacts, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeyOwner, KeySection, Kind
@@ -28,14 +28,14 @@ from executive.tree.keys import Child, KeyOwner, KeySection, Kind
 
 @dataclass(frozen=True)
 class NodeContext:
-    """Place of a node in a tree, and the parts of the run that the node uses.
+    """Path and label of a node in a tree, and the parts of the run that the node uses.
 
     Attributes:
         path: Unique path from the root of the tree.
         clock: Clock of the run.
         blackboard: Variables of the run.
         label: Label of the node in the mission, or "".
-        emit: Receives the events of the node.
+        emit: Callback that receives the events of the node.
     """
 
     path: str
@@ -46,19 +46,19 @@ class NodeContext:
 
 
 class ControlNode(KeyOwner, Behaviour):
-    """Base of the control nodes.
+    """Base class of control nodes.
 
     Attributes:
-        keyword: Name of the node in missions, and source of its own failures.
-        reasons: Reasons of the node's own failures.
+        keyword: Name of the node in missions, and source of the failures that the node itself raises.
+        reasons: Declared reasons of the failures that the node itself raises.
         symbol: Character before the name of the node in drawings.
         shape: Shape of the node in Graphviz drawings.
-        remedy: Advice to the mission author how to handle a failure by wrapping the failing node in this
-            node; "" if this node handles none.
-        keyword_hints: Hints by the keyword that other languages use for this node, as `selector`.
+        remedy: Advice to the mission author: how this node, around a failing node, handles the failure; "" if
+            this node handles no failures.
+        keyword_hints: Hints for authors who write a keyword of another language, by that keyword.
         path: Unique path from the root of the tree.
         label: Label of the node in the mission, or "".
-        failure: Cause of the failure while the status is FAILURE; else None.
+        failure: The failure while the status is FAILURE; else None.
         subtrees: Names of the subtrees whose root is this node, the outermost first.
     """
 
@@ -77,19 +77,19 @@ class ControlNode(KeyOwner, Behaviour):
         self.failure: Failure | None = None
         self._emit = context.emit
         self.set_keys(values)
-        self.children = [child for key in self.keys for child in self.children_of(key)]
+        self.children = [child for key in self.keys for child in self.list_children(key)]
         for child in self.children:
             child.parent = self
         self._check_constants()
 
-    def children_of(self, name: str) -> list[Child]:
+    def list_children(self, key_name: str) -> list[Child]:
         """Return the nodes under a key, including those in the sections of the key."""
-        key = self.keys[name]
+        key = self.keys[key_name]
         return _find_nodes(getattr(self, key.attribute))
 
     @property
     def detail(self) -> str:
-        """The constants of the node in a few words, for outlines."""
+        """The constants of the node that differ from their defaults, as a text for outlines."""
         constants = [key for key in self.keys.values() if key.kind is Kind.CONSTANT]
         values = {key.name: getattr(self, key.attribute) for key in constants}
         return ", ".join(
@@ -97,30 +97,30 @@ class ControlNode(KeyOwner, Behaviour):
         )
 
     def describe_trigger(self, child: Child) -> str:
-        """Return the failures after which a child runs, in a few words; "" for none."""
+        """Return a text with the failures after which a child runs: `on Grasp.missed`; else ""."""
         del child
         return ""
 
-    # The run.
+    # Methods for the run.
 
     def start(self) -> None:
         """Begin an activation; called before the first `step`."""
 
     def step(self) -> Status:
-        """Continue by one tick; return RUNNING, SUCCESS or FAILURE, the latter with `failure` set."""
+        """Continue by one tick; return RUNNING, SUCCESS or FAILURE. Before FAILURE, set `failure`."""
         raise NotImplementedError
 
     def clean_up(self) -> None:
         """End an activation; called once, also after a halt or a fault."""
 
-    # The checker.
+    # Methods for the checker.
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Return how the node may end if it is entered in a state; `enter` returns the same for a child."""
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends of the node from a state; `flow_of` returns those of a child."""
         raise NotImplementedError
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
-        """Return a lower bound of the time to success [s]; `min_time_of` returns it for a child."""
+        """Return a lower bound of the time to success [s]; `min_time_of` returns the bound for a child."""
         del min_time_of
         return 0.0
 
@@ -130,7 +130,7 @@ class ControlNode(KeyOwner, Behaviour):
         yield from ()
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the reason why a child can never run; "" if another finding reports it."""
+        """Return the cause for which a child can never run; "" if another finding reports the cause."""
         del child
         return ""
 
@@ -140,24 +140,24 @@ class ControlNode(KeyOwner, Behaviour):
         return None
 
     @property
-    def concurrent(self) -> tuple[Child, ...]:
-        """Children that run at the same time."""
+    def concurrent_children(self) -> tuple[Child, ...]:
+        """Children that run at the same time; empty if the children run one after the other."""
         return ()
 
     @property
-    def halted_by_sibling(self) -> tuple[Child, ...]:
-        """Children that the node halts when another child has ended, so they need not end themselves."""
+    def children_halted_by_sibling(self) -> tuple[Child, ...]:
+        """Children that the node halts when another child has ended, so that they may run without end."""
         return ()
 
-    # Explanations.
+    # Methods for the diagnosis.
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return why the node did not handle a failure of a child; "" for a node that handles no failures."""
+        """Return the cause for which the node did not handle a failure; "" for a node that handles none."""
         del failure
         return ""
 
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int] | None:
-        """Return the number of the failed attempt and the allowed number, if the node has attempts."""
+        """Return the number of the failed attempt and the number of allowed attempts; None if it has none."""
         del failure
         return None
 
@@ -166,11 +166,11 @@ class ControlNode(KeyOwner, Behaviour):
         del failure
         yield from ()
 
-    def contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield the children that run only after a failure or at the end, with their names in reports."""
+    def list_contingencies(self) -> Iterator[tuple[str, Child]]:
+        """Yield the children that run only after a failure or at the end, each after its name in reports."""
         yield from ()
 
-    # Helpers of subclasses.
+    # Methods that subclasses call.
 
     def run_child(self, child: Child) -> Status:
         """Tick a child and return its status."""
@@ -181,36 +181,36 @@ class ControlNode(KeyOwner, Behaviour):
         return status
 
     def halt_children(self, children: Iterable[Child]) -> None:
-        """End every running node in and below these children, one after the other.
+        """Halt the children with all running nodes below them, one child after the other.
 
         Raises:
-            Fault: The clean-up of a node failed; all other nodes were ended nevertheless.
+            Fault: The clean-up of a node failed; all other nodes were halted nevertheless.
         """
         if problems := [problem for child in children for problem in halt(child)]:
             raise Fault("; ".join(problems), self.path)
 
-    def failure_of(self, child: Child) -> Failure:
-        """Return the failure of a child; a behaviour from py_trees has the only reason `failed`."""
+    def get_failure(self, child: Child) -> Failure:
+        """Return the failure of a child; for a py_trees behaviour, a failure with the reason `failed`."""
         failure = getattr(child, "failure", None)
         if isinstance(failure, Failure):
             return failure
         return Failure("failed", child.feedback_message, child.name, self.path)
 
     def fail(self, failure: Failure) -> Status:
-        """Pass on a failure of a child, and return FAILURE."""
+        """Pass on a failure of a child: set `failure`, and return FAILURE."""
         self.failure = failure.with_label(self.label)
         return Status.FAILURE
 
-    def fail_for(self, reason: str, message: str) -> Status:
-        """Fail with a reason of this node, and return FAILURE."""
+    def fail_with_reason(self, reason: str, message: str) -> Status:
+        """Raise a failure of this node itself: set `failure`, and return FAILURE."""
         return self.fail(Failure(reason, message, self.keyword, self.path))
 
     def report_choice(self, choice: str, cause: Failure | None = None) -> None:
-        """Report the next step of the node, and the failure that caused it, if any."""
+        """Emit an event with the next step of the node, and with the failure that caused the step, if any."""
         reason, message = (str(cause), cause.message) if cause else ("", "")
         self._emit(BranchChosen(self.path, choice, reason, message))
 
-    # The interface of py_trees.
+    # Methods of the py_trees interface.
 
     def tick_once(self) -> None:
         """Continue by one tick."""
@@ -235,7 +235,7 @@ class ControlNode(KeyOwner, Behaviour):
         yield self
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
-        """Halt the running nodes below, then end with `new_status`.
+        """Halt the running nodes below this node, then end with `new_status`.
 
         Raises:
             Fault: The clean-up of a node below failed; all other nodes were halted nevertheless.
@@ -265,12 +265,12 @@ class ControlNode(KeyOwner, Behaviour):
         for key in self.keys.values():
             value = getattr(self, key.attribute)
             if key.kind is Kind.CONSTANT and value != key.default:
-                max_value = len(self.children_of(key.max_of)) if key.max_of else None
+                max_value = len(self.list_children(key.max_key)) if key.max_key else None
                 try:
-                    key.adapter(max_value).validate_python(value, strict=True)
+                    key.make_validator(max_value).validate_python(value, strict=True)
                 except ValidationError as problems:
                     errors = problems.errors()
-                    problem = next((one for one in errors if "than" in one["type"]), errors[0])["msg"]
+                    problem = next((error for error in errors if "than" in error["type"]), errors[0])["msg"]
                     name = f"{self.keyword}.{key.name}"
                     raise InputError(f"{self.path}: {name} cannot be {value!r}: {problem}") from None
 

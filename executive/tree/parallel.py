@@ -1,4 +1,4 @@
-"""Children that run at the same time."""
+"""Control node whose children run at the same time."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from py_trees.common import Status
 
 from executive.tree.failure import Failure
 from executive.tree.flow import (
-    Enter,
     Flow,
+    FlowFunction,
     FlowState,
     PossibleFailure,
-    combine_branches,
+    combine_tools,
     find_tools_at_end,
     join_states,
 )
@@ -22,29 +22,30 @@ from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
 
 MAX_BRANCHES = 200
-"""Largest number of branches; limits the time of the checker, which compares every pair of branches."""
+"""Maximum number of branches; limits the time of the checker, which compares every pair of branches."""
 
 
 class Parallel(ControlNode):
     """Run all children at the same time.
 
-    Every running child is ticked once per tick, in order; a child that ended is not run again. The node
+    Every running child is ticked once per tick, in order; a child that has ended is not run again. The node
     decides after all running children were ticked:
 
-    * Enough children have succeeded: success, even if others failed in the same tick; running children are
-      halted.
-    * Too many children have failed: the others may finish first, or are halted at once with `halt`. The node
-      fails with the first failure; of failures in the same tick, with that of the child listed first.
-      Without `halt`, another child thus completes its motion of the arm.
+    * If enough children have succeeded, the node succeeds, even if others failed in the same tick, and halts
+      the running children.
+    * If too many children have failed, the node fails with the first failure; of failures in the same tick,
+      with the failure of the child listed first. With `halt`, the node halts the running children at once;
+      without `halt`, it lets them finish, so that a motion of the arm is completed.
 
-    With `wait_for: lead`, the node ends as its first child ends, in the same tick, and halts the others.
+    With `wait_for: lead`, the node ends in the tick in which its first child, the lead, ends, with the status
+    of the lead, and halts the others.
     """
 
     keyword = "parallel"
     symbol, shape = "⇉", "parallelogram"
 
     wait_for: Literal["all", "any", "lead"] | int = key(
-        default="all", ge=1, max_of="do",
+        default="all", ge=1, max_key="do",
         doc="Number of children that must succeed: `all`, `any` or a number; `lead`: only the first child.",
     )  # fmt: skip
     halt: bool = key(
@@ -58,7 +59,7 @@ class Parallel(ControlNode):
         return self.wait_for == "lead"
 
     @property
-    def _needed(self) -> int:
+    def _required_count(self) -> int:
         """Number of children that must succeed, if no child is the lead."""
         if isinstance(self.wait_for, int):
             return self.wait_for
@@ -70,13 +71,14 @@ class Parallel(ControlNode):
         if self._has_lead:
             return "wait for the lead"
         count = len(self.do)
-        wait = "wait for all" if self._needed == count else f"wait for {self._needed} of {count}"
+        required = self._required_count
+        wait = "wait for all" if required == count else f"wait for {required} of {count}"
         return f"{wait}, halt" if self.halt else wait
 
     def start(self) -> None:
         """Begin with all children."""
         self._running = list(self.do)
-        self._missing = self._needed
+        self._missing_count = self._required_count
         self._failure: Failure | None = None
         self._tick_children = self._tick_lead if self._has_lead else self._tick_all
 
@@ -85,117 +87,114 @@ class Parallel(ControlNode):
         return self._tick_children()
 
     def _tick_lead(self) -> Status:
-        """Tick the lead; unless it ended, tick the other running children too."""
+        """Tick the lead; if the lead is still running, tick the other running children."""
         lead, *others = self._running
         status = self.run_child(lead)
         if status is not Status.RUNNING:
             self.halt_children(others)
-            return status if status is Status.SUCCESS else self.fail(self.failure_of(lead))
+            return status if status is Status.SUCCESS else self.fail(self.get_failure(lead))
         for child in others:
             status = self.run_child(child)
             if status is not Status.RUNNING:
                 self._running.remove(child)
             if status is Status.FAILURE:
-                self.report_choice("go on without this branch", self.failure_of(child))
+                self.report_choice("go on without this branch", self.get_failure(child))
         return Status.RUNNING
 
     def _tick_all(self) -> Status:
-        has_ended = not self._running
+        has_child_ended = not self._running
         for child in self._running:
             if self.run_child(child) is not Status.RUNNING:
-                has_ended = True
-        return self._decide() if has_ended else Status.RUNNING
+                has_child_ended = True
+        return self._decide() if has_child_ended else Status.RUNNING
 
     def _decide(self) -> Status:
-        """Count the children that ended in this tick, and return the status of the node."""
+        """Count the children that ended in this tick, and end the node if their number suffices."""
         ticked = self._running
         self._running = [child for child in ticked if child.status is Status.RUNNING]
-        self._missing -= sum(child.status is Status.SUCCESS for child in ticked)
-        failures = [self.failure_of(child) for child in ticked if child.status is Status.FAILURE]
+        self._missing_count -= sum(child.status is Status.SUCCESS for child in ticked)
+        failures = [self.get_failure(child) for child in ticked if child.status is Status.FAILURE]
         self._failure = next(iter(failures), None) if self._failure is None else self._failure
-        if self._missing <= 0:
+        if self._missing_count <= 0:
             self.halt_children(self._running)
-            self._report("enough others succeeded", failures)
+            self._report_choices("enough others succeeded", failures)
             return Status.SUCCESS
-        must_fail = self._missing > len(self._running)
+        must_fail = self._missing_count > len(self._running)
         if self._running and not (must_fail and self.halt):
-            self._report(
-                "let the others finish, then fail" if must_fail else "go on with the others", failures
-            )
+            choice = "let the others finish, then fail" if must_fail else "go on with the others"
+            self._report_choices(choice, failures)
             return Status.RUNNING
         self.halt_children(self._running)
         assert self._failure is not None
-        self._report(
-            f"fail with {self._failure}",
-            [other for other in failures if other is not self._failure],
-        )
+        others = [failure for failure in failures if failure is not self._failure]
+        self._report_choices(f"fail with {self._failure}", others)
         return self.fail(self._failure)
 
-    def _report(self, choice: str, failures: Sequence[Failure]) -> None:
+    def _report_choices(self, choice: str, failures: Sequence[Failure]) -> None:
         for failure in failures:
             self.report_choice(choice, failure)
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Enter all children in the same state and join their ends."""
-        flows = [enter(branch, state) for branch in self.do]
-        after_halt = [find_tools_at_end(flow, state, halts=True) for flow in flows]
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends: every child is entered in the same state, and the ends are combined."""
+        flows = [flow_of(branch, state) for branch in self.do]
+        after_halt = [find_tools_at_end(flow, state, may_be_halted=True) for flow in flows]
         halted = join_states(flow.halted for flow in flows)
-        halted = halted and halted.with_tools(combine_branches(state.tools, after_halt))
+        halted = halted and halted.with_tools(combine_tools(state.tools, after_halt))
         failures: dict[PossibleFailure, FlowState] = {}
         if self._has_lead:
             others = after_halt[1:]
             for failure, after in flows[0].failures.items():
-                failures[failure] = after.with_tools(combine_branches(state.tools, [after.tools, *others]))
+                failures[failure] = after.with_tools(combine_tools(state.tools, [after.tools, *others]))
             end = flows[0].success
             return Flow(
-                end and end.with_tools(combine_branches(state.tools, [end.tools, *others])), failures, halted
+                end and end.with_tools(combine_tools(state.tools, [end.tools, *others])),
+                failures,
+                halted,
             )
-        needed = self._needed
-        ends = [find_tools_at_end(flow, state, self.halt or needed < len(flows)) for flow in flows]
-        if sum(bool(flow.failures) for flow in flows) > len(flows) - needed:
+        required = self._required_count
+        ends = [find_tools_at_end(flow, state, self.halt or required < len(flows)) for flow in flows]
+        if sum(bool(flow.failures) for flow in flows) > len(flows) - required:
             for index, flow in enumerate(flows):
                 others = [*ends[:index], *ends[index + 1 :]]
                 for failure, after in flow.failures.items():
-                    failures[failure] = after.with_tools(
-                        combine_branches(state.tools, [after.tools, *others])
-                    )
-        return Flow(self._find_success(flows, state), failures, halted)
+                    failures[failure] = after.with_tools(combine_tools(state.tools, [after.tools, *others]))
+        return Flow(self._compute_success_state(flows, state), failures, halted)
 
-    def _find_success(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
-        """Return the state once enough branches have succeeded; None if too few can succeed."""
+    def _compute_success_state(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
+        """Return the state after enough branches have succeeded; None if too few branches can succeed."""
         succeeding = [flow.success for flow in flows if flow.success is not None]
         success = join_states(succeeding)
-        if success is None or len(succeeding) < self._needed:
+        if success is None or len(succeeding) < self._required_count:
             return None
-        if self._needed < len(flows):
-            ends = [find_tools_at_end(flow, state, halts=True) for flow in flows]
-            return success.with_tools(combine_branches(state.tools, ends))
+        if self._required_count < len(flows):
+            ends = [find_tools_at_end(flow, state, may_be_halted=True) for flow in flows]
+            return success.with_tools(combine_tools(state.tools, ends))
         end = success.with_variables(name for one in succeeding for name in one.written or ())
-        return end.with_tools(combine_branches(state.tools, [one.tools for one in succeeding]))
+        return end.with_tools(combine_tools(state.tools, [one.tools for one in succeeding]))
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
-        """Return the minimum time of the lead, or the n-th shortest of a child if n must succeed [s]."""
-        return (
-            min_time_of(self.do[0]) if self._has_lead else sorted(map(min_time_of, self.do))[self._needed - 1]
-        )
+        """Return the minimum time of the lead, or the n-th shortest if n children must succeed [s]."""
+        if self._has_lead:
+            return min_time_of(self.do[0])
+        return sorted(map(min_time_of, self.do))[self._required_count - 1]
 
     @property
-    def concurrent(self) -> Children:
+    def concurrent_children(self) -> Children:
         """All children."""
         return self.do
 
     @property
-    def halted_by_sibling(self) -> Children:
-        """All children but the lead, if there is a lead."""
+    def children_halted_by_sibling(self) -> Children:
+        """All children except the lead; empty if no child is the lead."""
         return self.do[1:] if self._has_lead else ()
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the number of children that must succeed, and the other failures."""
+        """Return a text with the number of children that must succeed, and the other failures."""
         if self._has_lead:
             return "ends as its first child, the lead, ends"
         count = len(self.do)
-        needs = {"all": f"all {count}", "any": f"one of its {count}"}
-        needed = needs.get(str(self.wait_for), f"{self.wait_for} of its {count}")
-        # The failure passed on may have been reported already, when the other branches went on.
-        others = [reason for reason in failure.handled if reason != failure.reason]
-        return f"needs {needed} branches" + (f"; also failed: {', '.join(others)}" if others else "")
+        texts = {"all": f"all {count}", "any": f"one of its {count}"}
+        required = texts.get(str(self.wait_for), f"{self.wait_for} of its {count}")
+        # The handled failures may include the failure passed on: it was reported while other branches ran.
+        others = [reason for reason in failure.handled_counts if reason != failure.reason]
+        return f"needs {required} branches" + (f"; also failed: {', '.join(others)}" if others else "")

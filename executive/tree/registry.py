@@ -20,17 +20,17 @@ ControlNodes: TypeAlias = Mapping[str, type[ControlNode]]
 _KEYWORD_PATTERN = re.compile("[a-z][a-z0-9_]*")
 
 
-def control_nodes() -> ControlNodes:
+def load_control_nodes() -> ControlNodes:
     """Return the class of every installed control node by its keyword.
 
     Raises:
-        InputError: Two packages register one keyword, or a class cannot be loaded or lacks a declaration.
+        InputError: Two packages register the same keyword, or a class cannot be loaded or is incomplete.
     """
-    return _load(tuple(list_entries(ENTRY_POINT_GROUP, "control node").values()))
+    return _load_classes(tuple(list_entries(ENTRY_POINT_GROUP, "control node").values()))
 
 
 @cache
-def _load(entries: tuple[PluginEntry, ...]) -> ControlNodes:
+def _load_classes(entries: tuple[PluginEntry, ...]) -> ControlNodes:
     nodes = {entry.name: entry.load() for entry in entries}
     for entry in entries:
         if problem := _find_problem(entry.name, nodes[entry.name]):
@@ -39,15 +39,15 @@ def _load(entries: tuple[PluginEntry, ...]) -> ControlNodes:
 
 
 def _find_problem(keyword: str, node: object) -> str:
-    """Return the reason why a class cannot be used as a control node; "" if it can."""
+    """Return an error message if the class `node` cannot be used as a control node, else ""."""
     if not (isinstance(node, type) and issubclass(node, ControlNode)):
         return "is not a ControlNode subclass"
     if not _KEYWORD_PATTERN.fullmatch(keyword) or node.keyword != keyword:
         return f'must have the name of its class, in lower case: the class has the keyword "{node.keyword}"'
-    for method in ("step", "flow"):
+    for method in ("step", "compute_flow"):
         if getattr(node, method) is getattr(ControlNode, method):
             return f"has no method {method}"
-    # Only instances have all attributes of py_trees.
+    # Some attributes of py_trees behaviours exist only on instances.
     instance = ControlNode(NodeContext("", cast("Clock", None), Blackboard()))
     clashes = [key.attribute for key in node.keys.values() if hasattr(instance, key.attribute)]
     if clashes or "as" in node.keys:

@@ -1,4 +1,4 @@
-"""Loop that ends after a number of rounds or with an expected failure."""
+"""Loop that ends after a number of iterations or with an expected failure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, find_fixed_point, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure, format_reasons
 from executive.tree.keys import Child, Reasons, key
 from executive.tree.loop import Loop
@@ -15,71 +15,71 @@ from executive.tree.loop import Loop
 class Repeat(Loop):
     """Run the body again after each success, up to a number of times or until an expected failure.
 
-    The first limit that is reached ends the loop with success. Any other failure is passed on.
+    Both ends of the loop are a success. Any other failure of the body ends the loop and is passed on.
     """
 
     keyword = "repeat"
     keyword_hints: ClassVar = {"loop": "It is called repeat here, or while with a condition."}
     any_of = ("times", "until")
 
-    times: int | None = key(default=None, ge=0, doc="Maximum number of rounds.")
+    times: int | None = key(default=None, ge=0, doc="Maximum number of iterations.")
     until: Reasons = key(default=(), doc="Failures that end the loop with success.")
     do: Child = key(doc="Body of the loop.")
 
     @property
     def detail(self) -> str:
-        """The conditions that end the loop."""
-        ends = [] if self.times is None else [f"{self.times} times"]
+        """The conditions that end the loop, as a text."""
+        conditions = [] if self.times is None else [f"{self.times} times"]
         if self.until:
-            ends.append(f"until {format_reasons(self.until)}")
-        return " or ".join(ends)
+            conditions.append(f"until {format_reasons(self.until)}")
+        return " or ".join(conditions)
 
     def start(self) -> None:
-        """Begin the first round."""
+        """Begin the first iteration."""
         super().start()
-        self._completed = 0
+        self._completed_count = 0
 
     def step(self) -> Status:
-        """Tick the body; begin the next round in the same tick if the last one took time."""
-        while self._completed != self.times:
-            status = self.run_round(self.do)
+        """Tick the body; begin the next iteration in the same tick if the last one took at least one tick."""
+        while self._completed_count != self.times:
+            status = self.run_iteration(self.do)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
-                failure = self.failure_of(self.do)
+                failure = self.get_failure(self.do)
                 if not failure.matches(self.until):
                     return self.fail(failure)
                 self.report_choice("done", failure)
                 return Status.SUCCESS
-            self._completed += 1
-            if not self.begin_round() and self._completed != self.times:
+            self._completed_count += 1
+            if not self.begin_iteration() and self._completed_count != self.times:
                 return Status.RUNNING
         return Status.SUCCESS
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Enter the body again in the state after its success."""
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends: the body is entered again in the state after its success."""
         if self.times == 0:
             return Flow(state, {}, None)
         body, entry = find_fixed_point(
-            enter, self.do, state, lambda flow: None if self.times == 1 else flow.success
+            flow_of, self.do, state, lambda flow: None if self.times == 1 else flow.success
         )
         finished = [after for failure, after in body.failures.items() if failure.may_match(self.until)]
         success = join_states((*finished, None if self.times is None else body.success))
-        passed = {one: after for one, after in body.failures.items() if not one.must_match(self.until)}
-        return Flow(success, passed, join_states((body.halted, entry)))
+        others = {one: after for one, after in body.failures.items() if not one.must_match(self.until)}
+        return Flow(success, others, join_states((body.halted, entry)))
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
-        """Return the minimum time of all rounds [s]; 0 if a failure may end the loop with success."""
+        """Return the minimum time of all iterations [s]; 0 if a failure may end the loop with success."""
         return 0.0 if self.until else (self.times or 0) * min_time_of(self.do)
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause: the number of rounds is 0."""
+        """Return the cause: the number of iterations is 0."""
         del child
         return "the body runs 0 times"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the conditions under which the loop would have succeeded."""
+        """Return a text with the condition under which the loop would have succeeded."""
         del failure
         if self.until:
             return f"succeeds only with {format_reasons(self.until)}"
-        return f"a failure ends it before its {self.times} rounds are complete"
+        return f"a failure ends it before its {self.times} iterations are complete"

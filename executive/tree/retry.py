@@ -1,4 +1,4 @@
-"""Further attempts after a failure."""
+"""Loop that runs its body again after a failure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from py_trees.common import Status
 from executive.cell.protocols import Steps
 from executive.skill import Seconds
 from executive.tree.failure import Failure
-from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, find_fixed_point, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
 from executive.tree.inspection import (
     Advice,
     MinTimeFunction,
@@ -24,11 +24,11 @@ from executive.tree.loop import Loop
 
 
 class Backoff(KeySection):
-    """Waiting times that grow from one failure to the next."""
+    """Delays before further attempts, which grow by a factor from one failure to the next."""
 
-    first: Seconds = key(gt=0, shorthand=True, doc="Wait before the second attempt [s].")
-    factor: float = key(default=1.0, ge=1, doc="Ratio of each wait to the one before; 1 if not given.")
-    most: Seconds = key(default=inf, gt=0, doc="Longest wait [s].")
+    first: Seconds = key(gt=0, shorthand=True, doc="Delay before the second attempt [s].")
+    factor: float = key(default=1.0, ge=1, doc="Ratio of each delay to the previous delay; 1 if not given.")
+    most: Seconds = key(default=inf, gt=0, doc="Maximum delay [s].")
 
     def __str__(self) -> str:
         factor = f", times {self.factor:g} each" if self.factor != 1 else ""
@@ -36,7 +36,7 @@ class Backoff(KeySection):
         return f"{self.first:g} s{factor}{limit}"
 
     def compute_delay(self, attempt: int) -> float:
-        """Return the wait after the failure of an attempt, counted from 1 [s]."""
+        """Return the delay after the failure of an attempt, counted from 1 [s]."""
         try:
             return min(self.first * self.factor ** (attempt - 1), self.most)
         except OverflowError:
@@ -44,11 +44,11 @@ class Backoff(KeySection):
 
 
 class Retry(Loop):
-    """Run a node again after a failure.
+    """Run the body again after a failure.
 
     Failures that `on` does not list, and the failure of the last attempt, are passed on. Before every further
-    attempt, the node waits for `backoff` on the clock of the run and then runs `recover`; if `recover` fails,
-    the retry fails with the failure from which it was recovering.
+    attempt, the node waits for the delay `backoff` on the clock of the run and then runs `recover`; if
+    `recover` fails, the node fails with the failure of the last attempt.
     """
 
     keyword = "retry"
@@ -57,13 +57,13 @@ class Retry(Loop):
     on: Reasons = key(default=(), doc="Failures after which the body runs again; every failure if not given.")
     recover: Child | None = key(default=None, doc="Node to run before every further attempt.")
     backoff: Backoff | None = key(
-        default=None, doc="Wait before every further attempt [s], or first, factor and most."
+        default=None, doc="Delay before every further attempt [s], or first, factor and most."
     )
     do: Child = key(doc="Body, run in every attempt.")
 
     @property
     def detail(self) -> str:
-        """The number of attempts, their causes and the waits."""
+        """The number of attempts, the failures that are retried, and the delays, as a text."""
         after = format_reasons(self.on) or "any failure"
         backoff = "" if self.backoff is None else f", backoff {self.backoff}"
         return f"up to {self.attempts} attempts, on {after}{backoff}"
@@ -72,94 +72,93 @@ class Retry(Loop):
         """Begin the first attempt."""
         super().start()
         self._attempt = 1
-        self._pending: Failure | None = None
+        self._pending_failure: Failure | None = None
 
     def step(self) -> Status:
-        """Tick the current child; begin the next attempt in the same tick if the round took time."""
+        """Tick the current child; begin an attempt in the same tick if the last one took a tick or more."""
         while True:
-            if self._pending is None:
-                status = self.run_round(self.do)
+            if self._pending_failure is None:
+                status = self.run_iteration(self.do)
                 if status is not Status.FAILURE:
                     return status
-                failure = self.failure_of(self.do)
+                failure = self.get_failure(self.do)
                 if self._attempt == self.attempts or (self.on and not failure.matches(self.on)):
                     return self.fail(failure)
-                self._pending, self._wait = failure, self._begin_wait(failure)
-            status = self._tick_recovery(self._pending)
+                self._pending_failure, self._wait_steps = failure, self._begin_wait(failure)
+            status = self._tick_recovery(self._pending_failure)
             if status is not Status.SUCCESS:
                 return status
-            self._pending = None
-            if not self.begin_round():
+            self._pending_failure = None
+            if not self.begin_iteration():
                 return Status.RUNNING
 
     def _begin_wait(self, failure: Failure) -> Steps:
-        """Report the next attempt; return the wait before it."""
+        """Report the next attempt, and return the steps of the delay before the attempt."""
         delay = 0.0 if self.backoff is None else self.backoff.compute_delay(self._attempt)
         self._attempt += 1
         delay_text = f" in {delay:g} s" if delay else ""
         self.report_choice(f"attempt {self._attempt} of {self.attempts}{delay_text}", failure)
         return self.clock.sleep(delay)
 
-    def _tick_recovery(self, pending: Failure) -> Status:
-        """Continue the wait, then tick the recovery; SUCCESS if the next attempt may begin."""
-        if next(self._wait, self) is not self:
-            self.took_time = True
+    def _tick_recovery(self, failure: Failure) -> Status:
+        """Continue the delay, then tick `recover`; return SUCCESS if the next attempt may begin."""
+        if next(self._wait_steps, self) is not self:
+            self.was_running = True
             return Status.RUNNING
         if self.recover is None:
             return Status.SUCCESS
-        status = self.run_round(self.recover)
+        status = self.run_iteration(self.recover)
         if status is Status.FAILURE:
-            self.report_choice("give up: the recovery failed", self.failure_of(self.recover))
-            return self.fail(pending)
+            self.report_choice("give up: the recovery failed", self.get_failure(self.recover))
+            return self.fail(failure)
         return status
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Enter recovery and body in turn until no new state occurs."""
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends: body and recovery are entered in turn until no new state occurs."""
         recovery: list[Flow] = []
-        waiting: FlowState | None = None
+        retry_state: FlowState | None = None
 
         def is_retried(failure: PossibleFailure) -> bool:
             return not self.on or failure.may_match(self.on)
 
-        def next_entry(body: Flow) -> FlowState | None:
-            nonlocal waiting
+        def get_next_entry(body: Flow) -> FlowState | None:
+            nonlocal retry_state
             recovery.clear()
             retried = (after.after_handling(one) for one, after in body.failures.items() if is_retried(one))
-            waiting = join_states(retried) if self.attempts != 1 else None
-            if waiting is None or self.recover is None:
-                return waiting
-            recovery.append(enter(self.recover, waiting))
+            retry_state = join_states(retried) if self.attempts != 1 else None
+            if retry_state is None or self.recover is None:
+                return retry_state
+            recovery.append(flow_of(self.recover, retry_state))
             return recovery[0].success
 
-        body, _ = find_fixed_point(enter, self.do, state, next_entry)
+        body, _ = find_fixed_point(flow_of, self.do, state, get_next_entry)
         given_up = join_states(after for flow in recovery for after in flow.failures.values())
         failures = {
             failure: after.join(given_up or after) if is_retried(failure) else after
             for failure, after in body.failures.items()
         }
-        waits = waiting if self.backoff else None
-        return Flow(
-            body.success, failures, join_states((body.halted, *(flow.halted for flow in recovery), waits))
-        )
+        wait_state = retry_state if self.backoff else None
+        halted = join_states((body.halted, *(flow.halted for flow in recovery), wait_state))
+        return Flow(body.success, failures, halted)
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of one attempt [s]."""
         return min_time_of(self.do)
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
-        """Find attempts that change nothing, and a single attempt."""
-        skills = facts.skills()
+        """Yield a warning if nothing changes between the attempts, and if there is only one attempt."""
+        skills = facts.list_skills()
         if not self.backoff and skills and not any(one is None or one.senses or one.moves for one in skills):
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
             hint = "Put a look or a motion into do or recover, or wait with backoff."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
-        # The value of a param may differ in another run, so a param is not reported.
+        # An attempt count from a param is not reported: the param may have another value in another run.
         if self.attempts == 1 and facts.is_literal("attempts"):
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the reason why the recovery never runs."""
+        """Return the cause for which the recovery never runs; "" for the body."""
         if child is not self.recover:
             return ""
         return (
@@ -167,41 +166,43 @@ class Retry(Loop):
         )
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the failures of all attempts."""
-        handled = dict(failure.handled)
-        if self._has_given_up(failure):
+        """Return a text with the failures of all attempts."""
+        counts = dict(failure.handled_counts)
+        if self._has_recovery_failed(failure):
             attempt, attempts = self.count_attempts(failure)
-            last = f"{failure.last}: {failure.messages[failure.last]}"
+            last = f"{failure.last_handled}: {failure.last_messages[failure.last_handled]}"
             return f"gave up after attempt {attempt} of {attempts}: its recovery failed with {last}"
         if self.on and not failure.is_one_of(self.on):
-            earlier = f"; failures before: {_format_counts(handled)}" if handled else ""
+            earlier = f"; failures before: {_format_counts(counts)}" if counts else ""
             return f"runs again only after {format_reasons(self.on)}{earlier}"
-        handled[failure.reason] = handled.get(failure.reason, 0) + 1
+        counts[failure.reason] = counts.get(failure.reason, 0) + 1
         if self.attempts == 1:
             return "has no second attempt"
-        return f"all {self.attempts} attempts failed: {_format_counts(handled)}"
+        return f"all {self.attempts} attempts failed: {_format_counts(counts)}"
 
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int]:
         """Return the number of the failed attempt and the number of allowed attempts."""
-        # `handled` counts every failed attempt but the last one, and also a failed recovery.
-        return sum(failure.handled.values()) + (-1 if self._has_given_up(failure) else 1), self.attempts
+        # `handled_counts` contains every failed attempt except the last, and also a failed recovery.
+        return sum(failure.handled_counts.values()) + (
+            -1 if self._has_recovery_failed(failure) else 1
+        ), self.attempts
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
         attempts = self.attempts
-        if self._has_given_up(failure):
-            yield Advice(f"handle {failure.last} in the recovery", child=self.recover)
+        if self._has_recovery_failed(failure):
+            yield Advice(f"handle {failure.last_handled} in the recovery", child=self.recover)
         elif (not self.on or failure.is_one_of(self.on)) and self.count_attempts(failure)[0] == attempts:
             yield Advice(f"allow more than {attempts} attempt{'s' * (attempts > 1)}", "attempts")
 
-    def contingencies(self) -> Iterator[tuple[str, Child]]:
+    def list_contingencies(self) -> Iterator[tuple[str, Child]]:
         """Yield the recovery."""
         if self.recover is not None:
             yield "recover", self.recover
 
-    def _has_given_up(self, failure: PropagatedFailure) -> bool:
-        return self.recover is not None and failure.has_failed(self.recover)
+    def _has_recovery_failed(self, failure: PropagatedFailure) -> bool:
+        return self.recover is not None and failure.has_child_failed(self.recover)
 
 
-def _format_counts(handled: dict[str, int]) -> str:
-    return ", ".join(f"{count} x {reason}" for reason, count in handled.items())
+def _format_counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} x {reason}" for reason, count in counts.items())

@@ -1,10 +1,10 @@
-"""Sequence of nodes."""
+"""Control node that runs its children in order."""
 
 from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import MinTimeFunction
 from executive.tree.keys import Child, Children, key
 from executive.tree.node import ControlNode
@@ -30,19 +30,19 @@ class Sequence(ControlNode):
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
-                return self.fail(self.failure_of(child))
+                return self.fail(self.get_failure(child))
             self._next += 1
         return Status.SUCCESS
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Enter each child in the state after the one before it."""
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends; each child is entered in the state after the success of the previous."""
         failures: dict[PossibleFailure, FlowState] = {}
         halted = None
         entry: FlowState | None = state
         for child in self.do:
             if entry is None:
                 break
-            flow = enter(child, entry)
+            flow = flow_of(child, entry)
             failures.update(flow.failures)
             entry, halted = flow.success, join_states((halted, flow.halted))
         return Flow(entry, failures, halted)
@@ -52,7 +52,7 @@ class Sequence(ControlNode):
         return sum(map(min_time_of, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause, an earlier child."""
+        """Return the cause: an earlier child cannot succeed."""
         del child
         return "an earlier child never succeeds"
 

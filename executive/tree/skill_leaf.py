@@ -1,4 +1,4 @@
-"""A skill as a leaf of the tree."""
+"""Leaf of the tree that runs a skill."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from executive.tree.skill_run import SkillRun
 
 @dataclass(frozen=True)
 class Wiring:
-    """Values and variables that a mission connects to a skill.
+    """Connections of the ports of a skill to the constants and variables of a mission.
 
     Attributes:
-        constants: Values of params and inputs from the mission file, by name.
-        inputs: Variables by the names of the inputs that read them.
-        outputs: Variables by the names of the outputs that write them.
+        constants: Values of params and inputs from the mission file, by the name of the param or input.
+        inputs: Names of the variables from which inputs are read, by the name of the input.
+        outputs: Names of the variables to which outputs are written, by the name of the output.
     """
 
     constants: Mapping[str, object] = field(default_factory=dict)
@@ -36,13 +36,15 @@ class Wiring:
 
 
 class SkillLeaf(Behaviour):
-    """Runs one skill: a fresh instance per start, one step of its generator per tick.
+    """Runs one skill: creates an instance at every start, and advances its generator by one step per tick.
 
     Attributes:
         path: Unique path from the root of the tree.
-        failure: Cause of the failure while the status is FAILURE; else None.
+        label: Label of the leaf in the mission, or "".
+        skill_name: Name of the skill in the mission.
+        failure: The failure while the status is FAILURE; else None.
         skill_type: Class of the skill.
-        wiring: Values and variables that the mission connects to the skill.
+        wiring: Connections of the ports of the skill.
         subtrees: Names of the subtrees whose root is this leaf, the outermost first.
     """
 
@@ -65,10 +67,10 @@ class SkillLeaf(Behaviour):
 
     @property
     def detail(self) -> str:
-        """The constants and the renamed variables, for outlines."""
+        """The constants, and the variables whose names differ from their ports, as a text for outlines."""
         settings = {name: _format_value(value) for name, value in self.wiring.constants.items()}
-        wired = {**self.wiring.inputs, **self.wiring.outputs}
-        settings |= {port: f"${name}" for port, name in _unqualify(wired).items() if port != name}
+        variables = _remove_subtree_names({**self.wiring.inputs, **self.wiring.outputs})
+        settings |= {port: f"${name}" for port, name in variables.items() if port != name}
         if self.label:
             return ", ".join([self.skill_name, *(f"{key}: {value}" for key, value in settings.items())])
         return ", ".join(f"{key}: {value}" for key, value in settings.items())
@@ -77,7 +79,7 @@ class SkillLeaf(Behaviour):
         """Start the skill, or continue it by one step.
 
         Raises:
-            Fault: The skill raised another exception than a declared failure.
+            Fault: The skill raised an exception that is not a declared failure.
         """
         try:
             run = self._start() if self._run is None else self._run
@@ -141,7 +143,7 @@ class SkillLeaf(Behaviour):
         return inputs
 
     def _find_item(self, values: Mapping[str, object]) -> str:
-        """Return the item on which the skill acts according to the values of its ports, or ""."""
+        """Return the item on which the skill acts, given the values of its ports; "" if there is none."""
         for value in values.values():
             if isinstance(value, Target):
                 return value.item
@@ -152,8 +154,8 @@ class SkillLeaf(Behaviour):
         self._blackboard.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._find_item(outputs) or self._item
         self._close(Status.SUCCESS)
-        plain = {port: plain_or_type(value) for port, value in outputs.items()}
-        self._emit_end(Status.SUCCESS, outputs=plain)
+        reported = {port: plain_or_type(value) for port, value in outputs.items()}
+        self._emit_end(Status.SUCCESS, outputs=reported)
 
     def _fail(self, failed: SkillFailed) -> None:
         labels = (self.label,) if self.label else ()
@@ -180,9 +182,9 @@ class SkillLeaf(Behaviour):
         self._emit(event)
 
 
-def _unqualify(wired: Mapping[str, str]) -> dict[str, str]:
-    """Return the variables by port; a variable of a subtree without the name of the subtree."""
-    return {port: variable.rpartition(".")[2] for port, variable in wired.items()}
+def _remove_subtree_names(variables: Mapping[str, str]) -> dict[str, str]:
+    """Return the variables by port, each without the name of its subtree: `target` for `pick.target`."""
+    return {port: variable.rpartition(".")[2] for port, variable in variables.items()}
 
 
 def _format_value(value: object) -> str:

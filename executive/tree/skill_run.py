@@ -1,4 +1,4 @@
-"""One run of a skill: its generator, advanced step by step."""
+"""One run of a skill, whose generator is advanced step by step."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class SkillRun:
     """One run of a skill, from its first step until its end or halt.
 
     Args:
-        skill: A fresh instance with params and inputs.
-        cell: Cell that the skill acts on.
+        skill: A new instance with params and inputs.
+        cell: Cell on which the skill acts.
 
     Attributes:
         skill: The instance of the skill.
@@ -29,7 +29,7 @@ class SkillRun:
         self._steps: Iterator[object] | None = None
 
     def step(self) -> bool:
-        """Advance the skill by one step, or start it at the first call; return True if it has succeeded.
+        """Advance the skill by one step; return True if the skill has succeeded. The first call starts it.
 
         Raises:
             SkillFailed: The skill failed with a declared reason.
@@ -39,7 +39,7 @@ class SkillRun:
             if self._steps is None:
                 # A `run` without `yield` is a plain function, which is complete when it returns.
                 self._steps = iter(self.skill.run(self._cell) or ())
-            # `self` is the sentinel for the end of the generator: a skill cannot yield its own `SkillRun`.
+            # At the end of the generator, `next` returns `self`, which a skill cannot yield.
             yielded = next(self._steps, self)
         except SkillFailed as failed:
             if failed.reason in self.skill.reasons:
@@ -50,14 +50,16 @@ class SkillRun:
         if yielded is None:
             return False
         if yielded is not self:
-            kind = type(yielded).__name__
-            raise Fault(f'it yielded a {kind}; to run the steps of another generator, write "yield from"')
+            type_name = type(yielded).__name__
+            raise Fault(
+                f'it yielded a {type_name}; to run the steps of another generator, write "yield from"'
+            )
         if unset := [name for name in self._output_names if not hasattr(self.skill, name)]:
             raise Fault(f"it succeeded without setting its output {', '.join(unset)}")
         return True
 
     def read_outputs(self) -> dict[str, object]:
-        """Return the outputs by name; all outputs are set after success."""
+        """Return the values of all outputs by name; called after success, when all outputs are set."""
         return {name: getattr(self.skill, name) for name in self._output_names}
 
     def halt(self) -> None:

@@ -1,10 +1,10 @@
-"""Success after any end of the body."""
+"""Control node that succeeds after any end of its body."""
 
 from __future__ import annotations
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
@@ -23,12 +23,12 @@ class Succeed(ControlNode):
             return Status.SUCCESS
         status = self.run_child(self.do)
         if status is Status.FAILURE:
-            self.report_choice("succeed despite the failure", self.failure_of(self.do))
+            self.report_choice("succeed despite the failure", self.get_failure(self.do))
         return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Join all ends of the body."""
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends: success after every end of the body."""
         if self.do is None:
             return Flow(state, {}, None)
-        body = enter(self.do, state)
+        body = flow_of(self.do, state)
         return Flow(join_states((body.success, *body.failures.values())), {}, body.halted)

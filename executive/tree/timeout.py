@@ -1,4 +1,4 @@
-"""Time limit of a body."""
+"""Control node that limits the time of its body."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import Enter, Flow, FlowState, PossibleFailure
+from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure
 from executive.tree.inspection import Advice, MinTimeFunction, NodeFacts, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
 CLOCK_TOLERANCE = 0.005
-"""Largest time by which a wait may end too early, half a control step [s]."""
+"""Maximum time by which a wait may end too early [s]: half a control period."""
 
 
 class Timeout(ControlNode):
-    """Fail with `timeout` if the body takes longer than a limit on the clock of the run.
+    """Fail with the reason `timeout` if the body takes longer than a limit on the clock of the run.
 
-    A body that ends in the tick in which the limit is reached is in time.
+    A body that ends in the tick in which the limit is reached does not exceed the limit.
     """
 
     keyword = "timeout"
@@ -31,7 +31,7 @@ class Timeout(ControlNode):
 
     @property
     def detail(self) -> str:
-        """The limit."""
+        """The limit as a text: `5 s`."""
         return f"{self.seconds:g} s"
 
     def start(self) -> None:
@@ -42,16 +42,16 @@ class Timeout(ControlNode):
         """Tick the body, then compare the clock with the deadline."""
         status = self.run_child(self.do)
         if status is Status.FAILURE:
-            return self.fail(self.failure_of(self.do))
-        # The tolerance of 1 ns covers rounding of a clock that sums control steps.
+            return self.fail(self.get_failure(self.do))
+        # The tolerance of 1 ns covers rounding errors of a clock that adds up control periods.
         if status is Status.RUNNING and self.clock.now >= self._deadline - 1e-9:
             self.halt_children([self.do])
-            return self.fail_for("timeout", f"the body was not done after {self.seconds:g} s")
+            return self.fail_with_reason("timeout", f"the body was not done after {self.seconds:g} s")
         return status
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Add the timeout to the ends of a body that waits."""
-        body = enter(self.do, state)
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends of the body, and the timeout if the body can take more than one tick."""
+        body = flow_of(self.do, state)
         failures = dict(body.failures)
         if body.halted is not None:
             failures[PossibleFailure(self.keyword, "timeout", self.path)] = body.halted
@@ -62,14 +62,14 @@ class Timeout(ControlNode):
         return min_time_of(self.do)
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
-        """Compare the limit with the minimum time of the body."""
-        shortest = facts.min_time(self.do)
-        if self.seconds >= shortest - CLOCK_TOLERANCE:
+        """Yield an error if the limit is shorter than the minimum time of the body."""
+        body_time = facts.get_min_time(self.do)
+        if self.seconds >= body_time - CLOCK_TOLERANCE:
             return
-        message = f"timeout.seconds is {self.seconds:g} s, but its body takes at least {shortest:.2f} s"
-        skill_times = [(name, time) for name, time in facts.skill_times(self.do) if time > 0]
+        message = f"timeout.seconds is {self.seconds:g} s, but its body takes at least {body_time:.2f} s"
+        skill_times = [(name, time) for name, time in facts.list_skill_times(self.do) if time > 0]
         hint = f"Minimum times: {', '.join(f'{name} {time:.2f} s' for name, time in skill_times)}."
-        is_sum = abs(sum(time for _, time in skill_times) - shortest) <= 1e-9
+        is_sum = abs(sum(time for _, time in skill_times) - body_time) <= 1e-9
         yield NodeFinding("seconds", "short-timeout", message, hint if is_sum else "")
 
     @property
@@ -78,10 +78,10 @@ class Timeout(ControlNode):
         return self.do
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the duration of the body."""
+        """Return a text with the duration of the body and the limit."""
         return f"limits only the time: {failure.duration:.2f} of {self.seconds:g} s had passed"
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
-        """Yield a longer limit after a timeout."""
+        """Yield the advice to increase the limit after a timeout."""
         if failure.child is None:
             yield Advice(f"allow more than {self.seconds:g} s", "seconds")

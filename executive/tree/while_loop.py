@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 from py_trees.common import Status
 
-from executive.tree.flow import Enter, Flow, FlowState, find_fixed_point, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import NodeFacts, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
 from executive.tree.loop import Loop
 
 
 class While(Loop):
-    """Run the body as long as a condition succeeds; the condition runs before every round.
+    """Run the body as long as a condition succeeds; the condition runs before every iteration.
 
     The loop succeeds when the condition fails; a failure of the body is passed on.
     """
@@ -30,14 +30,14 @@ class While(Loop):
         self._current = self.condition
 
     def step(self) -> Status:
-        """Tick the current child; begin the next round in the same tick if the last one took time."""
+        """Tick the current child; begin an iteration in the same tick if the last one took a tick or more."""
         while True:
             current = self._current
-            status = self.run_round(current)
+            status = self.run_iteration(current)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
-                failure = self.failure_of(current)
+                failure = self.get_failure(current)
                 if current is self.do:
                     return self.fail(failure)
                 self.report_choice("done", failure)
@@ -46,38 +46,38 @@ class While(Loop):
                 self._current = self.do
             else:
                 self._current = self.condition
-                if not self.begin_round():
+                if not self.begin_iteration():
                     return Status.RUNNING
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        """Enter condition and body in turn until no new state occurs."""
-        rounds: list[Flow] = []
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends: condition and body are entered in turn until no new state occurs."""
+        body: list[Flow] = []
 
-        def next_entry(condition: Flow) -> FlowState | None:
-            rounds.clear()
+        def get_next_entry(condition: Flow) -> FlowState | None:
+            body.clear()
             if condition.success is None:
                 return None
-            rounds.append(enter(self.do, condition.success))
-            return rounds[0].success
+            body.append(flow_of(self.do, condition.success))
+            return body[0].success
 
-        condition, entry = find_fixed_point(enter, self.condition, state, next_entry)
-        failures = {failure: after for flow in rounds for failure, after in flow.failures.items()}
-        halted = join_states((condition.halted, entry, *(flow.halted for flow in rounds)))
+        condition, entry = find_fixed_point(flow_of, self.condition, state, get_next_entry)
+        failures = {failure: after for flow in body for failure, after in flow.failures.items()}
+        halted = join_states((condition.halted, entry, *(flow.halted for flow in body)))
         return Flow(join_states(condition.failures.values()), failures, halted)
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
-        """Find a loop that never ends."""
-        condition = facts.flow(self.condition)
+        """Yield an error if the loop never ends because its condition cannot fail."""
+        condition = facts.get_flow(self.condition)
         if condition is not None and not condition.failures and not facts.is_halted_by_sibling:
-            message = f"this loop never ends: its condition, {facts.name(self.condition)}, cannot fail"
+            message = f"this loop never ends: its condition, {facts.get_name(self.condition)}, cannot fail"
             yield NodeFinding("", "endless", message, "Use repeat with times or until.")
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause: the condition."""
+        """Return the cause: the condition cannot succeed."""
         del child
         return "the condition never succeeds"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the rule for failures of the body."""
+        """Return a text with the rule for failures of the body."""
         del failure
         return "a failure of its body ends it"

@@ -11,14 +11,14 @@ from executive.cli.main import main
 from executive.mission.schema.files import library_schema, mission_schema
 from executive.mission.schema.types import cell_schema
 from executive.plugins import discover
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 
 
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        ([], mission_schema(discover(), control_nodes())),
-        (["--library"], library_schema(discover(), control_nodes())),
+        ([], mission_schema(discover(), load_control_nodes())),
+        (["--library"], library_schema(discover(), load_control_nodes())),
         (["--cell"], cell_schema()),
     ],
 )

@@ -25,7 +25,7 @@ from executive.mission.text.yaml_text import parse_yaml
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
 from executive.tree.blackboard import Blackboard
 from executive.tree.halting import halt
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 
 MOST_TICKS = 400
 
@@ -91,7 +91,7 @@ class Choose(Chance):
 
 
 class Take(Chance):
-    """PossibleTool."""
+    """PossibleToolState."""
 
     chosen: In[int]
     reasons: ClassVar = ("missed",)
@@ -196,10 +196,10 @@ def sound(tree: Tree) -> Case | None:
     source = Source("m.yaml", json.dumps({"mission": "m", "cell": "none", "tree": tree}))
     root, wrong = parse_yaml(source)
     assert root is not None
-    mission, malformed = parse_mission(root, {}, SKILLS, control_nodes())
+    mission, malformed = parse_mission(root, {}, SKILLS, load_control_nodes())
     expanded = expand(mission, SKILLS)
     assert expanded.tree is not None
-    case = Case(mission, with_paths(expanded.tree), (), SKILLS, control_nodes(), None, {}, None)
+    case = Case(mission, with_paths(expanded.tree), (), SKILLS, load_control_nodes(), None, {}, None)
     findings = [*wrong, *malformed, *expanded.findings, *check(case)]
     return None if any(finding.severity == "error" for finding in findings) else case
 
@@ -249,7 +249,9 @@ def hold_against_runs(tree: Tree, seed: int) -> None:
             assert key in ends, f"the checker has not foreseen {key}"
             assert str(failure) in [f"{ending.source}.{ending.reason}" for ending in find_endings(flow)]
             state = ends[key]
-        assert state.find_tool(HOLDING if world.holding else EMPTY), "the checker thinks the tool otherwise"
+        assert state.find_tool_state(HOLDING if world.holding else EMPTY), (
+            "the checker thinks the tool otherwise"
+        )
 
 
 def test_a_good_part_of_the_random_trees_can_run() -> None:

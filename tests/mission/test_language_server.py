@@ -17,7 +17,7 @@ from editor import Editor
 
 from executive.mission.text.files import shipped_folder
 from executive.plugins import discover
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 
 SERVER = os.environ.get("YAML_LANGUAGE_SERVER") or shutil.which("yaml-language-server")
 pytestmark = [
@@ -49,7 +49,7 @@ REASONS = {"Detect.unsure", "Grasp.missed", "Transit.dropped"}
 COMPLETED = {
     "top-level keys": ("|", {"description", "params", "routes", "tree", "trees"}, {"mission", "cell"}),
     "skills after a key": ("tree: |\n", WORDS | {"succeed"}, {"retry"}),
-    "skills and control words on a new line": ("tree:\n  |\n", SKILLS | {*control_nodes(), "use"}, {"do"}),
+    "words on a new line": ("tree:\n  |\n", SKILLS | {*load_control_nodes(), "use"}, {"do"}),
     "a word begun in a list": ("tree:\n  - Detect\n  - Gr|\n", {"Grasp"}, {"do"}),
     "params of a skill": ("tree:\n  - Detect:\n      |\n", {"view", "detector", "detections"}, {"Grasp"}),
     "further params": ("tree:\n  - Detect: {view: full, d|}\n", {"doubtful"}, {"view"}),

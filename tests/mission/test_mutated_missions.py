@@ -27,7 +27,7 @@ from executive.run import assembly
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 from tests.mission.mutations import places
 from tests.mission.mutator import Base, Mutator
 from tests.mission.unkind_cell import UnkindCell
@@ -140,7 +140,7 @@ def test_the_bases_of_the_mutants_pass_the_check(file: Path) -> None:
 def test_the_bases_of_the_mutants_use_every_control_node() -> None:
     files = [yaml.safe_load(file.read_text()) for file in OWN_BASES]
     words = {str(word) for container, key in places(files) for word in (key, container[key])}
-    assert {*control_nodes(), USE} - words == set()
+    assert {*load_control_nodes(), USE} - words == set()
 
 
 @pytest.mark.parametrize(

@@ -20,11 +20,11 @@ from executive.mission.text.files import shipped_folder
 from executive.mission.text.yaml_text import parse_yaml, plain
 from executive.plugins import discover
 from executive.skill import Skill
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 
 MISSIONS = shipped_folder()
 SCHEMAS: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {
-    "mission.schema.json": (lambda: mission_schema(discover(), control_nodes()), ""),
+    "mission.schema.json": (lambda: mission_schema(discover(), load_control_nodes()), ""),
     "cells/cell.schema.json": (cell_schema, " --cell"),
 }
 """The generated files: how each is made, and the option that prints it."""
@@ -61,7 +61,11 @@ def test_the_shipped_schema_is_the_generated_one(name: str) -> None:
 
 @pytest.mark.parametrize(
     "schema",
-    [mission_schema(discover(), control_nodes()), library_schema(discover(), control_nodes()), cell_schema()],
+    [
+        mission_schema(discover(), load_control_nodes()),
+        library_schema(discover(), load_control_nodes()),
+        cell_schema(),
+    ],
     ids=FILES,
 )
 def test_the_schema_is_sound_draft_07(schema: dict[str, Any]) -> None:
@@ -128,9 +132,9 @@ trees:
 
 
 def test_everything_of_the_language_is_accepted(skills: dict[str, type[Skill]]) -> None:
-    assert problems(mission_schema(skills, control_nodes()), WELL_FORMED) == []
+    assert problems(mission_schema(skills, load_control_nodes()), WELL_FORMED) == []
     written = set(re.findall(r"[a-z_]+(?=:)", WELL_FORMED))
-    assert set(control_nodes()) <= written, "the example must show every control node"
+    assert set(load_control_nodes()) <= written, "the example must show every control node"
 
 
 BROKEN = {
@@ -181,7 +185,7 @@ BROKEN = {
 @pytest.mark.parametrize("case", BROKEN)
 def test_what_is_wrong_is_marked(case: str, skills: dict[str, type[Skill]]) -> None:
     text, expected = BROKEN[case]
-    found = problems(mission_schema(skills, control_nodes()), HEAD + text)
+    found = problems(mission_schema(skills, load_control_nodes()), HEAD + text)
     assert expected in "\n".join(found)
 
 
@@ -195,7 +199,7 @@ def test_what_the_schema_marks_is_an_error_of_check_too(
 
 @pytest.mark.parametrize(
     "schema",
-    [{"$ref": f"{FOLDER}/library/library.schema.json"}, library_schema(discover(), control_nodes())],
+    [{"$ref": f"{FOLDER}/library/library.schema.json"}, library_schema(discover(), load_control_nodes())],
     ids=["shipped", "printed"],
 )
 def test_a_library_has_subtrees_and_no_tree(schema: dict[str, Any]) -> None:
@@ -221,7 +225,7 @@ def test_a_cell_with_a_base_needs_no_other_key(small_cell: str) -> None:
 
 
 def test_a_param_says_its_unit_bounds_and_default(skills: dict[str, type[Skill]]) -> None:
-    (shape,) = mission_schema(skills, control_nodes())["definitions"]["Pick"]["allOf"]
+    (shape,) = mission_schema(skills, load_control_nodes())["definitions"]["Pick"]["allOf"]
     height = shape["properties"]["height"]
     assert height["description"] == "[m] (at least 0, at most 0.5, 0.1 if not given)"
     assert height["anyOf"][0] == {"type": "number", "minimum": 0, "maximum": 0.5, "default": 0.1}

@@ -66,7 +66,12 @@ class Witness:
             found.append(f"it ends with {reason} of {node}, which the check does not list")
         if status == "SUCCESS" and success is None:
             found.append("it succeeds, which the check says it never does")
-        if status == "SUCCESS" and success and not success.find_tool(HOLDING) and self.cell.tool.holding:
+        if (
+            status == "SUCCESS"
+            and success
+            and not success.find_tool_state(HOLDING)
+            and self.cell.tool.holding
+        ):
             found.append("it ends well with something in the tool, of which the check does not warn")
         running = [behaviour for behaviour in run.root.iterate() if behaviour.status is Status.RUNNING]
         return found + [f"{behaviour.name} still runs" for behaviour in running]

@@ -51,7 +51,7 @@ def test_a_success_has_no_story() -> None:
         ("  - MoveToScan\n  - repeat: {until: [Detect.hidden], do: [Detect, IsHolding]}\n",
          "repeat: succeeds only with Detect.hidden"),
         ("  repeat: {times: 3, do: IsHolding}\n",
-         "repeat: a failure ends it before its 3 rounds are complete"),
+         "repeat: a failure ends it before its 3 iterations are complete"),
         ("  - MoveToScan\n  - while: {condition: Detect, do: IsHolding}\n",
          "while: a failure of its body ends it"),
         ("  for_each: {each: label, in: [cube, duck], do: IsHolding}\n",

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import executive
 from executive.mission.model.grammar import SEQUENCE, USE
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 
 PACKAGE = Path(inspect.getfile(executive)).parent
 
@@ -37,7 +37,7 @@ def names_in(file: Path, words: set[str], classes: dict[str, str]) -> Iterator[s
 
 
 def test_no_other_file_names_a_control_node() -> None:
-    kinds = control_nodes().values()
+    kinds = load_control_nodes().values()
     words = {kind.keyword for kind in kinds} | {USE}
     # `Sequence` is also a type of Python: imports of its module are found all the same.
     classes = {kind.__name__: kind.keyword for kind in kinds if kind.__name__ != "Sequence"}

@@ -24,7 +24,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import Enter, Flow, FlowState, find_tools_at_end, join_states, combine_branches
+from executive.tree.flow import Flow, FlowFunction, FlowState, combine_tools, find_tools_at_end, join_states
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
@@ -54,13 +54,13 @@ class Race(ControlNode):
             if status is Status.FAILURE:
                 self._running.remove(child)
                 if not self._running:
-                    return self.fail(self.failure_of(child))
+                    return self.fail(self.get_failure(child))
         return Status.RUNNING
 
-    def flow(self, enter: Enter, state: FlowState) -> Flow:
-        flows = [enter(child, state) for child in self.do]
-        ends = [find_tools_at_end(flow, state, halts=True) for flow in flows]
-        tools = combine_branches(state.tools, ends)
+    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+        flows = [flow_of(child, state) for child in self.do]
+        ends = [find_tools_at_end(flow, state, may_be_halted=True) for flow in flows]
+        tools = combine_tools(state.tools, ends)
         success = join_states(flow.success for flow in flows)
         halted = join_states(flow.halted for flow in flows)
         failures = {one: after.with_tools(tools) for flow in flows for one, after in flow.failures.items()}
@@ -70,7 +70,7 @@ class Race(ControlNode):
         return min(min_time_of(child) for child in self.do)
 
     @property
-    def concurrent(self) -> Children:
+    def concurrent_children(self) -> Children:
         return self.do
 
     def explain(self, failure: PropagatedFailure) -> str:
@@ -184,7 +184,7 @@ def test_a_failure_that_it_passes_on_is_explained(project: Path) -> None:
         ("class Race:\n    pass\n", "is not a ControlNode subclass"),
         ("import nothing_of_this_name\n", "cannot be loaded: ModuleNotFoundError"),
         (RACE.replace('keyword = "race"', 'keyword = "run"'), 'the class has the keyword "run"'),
-        (RACE.replace("def flow", "def flows"), "has no method flow"),
+        (RACE.replace("def compute_flow", "def flow"), "has no method compute_flow"),
         (RACE.replace("do: Children", "status: Children"), 'cannot have the key "status"'),
         (RACE.replace("do: Children =", "do ="), "has no annotation"),
     ],

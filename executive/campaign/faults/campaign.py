@@ -175,7 +175,7 @@ def _walk_branches(tree: Node) -> Iterator[tuple[Mark, str, Node]]:
     """Yield place, name and node of each branch."""
     for node in tree.walk():
         if isinstance(node, InnerNode):
-            for what, child in inspection_instance(node).contingencies():
+            for what, child in inspection_instance(node).list_contingencies():
                 yield node_of(child).mark, what, node_of(child)
 
 

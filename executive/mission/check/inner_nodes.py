@@ -67,9 +67,9 @@ def check_class_rules(case: Case) -> Iterator[Finding]:
 
 
 def _find_halted(case: Case) -> Iterator[Node]:
-    """Yield every node that is halted when a concurrent one has ended."""
+    """Yield every node that is halted when a concurrent node has ended."""
     for node in case.inner_nodes():
-        for child in inspection_instance(node).halted_by_sibling:
+        for child in inspection_instance(node).children_halted_by_sibling:
             yield from node_of(child).walk()
 
 
@@ -90,33 +90,33 @@ class CaseFacts:
         self._case, self._node = case, node
         self.is_halted_by_sibling = is_halted_by_sibling
 
-    def flow(self, child: Child) -> Flow | None:
+    def get_flow(self, child: Child) -> Flow | None:
         """Return how a child may end; None if it never runs."""
         return self._case.flow.flows.get(node_of(child).path)
 
-    def name(self, child: Child) -> str:
+    def get_name(self, child: Child) -> str:
         """Return the name of a child in paths."""
         return name_of(node_of(child))
 
-    def place(self, reason: Reason, seen_from: Reason) -> str:
-        """Return the place of a name of a failure for the reader of another."""
-        return cast("FailureName", reason).mark.place(cast("FailureName", seen_from).mark.source)
+    def describe_place(self, reason: Reason, reported: Reason) -> str:
+        """Return the place of a failure name for a finding about the failure name `reported`."""
+        return cast("FailureName", reason).mark.place(cast("FailureName", reported).mark.source)
 
     def is_literal(self, key: str) -> bool:
-        """Return True if the mission file gives the value of a key there."""
+        """Return True if the node gives the value of a key literally, not through a param or an argument."""
         value = self._node.values.get(key)
         return isinstance(value, Literal) and not value.origin
 
-    def min_time(self, child: Child) -> float:
+    def get_min_time(self, child: Child) -> float:
         """Return a lower bound of the time in which a child can succeed [s]."""
         return min_time(self._case, node_of(child))
 
-    def skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
-        """Return the names and least times [s] of the skills in and below a child."""
+    def list_skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
+        """Return the names and minimum times [s] of the skills in and below a child."""
         skills = [node for node in node_of(child).walk() if isinstance(node, SkillNode)]
         return [(node.skill, min_time(self._case, node)) for node in skills]
 
-    def skills(self) -> Sequence[type[Skill] | None]:
+    def list_skills(self) -> Sequence[type[Skill] | None]:
         """Return the skills below the node; None stands for a skill that is not installed."""
         return [
             self._case.skills.get(node.skill) for node in self._node.walk() if isinstance(node, SkillNode)

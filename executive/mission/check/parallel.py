@@ -72,7 +72,7 @@ def find_racing_reads(case: Case) -> Iterator[Finding]:
 def _concurrent(case: Case) -> Iterator[list[Node]]:
     """Yield the children of each node that run at the same time."""
     for node in case.inner_nodes():
-        if branches := inspection_instance(node).concurrent:
+        if branches := inspection_instance(node).concurrent_children:
             yield [node_of(branch) for branch in branches]
 
 

@@ -122,9 +122,9 @@ class ElementType:
 
 def _loops(node: Node) -> Iterator[ElementType]:
     for key, variable in find_written_variables(node):
-        source = node.values.get(key.element_of) if isinstance(node, InnerNode) else None
+        source = node.values.get(key.list_key) if isinstance(node, InnerNode) else None
         if isinstance(source, Literal | Reference):
-            yield ElementType(word_of(node), node.mark, variable.name, key.element_of, source)
+            yield ElementType(word_of(node), node.mark, variable.name, key.list_key, source)
 
 
 def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:

@@ -12,7 +12,7 @@ from executive.mission.model.nodes import InnerNode, Node, SkillNode
 from executive.mission.model.paths import name_of
 from executive.mission.source import Mark
 from executive.skill import EMPTY, HOLDING
-from executive.tree.flow import PossibleTool
+from executive.tree.flow import PossibleToolState
 from executive.tree.node import ControlNode
 
 
@@ -34,7 +34,7 @@ def _unreachable(node: Node, flow: Analysis) -> Iterator[Finding]:
 
 
 def _explain_unreachable(model: ControlNode, child: Node) -> str:
-    stand_in = next(one for key in model.keys for one in model.children_of(key) if node_of(one) is child)
+    stand_in = next(one for key in model.keys for one in model.list_children(key) if node_of(one) is child)
     return model.explain_unreachable(stand_in)
 
 
@@ -48,11 +48,11 @@ def check_tool_states(case: Case) -> Iterator[Finding]:
         before, use = case.skills[node.skill].tool_state[0], case.library_uses.get(path)
         mark = use.mark if use else node.mark
         who = f'{node.skill} in the subtree "{use.name}"' if use else node.skill
-        if before is EMPTY and (possible := entry.find_tool(HOLDING)):
+        if before is EMPTY and (possible := entry.find_tool_state(HOLDING)):
             message = f"{who} needs an empty tool, but something may still be held here"
             hint = f"{_since(flow, possible, mark)} Put it down on every way from there to here."
             yield error(mark, "tool-state", message, hint)
-        if before is HOLDING and (possible := entry.find_tool(EMPTY)):
+        if before is HOLDING and (possible := entry.find_tool_state(EMPTY)):
             message = f"{who} needs something in the tool, but it may be empty here"
             yield error(mark, "tool-state", message, _since(flow, possible, mark))
 
@@ -60,12 +60,12 @@ def check_tool_states(case: Case) -> Iterator[Finding]:
 def check_tool_at_end(case: Case) -> Iterator[Finding]:
     """Find out whether the mission may succeed with something in the tool."""
     flow = case.flow
-    if flow.result.success and (possible := flow.result.success.find_tool(HOLDING)):
+    if flow.result.success and (possible := flow.result.success.find_tool_state(HOLDING)):
         message = "the mission may end well with something still in the tool"
         yield warning(case.tree.mark, "tool-state", message, _since(flow, possible, case.tree.mark))
 
 
-def _since(flow: Analysis, possible: PossibleTool, mark: Mark) -> str:
+def _since(flow: Analysis, possible: PossibleToolState, mark: Mark) -> str:
     """Return since when the tool may be so, and which failure led on from there."""
     node = flow.nodes.get(possible.cause)
     after = f", when {possible.handled_failure} is dealt with" if possible.handled_failure else ""

@@ -67,7 +67,7 @@ def _expectations(node: Node) -> Iterator[tuple[FailureName, str, Node]]:
     if not isinstance(node, InnerNode):
         return
     for key, match in _matches(node):
-        for body in nodes_of(node.values[key.raised_under]) if key.raised_under in node.values else ():
+        for body in nodes_of(node.values[key.raising_key]) if key.raising_key in node.values else ():
             yield match, node.kind.keyword, body
 
 

@@ -21,9 +21,9 @@ from executive.tree.flow import (
     FlowState,
     PossibleFailure,
     apply_precondition,
+    get_tools_after_failure,
+    get_tools_after_success,
     join_states,
-    tools_after_failure,
-    tools_after_success,
 )
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
@@ -75,7 +75,7 @@ class Analysis:
             case InnerNode():
                 if node.path not in self._models:
                     self._models[node.path] = inspection_instance(node)
-                return self._models[node.path].flow(self._enter, state)
+                return self._models[node.path].compute_flow(self._enter, state)
             case SkillNode():
                 return self._skill(node, state)
             case UseNode(body=Node() as body):
@@ -96,10 +96,10 @@ class Analysis:
         state = state.with_tools(apply_precondition(state.tools, before, node.path))
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
         end = state.after_motion() if skill.moves else state
-        success = end.with_variables(outputs).with_tools(tools_after_success(end.tools, after, node.path))
+        success = end.with_variables(outputs).with_tools(get_tools_after_success(end.tools, after, node.path))
 
         def end_after(reason: str) -> FlowState:
-            return end.with_tools(tools_after_failure(end.tools, skill.tool_left.get(reason), node.path))
+            return end.with_tools(get_tools_after_failure(end.tools, skill.tool_left.get(reason), node.path))
 
         failures = {
             PossibleFailure(node.skill, reason, node.path): end_after(reason) for reason in skill.reasons

@@ -73,7 +73,7 @@ def has_valid_constants(node: InnerNode) -> bool:
 
 def find_upper_bound(owner: InnerNode | SectionNode, key: Key) -> int | None:
     """Return the largest allowed number of a constant, if it counts nodes under another key."""
-    return len(nodes_of(owner.values[key.max_of])) if key.max_of in owner.values else None
+    return len(nodes_of(owner.values[key.max_key])) if key.max_key in owner.values else None
 
 
 def _values(owner: InnerNode | SectionNode, build: BuildChild) -> Mapping[str, object]:

@@ -75,7 +75,7 @@ def read_constant(key: Key, value: object, max_value: int | None = None) -> obje
     Raises:
         WrongType: The value does not fit, or is out of bounds.
     """
-    return _read(key.adapter(max_value), value)
+    return _read(key.make_validator(max_value), value)
 
 
 def _read(adapter: TypeAdapter[object], value: object) -> object:

@@ -160,9 +160,9 @@ def _value_of(key: Key) -> Json:
             section, bare = _object(key.section.keys), find_shorthand_key(key.section)
             if bare is None:
                 return section
-            written = bare.adapter().json_schema()
+            written = bare.make_validator().json_schema()
             return or_reference({**section, **written, "type": [written["type"], "object"]})
-    written = key.adapter().json_schema()
+    written = key.make_validator().json_schema()
     return or_reference(*written.get("anyOf", [written]))
 
 

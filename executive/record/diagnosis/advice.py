@@ -13,7 +13,7 @@ from executive.record.diagnosis.chain import Link
 from executive.record.timeline.activation import Reading
 from executive.record.timeline.items import ItemTimeline
 from executive.tree.inspection import Advice
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 
 REMEDIES: Mapping[str, str] = {
     "camera_moved": "mount camera and bins as the cell file says, or measure the pose again"
@@ -76,7 +76,7 @@ def _suggest_changes(case: FailedRun) -> Iterator[str]:
     if handlers:
         yield _add_place(case, *handlers[0])
     else:
-        remedy = next(kind.remedy for kind in control_nodes().values() if kind.remedy)
+        remedy = next(kind.remedy for kind in load_control_nodes().values() if kind.remedy)
         yield f"{remedy} {case.locate(case.links[-1].node)}"
     for link, change in advice:
         if (link, change) not in handlers:

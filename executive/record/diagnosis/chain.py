@@ -80,7 +80,7 @@ def _make_passed_failure(
 ) -> PropagatedFailure:
     """Return the failure as input of a node; `below` is the child that failed, or None at the origin."""
     ran = timeline.nodes.get(node.path) or _NEVER
-    children = [child for key in model.keys for child in model.children_of(key)] if model else []
+    children = [child for key in model.keys for child in model.list_children(key)] if model else []
 
     def has_failed(child: Child) -> bool:
         last = timeline.nodes.get(node_of(child).path)

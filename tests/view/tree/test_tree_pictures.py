@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 from executive.mission.outline import Connection, OutlineNode
 from executive.tree.node import ControlNode
-from executive.tree.registry import control_nodes
+from executive.tree.registry import load_control_nodes
 from executive.view.text import replace_invalid
 from executive.view.tree.card import make_card
 from executive.view.tree.dot import draw_dot
@@ -21,7 +21,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 
 def control(path: str, depth: int, word: str, **more) -> OutlineNode:
-    kind = control_nodes().get(word, ControlNode)
+    kind = load_control_nodes().get(word, ControlNode)
     detail, title = more.pop("detail", ""), more.pop("title", word)
     return OutlineNode(path, word, depth, detail, word, title, symbol=kind.symbol, shape=kind.shape, **more)
 
