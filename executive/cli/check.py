@@ -65,7 +65,7 @@ def _describe(mission: str, findings: Sequence[Finding], endings: Sequence[Endin
 
     lines = [*describe_findings(findings), f"{mission}: ok"]
     if endings:
-        lines.append("  nothing deals with these failures; each would end the mission:")
+        lines.append("  no node handles these failures; each would end the mission:")
         # Endings of a subtree that is used twice have the same place, and count once.
         reasons: dict[tuple[str, str, int], dict[str, None]] = {}
         for ending in endings:

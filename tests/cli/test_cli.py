@@ -147,7 +147,7 @@ def test_check_tells_what_can_still_end_the_mission(project):
     assert shown.exit_code == 0
     assert shown.stdout.splitlines() == [
         "sort.yaml: ok",
-        "  nothing deals with these failures; each would end the mission:",
+        "  no node handles these failures; each would end the mission:",
         "    Detect: hidden, unsure  sort.yaml:9",
         "    Release: stuck          sort.yaml:12",
     ]

@@ -68,7 +68,7 @@ def check_tool_at_end(case: Case) -> Iterator[Finding]:
 def _since(flow: Analysis, possible: PossibleToolState, mark: Mark) -> str:
     """Return since when the tool may be so, and which failure led on from there."""
     node = flow.nodes.get(possible.cause)
-    after = f", when {possible.handled_failure} is dealt with" if possible.handled_failure else ""
+    after = f", when {possible.handled_failure} is handled" if possible.handled_failure else ""
     if node is None:
         return f"Nothing has been grasped before{after}."
     name = node.skill if isinstance(node, SkillNode) else "the node"

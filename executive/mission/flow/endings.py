@@ -1,4 +1,4 @@
-"""The failures that nothing in a mission deals with: what can still end it."""
+"""The failures that no node of a mission handles: they can end the mission."""
 
 from __future__ import annotations
 
