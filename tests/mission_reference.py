@@ -1,7 +1,4 @@
-"""Generator of `missions/reference.md`, read from the registered parts of the package.
-
-Write the file again with `.venv/bin/python -m tests.mission_reference`.
-"""
+"""Generator of `missions/reference.md`; run `.venv/bin/python -m tests.mission_reference` to write it again."""
 
 from __future__ import annotations
 
@@ -40,7 +37,8 @@ INTRODUCTION = f"""# Reference: missions, skills, cells and findings
 This file is generated from the code: `{COMMAND}`. The tutorial is [README.md](README.md).
 
 The column "default" shows the value of a key that a file does not contain; *required*: a file must contain \
-the key. `NAME` stands for a name that you choose. Units are in brackets.
+the key. A *section* is a mapping with keys of its own; the heading of its table is its path. `NAME` \
+stands for a name that you choose. Units are in brackets.
 """
 KEYS = "key, value, default, meaning"
 """Columns of the tables of keys."""
