@@ -1,4 +1,4 @@
-"""Generator of `missions/reference.md`; run `.venv/bin/python -m tests.mission_reference` to write it again."""
+"""Generator of `missions/reference.md`; `.venv/bin/python -m tests.mission_reference` writes it again."""
 
 from __future__ import annotations
 
