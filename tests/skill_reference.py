@@ -107,9 +107,9 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("effect = Effect(...)", "testing/faults/effect.py", "Effect"),
     ],
     "Test kit: conformance": [
-        ("Checks of the declarations", "testing/conformance/declarations.py", ""),
-        ("Checks of the runs", "testing/conformance/conduct.py", ""),
-        ("stage", "testing/conformance/situations.py", "Stage"),
+        ("Checks of the declarations", "testing/conformance/declaration_checks.py", ""),
+        ("Checks of the runs", "testing/conformance/behaviour_checks.py", ""),
+        ("scene", "testing/conformance/situations.py", "SkillScene"),
     ],
 }
 """For each section and table the expression of the object, the file, and the class; "": the functions."""

@@ -61,10 +61,10 @@ def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool
     verdicts: list[Verdict] = []
     for name, skill in skills.items():
         with stdout_kept_clean():
-            from executive.testing.conformance import conformance
+            from executive.testing.conformance import list_conformance_checks
             from executive.view.figures.conformance import conformance_lines, conformance_total
 
-            skill_verdicts = [check.run() for check in conformance(skill, name=name)]
+            skill_verdicts = [check.run() for check in list_conformance_checks(skill, name=name)]
         if not as_json:
             click.echo("\n".join(conformance_lines(skill_verdicts)))
         verdicts += skill_verdicts

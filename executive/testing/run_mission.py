@@ -118,9 +118,9 @@ def run_mission(
     workcell = run.workcell
     assert isinstance(workcell, FaultyCell)
     try:
-        workcell.require_nodes([getattr(node, "path", node.name) for node in run.root.iterate()])
+        workcell.check_patterns([getattr(node, "path", node.name) for node in run.root.iterate()])
         _require_matching_substitutes(run, skills)
-        run.add_observer(workcell.hear)
+        run.add_observer(workcell.on_event)
         outcome = run.execute()
         return MissionResult(
             **asdict(outcome),

@@ -142,7 +142,7 @@ def change_world(subject: Subject, seed: int, path: Path, past: InputLog, change
     done: list[str] = []
 
     def act(world: WorldAccess) -> None:
-        held = world.held
+        held = world.held_object
         unheld_objects = [thing for thing in world.objects if held is None or thing.body != held.body]
         on_table = [thing for thing in unheld_objects if is_on_table(thing.position[:2], config.table)]
         if change == "dropped" and held is not None:

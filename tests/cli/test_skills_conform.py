@@ -57,12 +57,12 @@ def test_without_a_name_all_skills_are_checked_and_mistakes_have_exit_code_1() -
     lines = [line for line in result.stdout.splitlines() if not line.startswith("ok")]
     assert lines[:3] == [
         "failed   Nap.has_allowed_defaults: the default of Nap.gap must be at most 0.2 m, not 0.3. "
-        "Correct the default, or the limits. (and 1 more)",
-        "failed   Dream.succeeds_somewhere: Dream cannot be tried: "
+        "Correct default or bounds. (and 1 more)",
+        "failed   Dream.can_succeed: Dream cannot be tested: "
         'no value can be generated for "story" (a text). '
-        'Return it from a function in a test: conformance(Dream, lambda stage: {"story": ...}), '
-        "as skills/README.md shows.",
-        "not run  Dream.comes_to_an_end",
+        'Return it from a function in a test: list_conformance_checks(Dream, lambda scene: {"story": ...}); '
+        "skills/README.md has an example.",
+        "not run  Dream.terminates",
     ]
     not_run = len(lines) - 3
     total = 3 * len(RULES)
@@ -77,6 +77,6 @@ def test_as_json_all_checks_are_one_array() -> None:
     assert {verdict["skill"] for verdict in told} == {"Nap"}
     (failed,) = (verdict for verdict in told if verdict["status"] != "ok")
     assert (failed["check"], failed["status"]) == ("has_allowed_defaults", "failed")
-    assert failed["doc"].startswith("Each default is a value that a mission may give")
+    assert failed["doc"].startswith("Each default is a valid value of its param")
     assert len(failed["problems"]) == 2
     assert result.exit_code == 1

@@ -24,7 +24,7 @@ SEEDS = range(171000, 171006)
 def exchange_objects(occurrence: Occurrence) -> bool:
     """Swap the target object with one of another class, once."""
     world = occurrence.scene.world
-    if (first := occurrence.scene.find("node", occurrence.item)) is None:
+    if (first := occurrence.scene.find_object("node", occurrence.item)) is None:
         return False
     others = [
         thing
@@ -37,7 +37,7 @@ def exchange_objects(occurrence: Occurrence) -> bool:
     x, y = (others[0].position - first.position)[:2]
     world.move(first, (float(x), float(y)))
     world.move(others[0], (-float(x), -float(y)))
-    occurrence.record(first)
+    occurrence.emit_event(first)
     return True
 
 
@@ -46,7 +46,7 @@ def empty_bin(occurrence: Occurrence) -> bool:
     for bin in occurrence.scene.cell.bins.values():
         inside = [thing for thing in occurrence.scene.world.objects if bin.contains(thing.position)]
         for thing in inside:
-            occurrence.record(thing)
+            occurrence.emit_event(thing)
             occurrence.scene.world.remove(thing)
         if inside:
             return True

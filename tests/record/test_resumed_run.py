@@ -185,7 +185,7 @@ def test_what_fell_from_the_tool_is_picked_again(missions: Path, tmp_path: Path,
     fell: list[str] = []
 
     def act(world: WorldAccess) -> None:
-        fell.append(world.held.label)
+        fell.append(world.held_object.label)
         world.break_seal()
 
     loaded = load(missions, "sort_overhead")

@@ -90,7 +90,7 @@ def test_without_disturbances_a_mission_goes_as_it_always_goes() -> None:
 
 def test_a_mission_that_never_ends_ends_as_a_fault(look: Path) -> None:
     result = run_mission(look, substitutes={"*Detect": make_endless(Detect)}, timeout=3.0)
-    assert (result.status, result.message) == ("FAULT", "the mission is not done after 3 s on its clock")
+    assert (result.status, result.message) == ("FAULT", "the mission has not ended after 3 s on its clock")
     assert result.robot_time == pytest.approx(3.0, abs=0.01)
     assert result.cell.arm.at_rest
 
@@ -99,14 +99,14 @@ def test_a_cell_whose_time_is_over_says_so_once_so_that_the_arm_can_be_braked() 
     cell = FaultyCell(FakeCell(), [], timeout=0.01)
     cell.advance()
     cell.advance()
-    with pytest.raises(Fault, match=r"the mission is not done after 0\.01 s on its clock"):
+    with pytest.raises(Fault, match=r"the mission has not ended after 0\.01 s on its clock"):
         cell.advance()
     cell.advance()
     assert cell.steps == 4
 
 
 def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:
-    sentence = 'no path of a node matches "*/Grasp", the pattern of seal_fails; the paths are: tree/Wait, '
+    sentence = 'the pattern "*/Grasp" of seal_fails matches no path of a node; the paths are: tree/Wait, '
     with pytest.raises(InputError, match=sentence.replace("*", r"\*")):
         run_mission(look, faults=[during("*/Grasp", seal_fails())])
     with pytest.raises(InputError, match='no node is called "Wait"; there are: tree/Wait, tree/Detect'):

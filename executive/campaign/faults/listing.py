@@ -13,7 +13,7 @@ from executive.cell.objects import Target
 from executive.mission.model import nodes
 from executive.skill import HOLDING, Skill
 from executive.testing import faults as effects
-from executive.testing.conformance.situations import list_inputs
+from executive.testing.conformance.situations import list_input_ports
 from executive.testing.faults.effect import Effect
 from executive.testing.faults.script import ScheduledFault, after, between, during
 
@@ -59,12 +59,12 @@ def list_causes(table: TableConfig) -> Mapping[str, Cause]:
         "missed": Cause(effects.seal_fails(), "nothing seals", "tool"),
         "dropped": Cause(effects.seal_breaks(), "the seal breaks half-way", "moves"),
         "no_contact": Cause(aside, "the object is bumped aside", "moves"),
-        "blocked": Cause(effects.arm_runs_into(), "the arm runs into something", "moves"),
-        "unreachable": Cause(effects.no_way(), "the planner finds no way", "moves"),
+        "blocked": Cause(effects.arm_collides(), "the arm runs into something", "moves"),
+        "unreachable": Cause(effects.no_path(), "the planner finds no way", "moves"),
         "stuck": Cause(effects.tool_sticks(), "the tool does not let go", "tool"),
         "unavailable": Cause(effects.detector_dead(), "the detector is dead", "camera"),
         "unsure": Cause(effects.detector_unsure(), "the detector is sure of nothing", "camera"),
-        "hidden": Cause(effects.workspace_hidden(), "the arm hides the workspace", "camera"),
+        "hidden": Cause(effects.workspace_occluded(), "the arm hides the workspace", "camera"),
         "stale": Cause(effects.table_bumped(), "something bumps the table", lasts=False),
         "no_depth": Cause(effects.no_depth(), "no detection can be localized"),
         "quit": Cause(effects.operator_quits(), "the operator quits", "senses"),
@@ -146,7 +146,7 @@ class _Listing:
             for duration in (SHORT, LONG):
                 for name, effect in (("hangs", effects.detector_hangs()), ("unsure", unsure), ("dead", dead)):
                     found.append((f"{name} for {duration:g} s", between(start, start + duration, effect)))
-            found.append(("hangs for ever", after(start, effects.detector_given_up(LONG))))
+            found.append(("hangs for ever", after(start, effects.detector_times_out(LONG))))
             found += [("dead for ever", after(start, dead)), ("unsure for ever", after(start, unsure))]
             for what, cell_fault in found:
                 leads_to = "unsure" if what.startswith("unsure") else "unavailable"
@@ -186,7 +186,7 @@ class _Listing:
             fails = between(half, half + duration, effects.seal_fails())
             yield _plan_global("tool", f"no seal for {duration:g} s", "middle", fails)
         for number in (1, 2):
-            refuses = after(0.0, effects.object_refuses(number))
+            refuses = after(0.0, effects.object_unsealable(number))
             yield _plan_global("tool", f"no seal on object {number}", "lasting", refuses)
 
     def _plan(self, node: nodes.SkillNode, what: str, when: When, **more: object) -> PlannedFault:
@@ -212,4 +212,4 @@ def _plan_global(part: str, what: str, when: When, cell_fault: ScheduledFault) -
 
 
 def _is_moving_to_target(skill: type[Skill]) -> bool:
-    return skill.moves and any(port.type is Target for port in list_inputs(skill))
+    return skill.moves and any(port.type is Target for port in list_input_ports(skill))

@@ -86,7 +86,7 @@ class _TrialRun:
         self.run = assemble(subject.loaded, subject.skills, self.options, [self._note, self._activations])
         workcell = self.run.workcell
         assert isinstance(workcell, FaultyCell)
-        self.run.add_observer(workcell.hear)
+        self.run.add_observer(workcell.on_event)
 
     @property
     def outcome(self) -> RunEnded:

@@ -1,8 +1,8 @@
-"""Checks that any skill must pass, generated from its declarations."""
+"""Conformance checks: rules of the executive for every skill, applied by test runs of the skill."""
 
 from __future__ import annotations
 
-from executive.testing.conformance.check import conformance
-from executive.testing.conformance.situations import Stage
+from executive.testing.conformance.check import list_conformance_checks
+from executive.testing.conformance.situations import SkillScene
 
-__all__ = ["Stage", "conformance"]
+__all__ = ["SkillScene", "list_conformance_checks"]

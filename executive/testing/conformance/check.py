@@ -1,4 +1,4 @@
-"""A check of a skill, and the list of all checks."""
+"""Conformance check of a skill (one rule applied to one skill), and the list of all checks."""
 
 from __future__ import annotations
 
@@ -8,36 +8,39 @@ from dataclasses import dataclass
 from typing import Any
 
 from executive.skill import Skill
-from executive.testing.conformance import conduct, declarations
-from executive.testing.conformance.situations import Arrange, NotTried, Stage
+from executive.testing.conformance import behaviour_checks, declaration_checks
+from executive.testing.conformance.situations import Arrange, NotTestable, SkillScene
 from executive.testing.conformance.skill_runs import SkillRuns
 
 Rule = Callable[[SkillRuns], Iterator[str]]
-"""Yields the violations by a skill, with place and correction. The docstring states the rule."""
+"""Function that yields one text per violation of a rule: place, problem and correction.
+
+The docstring of the function states the rule.
+"""
 
 RULES: tuple[Rule, ...] = tuple(
     rule
-    for module in (declarations, conduct)
+    for module in (declaration_checks, behaviour_checks)
     for name, rule in vars(module).items()
     if inspect.isfunction(rule) and rule.__module__ == module.__name__ and not name.startswith("_")
 )
-"""The public functions of `declarations` and `conduct`, in the order of their definition."""
+"""All rules: the public functions of `declaration_checks` and `behaviour_checks`, in file order."""
 
 
 class ConformanceError(AssertionError):
-    """A skill violates a rule; the text names the rule, the place and the correction."""
+    """A skill violates a rule; the message names the rule, the place and the correction."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a check.
+    """Result of a conformance check.
 
     Attributes:
         skill: Name of the skill.
         check: Name of the check.
-        doc: The rule, as a sentence.
-        status: `ok`, `failed`, or `not run` if the skill cannot be tried.
-        problems: One text for each violation.
+        doc: First line of the docstring of the rule.
+        status: `ok`; `failed`; or `not run` if the skill could not be tested.
+        problems: One text for each violation, or the reason why the check was not run.
     """
 
     skill: str
@@ -52,8 +55,8 @@ class Check:
     """One rule applied to one skill; a call raises `ConformanceError` if the skill violates the rule.
 
     Attributes:
-        skill_runs: The runs of the skill.
-        rule: The rule.
+        skill_runs: The test runs of the skill, which all its checks share.
+        rule: The rule to which the skill is checked.
     """
 
     skill_runs: SkillRuns
@@ -77,35 +80,37 @@ class Check:
         try:
             problems = tuple(self.rule(self.skill_runs))
             status = "failed" if problems else "ok"
-        except NotTried as problem:
-            problems, status = (str(problem),), "not run"
+        except NotTestable as error:
+            problems, status = (str(error),), "not run"
         return Verdict(self.skill_runs.name, self.name, self.doc, status, problems)
 
     def __call__(self) -> None:
         """Run the check.
 
         Raises:
-            ConformanceError: The skill violates the rule, or cannot be tried.
+            ConformanceError: The skill violates the rule, or cannot be tested.
         """
         verdict = self.run()
         if verdict.problems:
             raise ConformanceError("\n".join((f"{self.doc} Violated:", *verdict.problems)))
 
 
-def leave_as_is(stage: Stage) -> Mapping[str, Any]:
-    """Leave the stage as it is, and give no values."""
-    del stage
+def arrange_nothing(scene: SkillScene) -> Mapping[str, Any]:
+    """Leave the scene unchanged and return no values of params and inputs."""
+    del scene
     return {}
 
 
-def conformance(skill: type[Skill], arrange: Arrange = leave_as_is, name: str = "") -> list[Check]:
-    """Return all checks of a skill; the skill is run only when a check is called.
+def list_conformance_checks(
+    skill: type[Skill], arrange: Arrange = arrange_nothing, name: str = ""
+) -> list[Check]:
+    """Return one check per rule for a skill; the skill is run only when a check is called.
 
     Args:
         skill: Class of the skill.
-        arrange: Called with the `Stage` of each situation. It may change the stage, and returns values for
-            the params and inputs that cannot be generated, or should differ from the generated ones.
-        name: Name under which the skill is installed; by default that of its class.
+        arrange: Function that gets the `SkillScene` of each run. The function may change the scene. It
+            returns values of params and inputs by name; required ones that it omits are generated.
+        name: Name under which the skill is installed; "": the name of the class.
     """
-    runs = SkillRuns(name or skill.__name__, skill, arrange)
-    return [Check(runs, rule) for rule in RULES]
+    skill_runs = SkillRuns(name or skill.__name__, skill, arrange)
+    return [Check(skill_runs, rule) for rule in RULES]

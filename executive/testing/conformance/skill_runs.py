@@ -1,4 +1,4 @@
-"""Runs of one skill that its conformance checks share; each run is executed only once."""
+"""Test runs of one skill, shared by its conformance checks; each run is executed once, when it is needed."""
 
 from __future__ import annotations
 
@@ -9,55 +9,55 @@ import numpy as np
 
 from executive.skill import Skill
 from executive.testing.conformance.faults import NamedFault, list_skill_faults
-from executive.testing.conformance.rehearsal import SkillRehearsal
-from executive.testing.conformance.situations import Arrange, NotTried, Situation, list_situations
+from executive.testing.conformance.situations import Arrange, NotTestable, Situation, list_situations
+from executive.testing.conformance.skill_test_run import SkillTestRun
 
 MAX_HALTS = 40
-"""Maximum number of evenly spaced halts of a run, and, counted separately, of halts around its calls."""
+"""Maximum number of halts at evenly spaced ticks of a run, and of further halts at its calls."""
 
 
-class TickNotReturned(NotTried):
-    """A tick of a skill did not return; the skill is not run again."""
+class TickNotReturned(NotTestable):
+    """A tick of the skill did not return; no further run is executed."""
 
 
 class SkillRuns:
-    """The runs that the checks of one skill share.
+    """The test runs of one skill.
 
     Args:
-        name: Name of the skill.
+        name: Name of the skill in messages.
         skill: Class of the skill.
-        arrange: Prepares the `Stage` of each run; written by the author of the skill.
+        arrange: Function of the author of the skill that prepares the `SkillScene` of each run.
     """
 
     def __init__(self, name: str, skill: type[Skill], arrange: Arrange) -> None:
         self.name, self.skill, self._arrange = name, skill, arrange
-        self._stuck = ""
+        self._stuck_message = ""
 
     @cached_property
     def situations(self) -> list[Situation]:
-        """All situations in which the skill is tried; raises NotArranged."""
+        """All situations in which the skill is tested; raises ArrangementFailed."""
         return list(list_situations(self.skill, self._arrange))
 
     @cached_property
-    def repeated_runs(self) -> list[tuple[Situation, SkillRehearsal, SkillRehearsal]]:
-        """Two runs to the end in each situation, without a fault."""
+    def repeated_runs(self) -> list[tuple[Situation, SkillTestRun, SkillTestRun]]:
+        """For each situation two equal runs to the end, without a fault."""
         return [(situation, self._run(situation), self._run(situation)) for situation in self.situations]
 
     @cached_property
-    def complete_runs(self) -> list[SkillRehearsal]:
-        """Runs to the end: in each situation one without a fault, and one under each fault."""
-        plain = [first for _, first, _ in self.repeated_runs]
-        return plain + [
+    def complete_runs(self) -> list[SkillTestRun]:
+        """Runs to the end: in each situation one without a fault, and one with each fault."""
+        runs_without_fault = [first for _, first, _ in self.repeated_runs]
+        return runs_without_fault + [
             self._run(situation, fault)
             for situation, first, _ in self.repeated_runs
-            # If the undisturbed run does not end, a run under a fault will not end either.
+            # If the run without a fault does not end, a run with a fault would not end either.
             if first.status != "RUNNING"
-            for fault in list_skill_faults(self.skill, first.ticks, holding=first.held)
+            for fault in list_skill_faults(self.skill, first.ticks, is_holding=first.holds_before)
         ]
 
     @cached_property
-    def halted_runs(self) -> list[SkillRehearsal]:
-        """Halted runs: in each situation one for each tick that `_choose_halt_ticks` returns."""
+    def halted_runs(self) -> list[SkillTestRun]:
+        """Halted runs: in each situation one for each tick from `_choose_halt_ticks`."""
         return [
             self._run(situation, halt_at=tick)
             for situation, first, _ in self.repeated_runs
@@ -67,31 +67,31 @@ class SkillRuns:
 
     def _run(
         self, situation: Situation, fault: NamedFault | None = None, halt_at: int | None = None
-    ) -> SkillRehearsal:
+    ) -> SkillTestRun:
         """Run the skill once.
 
         Raises:
             TickNotReturned: A tick did not return, in this run or in an earlier one.
         """
-        if self._stuck:
-            raise TickNotReturned(self._stuck)
-        rehearsal = SkillRehearsal(self.skill, situation, self._arrange, fault, halt_at)
-        if rehearsal.status == "STUCK":
-            halted = ", halted there," if rehearsal.ticks == halt_at else ""
-            self._stuck = (
-                f"{rehearsal.where} at tick {rehearsal.ticks}{halted} {self.name} {rehearsal.message}. "
-                "A tick blocks the arm: yield in each loop that waits, "
-                "and leave long computations to a detector."
+        if self._stuck_message:
+            raise TickNotReturned(self._stuck_message)
+        test_run = SkillTestRun(self.skill, situation, self._arrange, fault, halt_at)
+        if test_run.status == "STUCK":
+            halted = ", when halted," if test_run.ticks == halt_at else ""
+            self._stuck_message = (
+                f"{test_run.description} at tick {test_run.ticks}{halted} {self.name} {test_run.message}. "
+                "A long tick blocks the arm: yield in each loop that waits, "
+                "and do long computations in a detector."
             )
-            raise TickNotReturned(self._stuck)
+            raise TickNotReturned(self._stuck_message)
         if fault is not None or halt_at is not None:
-            # Arguments of calls may be large, such as frames.
-            rehearsal.calls = [replace(call, arguments=()) for call in rehearsal.calls]
-        return rehearsal
+            # The arguments, such as frames, may be large, and are only compared in repeated runs.
+            test_run.calls = [replace(call, arguments=()) for call in test_run.calls]
+        return test_run
 
 
-def _choose_halt_ticks(rehearsal: SkillRehearsal) -> list[int]:
-    """Return the ticks at which to halt: evenly spaced ones, and those of and after calls."""
-    evenly_spaced = np.linspace(1, rehearsal.ticks, min(rehearsal.ticks, MAX_HALTS), dtype=int).tolist()
-    call_ticks = sorted({call.tick + offset for call in rehearsal.calls for offset in (0, 1)})
-    return sorted(tick for tick in {*evenly_spaced, *call_ticks[:MAX_HALTS]} if 1 <= tick <= rehearsal.ticks)
+def _choose_halt_ticks(test_run: SkillTestRun) -> list[int]:
+    """Return the ticks at which to halt a run: evenly spaced ticks, and the tick of and after each call."""
+    evenly_spaced = np.linspace(1, test_run.ticks, min(test_run.ticks, MAX_HALTS), dtype=int).tolist()
+    call_ticks = sorted({call.tick + offset for call in test_run.calls for offset in (0, 1)})
+    return sorted(tick for tick in {*evenly_spaced, *call_ticks[:MAX_HALTS]} if 1 <= tick <= test_run.ticks)

@@ -1,4 +1,4 @@
-"""Faults of detectors: dead, hanging, slow, blind, or unsure of everything.
+"""Faults of detectors: no answers, late answers, empty answers, or only low confidences.
 
 A fault affects each request that is made while the fault lasts; earlier requests are answered as usual.
 """
@@ -14,24 +14,24 @@ from executive.cell.protocols import Request
 from executive.errors import InputError, Unavailable
 from executive.testing.faults.effect import TIME_TOLERANCE, Effect, Occurrence
 
-MAX_UNSURE_SHARE = 0.9
-"""Highest confidence of an unsure detector, as a share of its threshold."""
+UNSURE_CONFIDENCE_FRACTION = 0.9
+"""Maximum confidence of the detections of an unsure detector, as a fraction of its threshold."""
 
 AnswerChange = Callable[[Answer], Answer]
-"""Returns a changed answer, or raises Unavailable."""
+"""Function that returns a changed answer of a detector, or raises Unavailable."""
 
 
-def _refuse(answer: Answer) -> Answer:
-    """Raise Unavailable."""
+def _raise_unavailable(answer: Answer) -> Answer:
+    """Raise Unavailable instead of returning an answer."""
     raise Unavailable(f"detector {answer.detector}: the detector is dead (injected fault)")
 
 
 def _reduce_confidence(answer: Answer) -> Answer:
     """Return an answer whose confidences are below the threshold."""
-    limit = MAX_UNSURE_SHARE * answer.error_rates.threshold
+    max_confidence = UNSURE_CONFIDENCE_FRACTION * answer.error_rates.threshold
     detections = sorted((*answer.found, *answer.doubtful), key=lambda detection: -detection.confidence)
     doubtful = tuple(
-        replace(detection, confidence=min(detection.confidence, limit)) for detection in detections
+        replace(detection, confidence=min(detection.confidence, max_confidence)) for detection in detections
     )
     return replace(answer, found=(), doubtful=doubtful, unknown=())
 
@@ -42,98 +42,100 @@ def _remove_detections(answer: Answer) -> Answer:
 
 
 def faulty_detector(
-    name: str, change: AnswerChange | None = None, delay: float = 0.0, until: float = 0.0
+    name: str, change: AnswerChange | None = None, delay: float = 0.0, hang_end: float = 0.0
 ) -> Effect:
-    """The detector answers late, wrongly, or not at all.
+    """Return an effect: the detector answers late, with changed answers, or not at all.
 
     Args:
-        name: Name of the effect in the record.
-        change: Changes the true answer; None: no change.
-        delay: Delay of the answer [s].
-        until: Time on the run's clock before which no request is answered while the effect lasts [s].
+        name: Name of the effect in the journal.
+        change: Changes the answer of the detector; None: no change.
+        delay: Delay of each answer [s].
+        hang_end: Time on the run's clock before which no request is answered while the effect lasts [s].
     """
-    return Effect(name, answers={"request": _request}, arguments=(change, delay, until))
+    return Effect(name, interceptors={"request": _make_faulty_request}, arguments=(change, delay, hang_end))
 
 
 def detector_dead() -> Effect:
-    """Requests are not answered: `Detect` is `unavailable`."""
-    return faulty_detector("detector_dead", _refuse)
+    """Return an effect: requests fail at their usual time, and `Detect` fails with `unavailable`."""
+    return faulty_detector("detector_dead", _raise_unavailable)
 
 
-def detector_hangs(until: float = math.inf) -> Effect:
-    """Requests are answered only after the fault, which is never if the node of the fault waits for them.
+def detector_hangs(hang_end: float = math.inf) -> Effect:
+    """Return an effect: requests are answered only after the fault.
+
+    If the fault lasts while a node runs that waits for the answer, the request is never answered.
 
     Args:
-        until: Time on the run's clock at which requests are answered in any case [s].
+        hang_end: Time on the run's clock at which requests are answered in any case [s].
     """
-    return faulty_detector("detector_hangs", until=until)
+    return faulty_detector("detector_hangs", hang_end=hang_end)
 
 
-def detector_given_up(deadline: float) -> Effect:
-    """Requests expire at their deadline without an answer: `Detect` is `unavailable`.
+def detector_times_out(delay: float) -> Effect:
+    """Return an effect: requests fail after a delay, and `Detect` fails with `unavailable`.
 
     Args:
-        deadline: Time between the usual answer and the deadline [s].
+        delay: Time from the usual answer to the failure [s].
     """
-    return faulty_detector("detector_hangs", _refuse, delay=deadline)
+    return faulty_detector("detector_hangs", _raise_unavailable, delay=delay)
 
 
-def detector_slow(by: float) -> Effect:
-    """Requests are answered with a delay.
+def detector_slow(delay: float) -> Effect:
+    """Return an effect: requests are answered late.
 
     Args:
-        by: The delay [s].
+        delay: Delay of each answer [s].
 
     Raises:
         InputError: The delay is negative.
     """
-    if by < 0:
-        raise InputError(f"the delay of a detector must be at least 0 s, not {by:g} s")
-    return faulty_detector("detector_slow", delay=by)
+    if delay < 0:
+        raise InputError(f"the delay of a detector must be at least 0 s, not {delay:g} s")
+    return faulty_detector("detector_slow", delay=delay)
 
 
 def detector_unsure() -> Effect:
-    """All detections have a confidence below the threshold: `Detect` is `unsure`."""
+    """Return an effect: all confidences are below the threshold, and `Detect` fails with `unsure`."""
     return faulty_detector("detector_unsure", _reduce_confidence)
 
 
 def detector_blind() -> Effect:
-    """Nothing is detected: `Detect` succeeds with an empty list."""
+    """Return an effect: nothing is detected, and `Detect` succeeds with an empty list."""
     return faulty_detector("detector_blind", _remove_detections)
 
 
 @dataclass
 class FaultyRequest:
-    """A request to a faulty detector; implements `Request`."""
+    """A request to a faulty detector; implements `Request`. For the attributes see `faulty_detector`."""
 
     request: Request
     occurrence: Occurrence
     change: AnswerChange | None
     delay: float
-    until: float
-    _due: float = math.inf
+    hang_end: float
+    _answer_time: float = math.inf
 
     @property
     def ready(self) -> bool:
-        """True if the delay of the answer is over and the detector does not hang."""
-        time = self.occurrence.scene.now
-        if math.isinf(self._due) and self.request.ready:
-            self._due = time + self.delay
-        is_hanging = not self.occurrence.is_over and time < self.until - TIME_TOLERANCE
-        return time >= self._due - TIME_TOLERANCE and not is_hanging
+        """True if the answer is available: the delay is over, and the detector does not hang."""
+        now = self.occurrence.scene.now
+        if math.isinf(self._answer_time) and self.request.ready:
+            self._answer_time = now + self.delay
+        is_hanging = not self.occurrence.is_over and now < self.hang_end - TIME_TOLERANCE
+        return now >= self._answer_time - TIME_TOLERANCE and not is_hanging
 
     def result(self) -> Answer:
-        """Return the changed answer, or raise Unavailable."""
+        """Return the changed answer of the detector, or raise Unavailable."""
         answer = self.request.result()
         return answer if self.change is None else self.change(answer)
 
 
-def _request(
+def _make_faulty_request(
     proceed: Callable[[], Request],
     occurrence: Occurrence,
     change: AnswerChange | None,
     delay: float,
-    until: float,
+    hang_end: float,
 ) -> Request:
-    occurrence.record()
-    return FaultyRequest(proceed(), occurrence, change, delay, until)
+    occurrence.emit_event()
+    return FaultyRequest(proceed(), occurrence, change, delay, hang_end)

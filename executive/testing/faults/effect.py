@@ -1,4 +1,4 @@
-"""Effects of faults on a cell: base class, one occurrence, and the state of the cell that effects need."""
+"""Effect of a fault on a cell, one occurrence of an effect, and access to the cell for effects."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ from executive.events import Emit, FaultInjected
 from executive.geometry import Array
 from executive.testing.faults.world_access import TrueObject, WorldAccess
 
-MAX_ITEM_DISTANCE = 0.05
-"""Distance from the believed position of an item up to which an object counts as that item [m]."""
+MAX_ITEM_POSITION_ERROR = 0.05
+"""Maximum horizontal distance between an item of the ledger and the object that counts as this item [m]."""
 TIME_TOLERANCE = 1e-9
-"""Rounding error allowed when two times on the run's clock are compared [s]."""
+"""Tolerance for rounding errors in comparisons of times on the run's clock [s]."""
 
 ObjectChoice = int | Literal["node", "nearest"]
-"""An object: its number, from 1; the one on the table that is `nearest` to the tool; or that of the `node`.
+"""Choice of an object: its number, from 1; `nearest`: nearest to the tool; `node`: the object of the node.
 
-The object of the node is the one that the ledger takes for its item; without an item, it is the nearest.
+The object of a node is the true object of its item in the ledger; without an item, the nearest object.
 """
 
 
 class FaultScene:
-    """A cell without faults, its world and the motion of its arm.
+    """The cell without faults, access to its world, and the current motion of its arm.
 
     Args:
         workcell: The cell without faults.
-        open_world: Returns the access to the world of the cell.
+        open_world: Function that returns the access to the world of a cell.
         emit: Emits events of the run.
 
     Attributes:
-        cell: The cell that skills would see without faults.
+        cell: The cell, as skills would see it without faults.
         emit: Emits events of the run.
-        motion: Start time [s] and motion of the arm; None if the arm was stopped.
+        motion: Start time [s] of the last motion, and the motion; None if there is none, or it was stopped.
     """
 
     def __init__(self, workcell: Workcell, open_world: Callable[[Workcell], WorldAccess], emit: Emit) -> None:
@@ -52,7 +52,7 @@ class FaultScene:
 
     @cached_property
     def world(self) -> WorldAccess:
-        """Access to the world, opened at its first use."""
+        """Access to the world of the cell, opened at the first use."""
         return self._open_world(self._workcell)
 
     @property
@@ -61,29 +61,32 @@ class FaultScene:
         return self.cell.clock.now
 
     @property
-    def progress(self) -> float:
-        """Completed share of the motion's duration, 0 to 1; 0 without a motion."""
+    def motion_progress(self) -> float:
+        """Elapsed fraction of the duration of the motion, 0 to 1; 0 without a motion or after its end."""
         if self.motion is None or self.motion[1].duration == 0.0:
             return 0.0
-        share = (self.now - self.motion[0]) / self.motion[1].duration
-        return share if share <= 1.0 else 0.0
+        fraction = (self.now - self.motion[0]) / self.motion[1].duration
+        return fraction if fraction <= 1.0 else 0.0
 
-    def find(self, which: ObjectChoice, item: Item) -> TrueObject | None:
-        """Return an object, or None if there is none now; `item` is the item of the node."""
-        if isinstance(which, int):
-            return next(iter(self.world.objects[which - 1 : which]), None)
-        if which == "nearest" or not item:
+    def find_object(self, choice: ObjectChoice, item: Item) -> TrueObject | None:
+        """Return the chosen object, or None if no object matches; `item` is the item of the node, or ""."""
+        if isinstance(choice, int):
+            return next(iter(self.world.objects[choice - 1 : choice]), None)
+        if choice == "nearest" or not item:
             return self._find_nearest(self.cell.arm.tool_pose.position, np.inf)
-        known = next((row for row in self._workcell.accounts.summaries() if row.item == item), None)
-        if known is None or known.state == "placed":
+        summary = next((row for row in self._workcell.accounts.summaries() if row.item == item), None)
+        if summary is None or summary.state == "placed":
             return None
-        if known.state == "held":
-            return self.world.held
-        return self._find_nearest(np.array(known.position), MAX_ITEM_DISTANCE)
+        if summary.state == "held":
+            return self.world.held_object
+        return self._find_nearest(np.array(summary.position), MAX_ITEM_POSITION_ERROR)
 
     def _find_nearest(self, position: Array, max_distance: float) -> TrueObject | None:
-        """Return the object on the table whose horizontal distance from `position` `(3,)` [m] is smallest."""
-        held, bins = self.world.held, self.cell.bins.values()
+        """Return the object on the table with the smallest horizontal distance from `position` `(3,)` [m].
+
+        None if this distance exceeds `max_distance` [m]. Objects in bins or in the tool are ignored.
+        """
+        held, bins = self.world.held_object, self.cell.bins.values()
         distances = [
             (float(np.linalg.norm((true.position - position)[:2])), true)
             for true in self.world.objects
@@ -96,21 +99,23 @@ class FaultScene:
 
 @dataclass(frozen=True)
 class Effect:
-    """Effect of a fault on a cell: an action, or changed answers of the cell; a value without state.
+    """Effect of a fault on a cell: an action, or changed results of calls; without state.
 
     Attributes:
-        name: Name of the effect in the record.
-        act: `act(occurrence, *arguments)` changes the cell once and returns True, or returns False while
-            this is impossible; called when the effect begins and after each control step. None: no action.
-        answers: Functions `answer(proceed, occurrence, *arguments)`, by the member of the cell whose result
-            they return: `close`, `open` (tool), `plan` (arm), `sees_table`, `capture` (camera), `request`
-            (detector), `localize` (localizer) or `ask` (operator). `proceed` returns the cell's own answer.
+        name: Name of the effect in the journal.
+        action: Function `action(occurrence, *arguments)` that changes the cell and returns True, or returns
+            False if this is not possible yet. It is called when the effect begins and after each control step
+            until it returns True. None: no action.
+        interceptors: Functions `interceptor(proceed, occurrence, *arguments)` that return the result of a
+            call, by method of the cell: `close`, `open` (tool), `plan` (arm), `sees_table`, `capture`
+            (camera), `request` (detector), `localize` (localizer) or `ask` (operator). `proceed()` calls the
+            method itself.
         arguments: Further arguments of these functions.
     """
 
     name: str
-    act: Callable[..., bool] | None = None
-    answers: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    action: Callable[..., bool] | None = None
+    interceptors: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     arguments: tuple[Any, ...] = ()
 
 
@@ -120,12 +125,12 @@ class Occurrence:
 
     Attributes:
         effect: The effect.
-        scene: The cell and its world.
+        scene: The cell without faults, and its world.
         node: Path of the node during which the effect occurs, or "".
-        item: Item of this node, or "".
-        end: Time at which the effect ends [s].
-        has_acted: True after the action.
-        is_over: True after the end.
+        item: Item of the ledger that this node handles, or "".
+        end: Time on the run's clock at which the effect ends [s].
+        has_acted: True if the action has changed the cell.
+        is_over: True if the effect has ended.
     """
 
     effect: Effect
@@ -135,29 +140,31 @@ class Occurrence:
     end: float = math.inf
     has_acted: bool = False
     is_over: bool = False
-    _last_record: float = -math.inf
+    _last_event_time: float = -math.inf
 
-    def act(self) -> None:
-        """Let the effect act, unless it has acted."""
-        if self.effect.act is not None and not self.has_acted:
-            self.has_acted = self.effect.act(self, *self.effect.arguments)
+    def run_action(self) -> None:
+        """Run the action of the effect, unless it has changed the cell already."""
+        if self.effect.action is not None and not self.has_acted:
+            self.has_acted = self.effect.action(self, *self.effect.arguments)
 
-    def record(self, affected: TrueObject | None = None) -> None:
-        """Emit the fault and the affected object; at most one event per control step."""
-        if self._last_record == self.scene.now:
+    def emit_event(self, affected: TrueObject | None = None) -> None:
+        """Emit a `FaultInjected` event with the affected object; at most one event per control step."""
+        if self._last_event_time == self.scene.now:
             return
-        self._last_record = self.scene.now
+        self._last_event_time = self.scene.now
         label = affected.label if affected else ""
         position = round_values(affected.position, 4) if affected else []
         self.scene.emit(FaultInjected(self.effect.name, self.node, self.item, label, position))
 
 
-def require_share(share: float | None) -> float:
-    """Return the share of a motion after which a fault occurs; 0 for None: at once, also at rest.
+def validate_fraction(fraction: float | None) -> float:
+    """Return the fraction of a motion after which a fault occurs; 0 if `fraction` is None.
+
+    With 0 the fault occurs at once, also if the arm is at rest.
 
     Raises:
-        InputError: The share is not more than 0 and less than 1.
+        InputError: The fraction is not between 0 and 1, both excluded.
     """
-    if share is not None and not 0.0 < share < 1.0:
-        raise InputError(f"a share of a motion is more than 0 and less than 1, not {share:g}")
-    return share or 0.0
+    if fraction is not None and not 0.0 < fraction < 1.0:
+        raise InputError(f"a fraction of a motion must be more than 0 and less than 1, not {fraction:g}")
+    return fraction or 0.0

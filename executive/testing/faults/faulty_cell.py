@@ -1,4 +1,4 @@
-"""Work cell into which the faults of a script are injected."""
+"""Work cell with injected faults: a wrapper of a cell that executes a fault script."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from executive.cell.workcell import Workcell
 from executive.errors import Fault, InputError
 from executive.events import Emit, NodeEnded, NodeStarted, TimedEvent, ignore
 from executive.testing.faults.effect import TIME_TOLERANCE, FaultScene, Occurrence
-from executive.testing.faults.script import DuringNode, DuringTime, ScheduledFault
+from executive.testing.faults.script import NodeActivations, ScheduledFault, TimeSpan
 from executive.testing.faults.world_access import WorldAccess, open_world
 
-_ROLES = ("arm", "tool", "camera", "detector", "localizer", "operator")
-_ANSWERS = frozenset(
+_INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "localizer", "operator")
+_INTERCEPTED_CALLS = frozenset(
     {
         "arm.plan", "tool.close", "tool.open", "camera.sees_table", "camera.capture", "detector.request",
         "localizer.localize", "operator.ask",
     }
 )  # fmt: skip
-"""Accesses whose answers effects can change."""
+"""Calls whose results effects can change."""
 
 
 class FaultyCell(CellWrapper):
     """A work cell with injected faults; implements `Workcell`.
 
-    The cell must `hear` the events of its run to know the running nodes. Each fault emits a `FaultInjected`.
+    Faults of nodes require that `on_event` observes the events of the run. Each fault emits `FaultInjected`.
 
     Args:
         inner: The cell without faults.
-        faults: The faults and their times.
+        faults: Fault script.
         emit: Emits events of the run.
-        open_world: Returns the access to the world of a cell.
+        open_world: Function that returns the access to the world of a cell.
         timeout: Time on the run's clock after which the run ends as a fault [s].
     """
 
@@ -53,16 +53,18 @@ class FaultyCell(CellWrapper):
         self._scene = FaultScene(inner, open_world, emit)
         self._timeout = timeout
         self._node_faults = [
-            (fault.effect, fault.time) for fault in faults if isinstance(fault.time, DuringNode)
+            (fault.effect, fault.time) for fault in faults if isinstance(fault.time, NodeActivations)
         ]
-        self._pending = [(fault.effect, fault.time) for fault in faults if isinstance(fault.time, DuringTime)]
-        self._activations: Counter[int] = Counter()
+        self._time_faults = [
+            (fault.effect, fault.time) for fault in faults if isinstance(fault.time, TimeSpan)
+        ]
+        self._activation_counts: Counter[int] = Counter()
         self._occurrences: list[Occurrence] = []
-        self._cell = intercept(inner.cell, self._answer, _ROLES)
+        self._cell = intercept(inner.cell, self._intercept_access, _INTERCEPTED_ROLES)
 
     @property
     def cell(self) -> Cell:
-        """The cell that skills see."""
+        """The cell with the faults, as skills see it."""
         return self._cell
 
     @property
@@ -70,20 +72,20 @@ class FaultyCell(CellWrapper):
         """Access to the world of the cell."""
         return self._scene.world
 
-    def hear(self, timed: TimedEvent) -> None:
-        """Begin and end the faults of a node; an observer of the run on this cell."""
+    def on_event(self, timed: TimedEvent) -> None:
+        """Begin or end the faults of a node; an observer of the run on this cell."""
         match timed.event:
             case NodeStarted(node, _, item):
                 for index, (effect, time) in enumerate(self._node_faults):
                     if time.matches(node):
-                        self._activations[index] += 1
-                        if time.includes(self._activations[index]):
-                            self._begin(Occurrence(effect, self._scene, node, item))
+                        self._activation_counts[index] += 1
+                        if time.includes(self._activation_counts[index]):
+                            self._begin_occurrence(Occurrence(effect, self._scene, node, item))
             case NodeEnded(node):
-                self._end(lambda occurrence: occurrence.node == node)
+                self._end_occurrences(lambda occurrence: occurrence.node == node)
 
-    def require_nodes(self, paths: Sequence[str]) -> None:
-        """Check that the pattern of each fault matches one of these `paths`.
+    def check_patterns(self, paths: Sequence[str]) -> None:
+        """Check that the pattern of each fault matches at least one of these `paths` of nodes.
 
         Raises:
             InputError: A pattern matches no path.
@@ -91,50 +93,50 @@ class FaultyCell(CellWrapper):
         for effect, time in self._node_faults:
             if not any(map(time.matches, paths)):
                 raise InputError(
-                    f'no path of a node matches "{time.pattern}", the pattern of {effect.name}; '
+                    f'the pattern "{time.pattern}" of {effect.name} matches no path of a node; '
                     f"the paths are: {', '.join(paths)}"
                 )
 
     def advance(self) -> None:
-        """Let one control step pass, and inject the faults that are due.
+        """Advance the cell by one control step, and inject the faults that are due.
 
         Raises:
-            Fault: The timeout has expired; raised once, so that the arm can brake afterwards.
+            Fault: The timeout has expired. Raised only once, so that the arm can brake afterwards.
         """
         self.inner.advance()
-        self._step()
+        self._update_occurrences()
         if self._scene.now > self._timeout:
             timeout, self._timeout = self._timeout, math.inf
-            raise Fault(f"the mission is not done after {timeout:g} s on its clock")
+            raise Fault(f"the mission has not ended after {timeout:g} s on its clock")
 
-    def _step(self) -> None:
-        """Begin and end the faults with a time, and let the active ones act."""
+    def _update_occurrences(self) -> None:
+        """Begin and end the faults with a time interval, and run the actions of the active faults."""
         now = self._scene.now + TIME_TOLERANCE
-        due = [(effect, time) for effect, time in self._pending if time.start <= now]
-        self._pending = [(effect, time) for effect, time in self._pending if time.start > now]
+        due = [(effect, time) for effect, time in self._time_faults if time.start <= now]
+        self._time_faults = [(effect, time) for effect, time in self._time_faults if time.start > now]
         for effect, time in due:
-            self._begin(Occurrence(effect, self._scene, end=time.end))
-        self._end(lambda occurrence: occurrence.end <= now)
+            self._begin_occurrence(Occurrence(effect, self._scene, end=time.end))
+        self._end_occurrences(lambda occurrence: occurrence.end <= now)
         for occurrence in self._occurrences:
-            occurrence.act()
+            occurrence.run_action()
 
-    def _begin(self, occurrence: Occurrence) -> None:
+    def _begin_occurrence(self, occurrence: Occurrence) -> None:
         self._occurrences.append(occurrence)
-        occurrence.act()
+        occurrence.run_action()
 
-    def _end(self, is_ending: Callable[[Occurrence], bool]) -> None:
+    def _end_occurrences(self, is_ending: Callable[[Occurrence], bool]) -> None:
         for occurrence in filter(is_ending, list(self._occurrences)):
             occurrence.is_over = True
             self._occurrences.remove(occurrence)
 
-    def _answer(self, access: Access) -> Any:
-        """Return the answer of the cell, changed by all active effects."""
+    def _intercept_access(self, access: Access) -> Any:
+        """Return the result of an access to the cell, changed by all active effects."""
         proceed = access.proceed
-        if access.name in _ANSWERS:
-            self._step()
+        if access.name in _INTERCEPTED_CALLS:
+            self._update_occurrences()
             for occurrence in self._occurrences:
-                if answer := occurrence.effect.answers.get(access.member):
-                    proceed = partial(answer, proceed, occurrence, *occurrence.effect.arguments)
+                if interceptor := occurrence.effect.interceptors.get(access.member):
+                    proceed = partial(interceptor, proceed, occurrence, *occurrence.effect.arguments)
         result = proceed()
         if access.name == "arm.start":
             self._scene.motion = self._scene.now, access.all_arguments[0]
@@ -144,23 +146,23 @@ class FaultyCell(CellWrapper):
 
 
 def with_faults(
-    kind: Callable[..., Workcell],
+    make_cell: Callable[..., Workcell],
     faults: Sequence[ScheduledFault],
     open_world: Callable[[Workcell], WorldAccess] = open_world,
     timeout: float = math.inf,
 ) -> Callable[..., FaultyCell]:
-    """Return a kind of cell with a fault script, for `RunOptions.kind`.
+    """Return a function that makes cells with a fault script, for `RunOptions.kind`.
 
-    The cell must observe the run: `run.add_observer(run.workcell.hear)`.
+    The cell must observe the run: `run.add_observer(run.workcell.on_event)`.
 
     Args:
-        kind: The kind of cell without faults.
-        faults: The script.
-        open_world: Returns the access to the world of a cell of that kind.
+        make_cell: Function that makes the cells without faults.
+        faults: Fault script.
+        open_world: Function that returns the access to the world of these cells.
         timeout: Time on the run's clock after which the run ends as a fault [s].
     """
 
-    def make(*args: Any, emit: Emit = ignore, **options: Any) -> FaultyCell:
-        return FaultyCell(kind(*args, emit=emit, **options), faults, emit, open_world, timeout)
+    def make_faulty_cell(*args: Any, emit: Emit = ignore, **options: Any) -> FaultyCell:
+        return FaultyCell(make_cell(*args, emit=emit, **options), faults, emit, open_world, timeout)
 
-    return make
+    return make_faulty_cell

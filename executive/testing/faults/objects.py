@@ -1,4 +1,4 @@
-"""Faults of objects: one is removed, moved or bumped aside, or does not seal to the tool."""
+"""Faults of objects: an object is removed, displaced or bumped aside, or cannot be sealed."""
 
 from __future__ import annotations
 
@@ -8,131 +8,129 @@ from collections.abc import Callable
 import numpy as np
 
 from executive.errors import InputError
-from executive.testing.faults.effect import Effect, FaultScene, ObjectChoice, Occurrence, require_share
+from executive.testing.faults.effect import Effect, FaultScene, ObjectChoice, Occurrence, validate_fraction
 from executive.testing.faults.world_access import TrueObject
 
 BUMP_DISTANCE = 0.06
-"""Distance by which an object is bumped aside [m]."""
-BUMP_DIRECTIONS = 8
-"""Number of directions in which an object may be bumped; the first free one is taken."""
-MAX_TOOL_OFFSET = 0.03
-"""Horizontal distance between an object and the tool up to which the tool is on the object [m]."""
+"""Displacement of an object that is bumped aside [m]."""
+BUMP_DIRECTION_COUNT = 8
+"""Number of evenly spaced directions that are tried, in order, for a free place for a bumped object."""
+MAX_TOOL_DISTANCE = 0.03
+"""Maximum horizontal distance between tool and object if the tool touches the object [m]."""
 
-Range = tuple[float, float]
-"""Smallest and largest coordinate [m]."""
-
-
-def object_removed(which: ObjectChoice = "node", share: float | None = None) -> Effect:
-    """An object is removed once, from the tool if it is held.
-
-    Args:
-        which: The object: its number from 1, the `nearest` to the tool, or that of the `node`.
-        share: Share of the arm's motion after which this happens, 0 to 1; by default at once.
-
-    Raises:
-        InputError: The number or the share is out of range.
-    """
-    return _object_effect("object_removed", _remove, which, share)
+Pair = tuple[float, float]
+"""Components `(x, y)` of a displacement [m], or minimum and maximum of a coordinate [m]."""
 
 
-def object_moved(by: tuple[float, float], which: ObjectChoice = "node", share: float | None = None) -> Effect:
-    """An object is displaced once.
+def object_removed(choice: ObjectChoice = "node", fraction: float | None = None) -> Effect:
+    """Return an effect: an object is removed once, also if the tool holds it.
 
     Args:
-        by: Displacement along x and y [m]; an object at the new place is pushed aside.
-        which: The object: its number from 1, the `nearest` to the tool, or that of the `node`.
-        share: Share of the arm's motion after which this happens, 0 to 1; by default at once.
+        choice: The object, see `ObjectChoice`.
+        fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
 
     Raises:
-        InputError: The number or the share is out of range.
+        InputError: The number of the object or the fraction is out of range.
     """
-    return _object_effect("object_moved", _move, which, share, by)
+    return _make_object_effect("object_removed", _remove_object, choice, fraction)
 
 
-def object_bumped(x: Range, y: Range, which: ObjectChoice = "node", share: float | None = None) -> Effect:
-    """An object is bumped aside once, to a free place.
+def object_moved(displacement: Pair, choice: ObjectChoice = "node", fraction: float | None = None) -> Effect:
+    """Return an effect: an object is displaced once.
 
     Args:
-        x: Range of x of the place [m].
-        y: Range of y of the place [m].
-        which: The object: its number from 1, the `nearest` to the tool, or that of the `node`.
-        share: Share of the arm's motion after which this happens, 0 to 1; by default at once.
+        displacement: Displacement along x and y [m]; a simulated object at the destination is pushed aside.
+        choice: The object, see `ObjectChoice`.
+        fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
 
     Raises:
-        InputError: The number or the share is out of range.
+        InputError: The number of the object or the fraction is out of range.
     """
-    return _object_effect("object_moved", _bump, which, share, x, y)
+    return _make_object_effect("object_moved", _move_object, choice, fraction, displacement)
 
 
-def object_refuses(number: int) -> Effect:
-    """One object does not seal to the tool.
+def object_bumped(x: Pair, y: Pair, choice: ObjectChoice = "node", fraction: float | None = None) -> Effect:
+    """Return an effect: an object is bumped aside once, by `BUMP_DISTANCE`, to a free place.
+
+    Args:
+        x: Allowed interval of x of the new place [m].
+        y: Allowed interval of y of the new place [m].
+        choice: The object, see `ObjectChoice`.
+        fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
+
+    Raises:
+        InputError: The number of the object or the fraction is out of range.
+    """
+    return _make_object_effect("object_moved", _bump_object, choice, fraction, x, y)
+
+
+def object_unsealable(number: int) -> Effect:
+    """Return an effect: the suction cup cannot seal on one object.
 
     Args:
         number: Number of the object, from 1.
     """
-    return Effect("seal_fails", answers={"close": _prevent_seal}, arguments=(number,))
+    return Effect("seal_fails", interceptors={"close": _prevent_seal}, arguments=(number,))
 
 
-def _object_effect(
-    name: str, change: Callable[..., bool], which: ObjectChoice, share: float | None, *arguments: Range
+def _make_object_effect(
+    name: str, change: Callable[..., bool], choice: ObjectChoice, fraction: float | None, *values: Pair
 ) -> Effect:
-    """Return the effect of `change(occurrence, object, *arguments)`."""
-    if isinstance(which, int) and which < 1:
-        raise InputError(f"the number of an object is at least 1, not {which}")
-    return Effect(name, _change_object, arguments=(change, which, require_share(share), *arguments))
+    """Return an effect that calls `change(occurrence, object, *values)` once."""
+    if isinstance(choice, int) and choice < 1:
+        raise InputError(f"the number of an object must be at least 1, not {choice}")
+    return Effect(name, _change_object, arguments=(change, choice, validate_fraction(fraction), *values))
 
 
 def _change_object(
-    occurrence: Occurrence, change: Callable[..., bool], which: ObjectChoice, share: float, *arguments: Range
+    occurrence: Occurrence, change: Callable[..., bool], choice: ObjectChoice, fraction: float, *values: Pair
 ) -> bool:
-    """Change the object as soon as the arm has completed this share of its motion."""
+    """Change the object if the arm has completed `fraction` of its motion; return True if changed."""
     scene = occurrence.scene
-    affected = None if scene.progress < share else scene.find(which, occurrence.item)
-    return affected is not None and change(occurrence, affected, *arguments)
+    affected = None if scene.motion_progress < fraction else scene.find_object(choice, occurrence.item)
+    return affected is not None and change(occurrence, affected, *values)
 
 
-def _remove(occurrence: Occurrence, removed: TrueObject) -> bool:
-    occurrence.record(removed)
+def _remove_object(occurrence: Occurrence, removed: TrueObject) -> bool:
+    occurrence.emit_event(removed)
     occurrence.scene.world.remove(removed)
     return True
 
 
-def _move(occurrence: Occurrence, moved: TrueObject, by: tuple[float, float]) -> bool:
-    occurrence.record(moved)
-    occurrence.scene.world.move(moved, by)
+def _move_object(occurrence: Occurrence, moved: TrueObject, displacement: Pair) -> bool:
+    occurrence.emit_event(moved)
+    occurrence.scene.world.move(moved, displacement)
     return True
 
 
-def _bump(occurrence: Occurrence, bumped: TrueObject, x: Range, y: Range) -> bool:
-    by = _find_free_displacement(occurrence.scene, bumped, x, y)
-    return by is not None and _move(occurrence, bumped, by)
+def _bump_object(occurrence: Occurrence, bumped: TrueObject, x: Pair, y: Pair) -> bool:
+    displacement = _find_free_displacement(occurrence.scene, bumped, x, y)
+    return displacement is not None and _move_object(occurrence, bumped, displacement)
 
 
-def _find_free_displacement(
-    scene: FaultScene, bumped: TrueObject, x: Range, y: Range
-) -> tuple[float, float] | None:
-    """Return the displacement of an object to a free place beside it [m], or None."""
+def _find_free_displacement(scene: FaultScene, bumped: TrueObject, x: Pair, y: Pair) -> Pair | None:
+    """Return the displacement `(x, y)` [m] of an object to a free place; None if there is none."""
     radius = scene.cell.classes[bumped.label].radius
     others = [
         (other.position[:2], scene.cell.classes[other.label].radius + radius)
         for other in scene.world.objects
         if other.body != bumped.body
     ]
-    for number in range(BUMP_DIRECTIONS):
-        angle = 2 * math.pi * number / BUMP_DIRECTIONS
-        by = np.array([math.cos(angle), math.sin(angle)]) * BUMP_DISTANCE
-        place = bumped.position[:2] + by
+    for index in range(BUMP_DIRECTION_COUNT):
+        angle = 2 * math.pi * index / BUMP_DIRECTION_COUNT
+        displacement = np.array([math.cos(angle), math.sin(angle)]) * BUMP_DISTANCE
+        place = bumped.position[:2] + displacement
         is_inside = x[0] <= place[0] <= x[1] and y[0] <= place[1] <= y[1]
         if is_inside and all(math.dist(place, other) > distance for other, distance in others):
-            return float(by[0]), float(by[1])
+            return float(displacement[0]), float(displacement[1])
     return None
 
 
 def _prevent_seal(proceed: Callable[[], None], occurrence: Occurrence, number: int) -> None:
-    """Close the tool, unless the tool is on this object."""
-    refusing = occurrence.scene.find(number, "")
+    """Close the tool, unless the tool touches the object with this number."""
+    unsealable = occurrence.scene.find_object(number, "")
     tool = occurrence.scene.cell.arm.tool_pose.position
-    if refusing is None or math.dist(refusing.position[:2], tool[:2]) > MAX_TOOL_OFFSET:
+    if unsealable is None or math.dist(unsealable.position[:2], tool[:2]) > MAX_TOOL_DISTANCE:
         proceed()
     else:
-        occurrence.record(refusing)
+        occurrence.emit_event(unsealable)

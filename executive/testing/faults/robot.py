@@ -1,4 +1,7 @@
-"""Faults of arm, tool, camera, localizer, table and operator."""
+"""Faults of arm, tool, camera, localizer, table and operator.
+
+An effect that does not happen once lasts as long as its fault.
+"""
 
 from __future__ import annotations
 
@@ -11,109 +14,113 @@ import numpy as np
 from executive.cell.arm import Motion, Planning
 from executive.cell.frame import Frame
 from executive.errors import Blocked, NoDepth, Unreachable
-from executive.testing.faults.effect import Effect, Occurrence, require_share
+from executive.testing.faults.effect import Effect, Occurrence, validate_fraction
 
 
 def seal_fails() -> Effect:
-    """Nothing seals to the tool while this lasts: `Grasp` is `missed`; a held object stays at the tool."""
-    return Effect("seal_fails", answers={"close": _answer}, arguments=(None,))
+    """Return an effect: the suction cup cannot seal, and `Grasp` fails with `missed`; held objects stay."""
+    return Effect("seal_fails", interceptors={"close": _return_constant}, arguments=(None,))
 
 
-def seal_breaks(share: float | None = 0.5) -> Effect:
-    """The seal breaks once, while the arm carries an object, which falls: `Transit` is `dropped`.
+def seal_breaks(fraction: float | None = 0.5) -> Effect:
+    """Return an effect: the seal breaks once, the object falls, and `Transit` fails with `dropped`.
 
     Args:
-        share: Share of the motion after which the seal breaks, 0 to 1; None: at once, also at rest.
+        fraction: Fraction of the motion after which the seal breaks, 0 to 1; None: at once, also at rest.
 
     Raises:
-        InputError: The share is not more than 0 and less than 1.
+        InputError: The fraction is not more than 0 and less than 1.
     """
-    return Effect("seal_breaks", _break_seal, arguments=(require_share(share),))
+    return Effect("seal_breaks", _break_seal, arguments=(validate_fraction(fraction),))
 
 
 def seal_breaks_over_wrong_bin() -> Effect:
-    """The seal breaks once, over a bin that is wrong for the object, which falls into this bin."""
+    """Return an effect: the seal breaks once, and the object falls into a bin that is wrong for its class."""
     return Effect("seal_breaks", _break_seal_over_wrong_bin)
 
 
 def tool_sticks() -> Effect:
-    """The tool keeps its object when it opens while this lasts: `Release` is `stuck`."""
-    return Effect("tool_sticks", answers={"open": _keep_object})
+    """Return an effect: the object sticks to the opened tool, and `Release` fails with `stuck`."""
+    return Effect("tool_sticks", interceptors={"open": _keep_held_object})
 
 
-def arm_runs_into(what: str = "something", share: float = 0.5) -> Effect:
-    """The arm runs into an obstacle once and brakes: the skill is `blocked`.
+def arm_collides(obstacle: str = "something", fraction: float = 0.5) -> Effect:
+    """Return an effect: the arm collides once and brakes, and the skill fails with `blocked`.
 
     Args:
-        what: The obstacle, for the message of the failure.
-        share: Share of the motion after which this happens, 0 to 1.
+        obstacle: Name of the obstacle in the message of the failure.
+        fraction: Fraction of the motion after which the arm collides, 0 to 1.
 
     Raises:
-        InputError: The share is not more than 0 and less than 1.
+        InputError: The fraction is not more than 0 and less than 1.
     """
-    return Effect("arm_runs_into", _block_arm, arguments=(what, require_share(share)))
+    return Effect("arm_collides", _block_arm, arguments=(obstacle, validate_fraction(fraction)))
 
 
-def no_way(*, is_blocked: bool = False) -> Effect:
-    """The planner finds no motion while this lasts: the skill is `unreachable`, or `blocked`.
+def no_path(*, is_blocked: bool = False) -> Effect:
+    """Return an effect: the planner finds no motion, and the skill fails with `unreachable` or `blocked`.
 
     Args:
         is_blocked: True if an obstacle blocks the goal; False if the goal is out of reach.
     """
-    return Effect("no_way", answers={"plan": _fail_planning}, arguments=(is_blocked,))
+    return Effect("no_path", interceptors={"plan": _fail_planning}, arguments=(is_blocked,))
 
 
-def workspace_hidden() -> Effect:
-    """The arm hides the table from the camera while this lasts: `Detect` is `hidden`, or sees nothing."""
-    return Effect("workspace_hidden", answers={"sees_table": _answer, "capture": _hide}, arguments=(False,))
+def workspace_occluded() -> Effect:
+    """Return an effect: the arm occludes the table, and `Detect` fails with `hidden`, or detects nothing."""
+    return Effect(
+        "workspace_occluded",
+        interceptors={"sees_table": _return_constant, "capture": _occlude_frame},
+        arguments=(False,),
+    )
 
 
 def no_depth() -> Effect:
-    """No detection can be localized while this lasts: `Localize` fails with `no_depth`."""
-    return Effect("no_depth", answers={"localize": _lose_depth})
+    """Return an effect: no detection can be localized, and `Localize` fails with `no_depth`."""
+    return Effect("no_depth", interceptors={"localize": _raise_no_depth})
 
 
 def table_bumped() -> Effect:
-    """The table is bumped once, and the ledger is informed: frames and targets are `stale`."""
+    """Return an effect: the table is bumped once; skills with older frames or targets fail with `stale`."""
     return Effect("table_bumped", _bump_table)
 
 
 def operator_quits() -> Effect:
-    """The operator quits while this lasts: `AwaitRequest` fails with `quit`."""
-    return Effect("operator_quits", answers={"ask": _answer}, arguments=(None,))
+    """Return an effect: the operator quits, and `AwaitRequest` fails with `quit`."""
+    return Effect("operator_quits", interceptors={"ask": _return_constant}, arguments=(None,))
 
 
 def operator_asks_rescan() -> Effect:
-    """The operator requests a new look while this lasts: `AwaitRequest` fails with `rescan`."""
-    return Effect("operator_asks_rescan", answers={"ask": _answer}, arguments=("rescan",))
+    """Return an effect: the operator requests a new scan, and `AwaitRequest` fails with `rescan`."""
+    return Effect("operator_asks_rescan", interceptors={"ask": _return_constant}, arguments=("rescan",))
 
 
-def _answer(proceed: Callable[[], object], occurrence: Occurrence, answer: object) -> object:
-    """Return `answer` instead of the cell's own answer."""
+def _return_constant(proceed: Callable[[], object], occurrence: Occurrence, answer: object) -> object:
+    """Return `answer` without a call of the method of the cell."""
     del proceed
-    occurrence.record()
+    occurrence.emit_event()
     return answer
 
 
-def _keep_object(proceed: Callable[[], None], occurrence: Occurrence) -> None:
-    if (held := occurrence.scene.world.held) is None:
+def _keep_held_object(proceed: Callable[[], None], occurrence: Occurrence) -> None:
+    if (held := occurrence.scene.world.held_object) is None:
         proceed()
     else:
-        occurrence.record(held)
+        occurrence.emit_event(held)
 
 
-def _break_seal(occurrence: Occurrence, share: float) -> bool:
+def _break_seal(occurrence: Occurrence, fraction: float) -> bool:
     world = occurrence.scene.world
-    if (held := world.held) is None or occurrence.scene.progress < share:
+    if (held := world.held_object) is None or occurrence.scene.motion_progress < fraction:
         return False
-    occurrence.record(held)
+    occurrence.emit_event(held)
     world.break_seal()
     return True
 
 
 def _break_seal_over_wrong_bin(occurrence: Occurrence) -> bool:
-    scene, held = occurrence.scene, occurrence.scene.world.held
-    if held is None or scene.progress == 0.0:
+    scene, held = occurrence.scene, occurrence.scene.world.held_object
+    if held is None or scene.motion_progress == 0.0:
         return False
     right_bins = scene.cell.routes.get(held.label, ())
     bins = scene.cell.bins.items()
@@ -121,53 +128,58 @@ def _break_seal_over_wrong_bin(occurrence: Occurrence) -> bool:
     return is_over_wrong_bin and _break_seal(occurrence, 0.0)
 
 
-def _block_arm(occurrence: Occurrence, obstacle: str, share: float) -> bool:
-    if occurrence.scene.progress < share:
+def _block_arm(occurrence: Occurrence, obstacle: str, fraction: float) -> bool:
+    if occurrence.scene.motion_progress < fraction:
         return False
-    occurrence.record()
+    occurrence.emit_event()
     occurrence.scene.world.block_arm(f"the arm ran into {obstacle}")
     return True
 
 
 def _bump_table(occurrence: Occurrence) -> bool:
-    occurrence.record()
+    occurrence.emit_event()
     occurrence.scene.cell.ledger.invalidate_positions()
     return True
 
 
-def _hide(proceed: Callable[[], Frame], occurrence: Occurrence, answer: object) -> Frame:
-    """Return a frame that shows only the arm."""
+def _occlude_frame(proceed: Callable[[], Frame], occurrence: Occurrence, answer: object) -> Frame:
+    """Return the captured frame with all pixels marked as occluded by the arm."""
     del answer
-    occurrence.record()
+    occurrence.emit_event()
     frame = proceed()
     return replace(frame, visible=np.zeros_like(frame.visible))
 
 
-def _lose_depth(proceed: Callable[[], Any], occurrence: Occurrence) -> Any:
+def _raise_no_depth(proceed: Callable[[], Any], occurrence: Occurrence) -> Any:
     del proceed
-    occurrence.record()
+    occurrence.emit_event()
     raise NoDepth("the frame has no depth there (injected fault)")
 
 
 @dataclass(frozen=True)
 class FailingPlanning:
-    """A plan that takes the usual time and finds no motion; implements `Planning`."""
+    """A planning that takes the usual time and finds no motion; implements `Planning`.
+
+    Attributes:
+        planning: The planning without a fault, which determines the planning time.
+        is_blocked: True: `result` raises Blocked. False: Unreachable.
+    """
 
     planning: Planning
     is_blocked: bool
 
     @property
     def ready(self) -> bool:
-        """True if the planning time is over."""
+        """True if the planning has ended."""
         return self.planning.ready
 
     def result(self) -> Motion:
         """Raise Blocked or Unreachable."""
         if self.is_blocked:
-            raise Blocked("something is in the way (injected fault)")
+            raise Blocked("an obstacle blocks the goal (injected fault)")
         raise Unreachable("the planner finds no motion (injected fault)")
 
 
 def _fail_planning(proceed: Callable[[], Planning], occurrence: Occurrence, is_blocked: bool) -> Planning:
-    occurrence.record()
+    occurrence.emit_event()
     return FailingPlanning(proceed(), is_blocked)

@@ -1,4 +1,4 @@
-"""Fault script: the faults of a cell and their times."""
+"""Times of the faults of a script: during nodes, in random activations, or in a time span."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from executive.testing.faults.effect import Effect
 
 
 @dataclass(frozen=True)
-class DuringNode:
-    """Activations of nodes.
+class NodeActivations:
+    """Activations of nodes, from the start to the end of a node, in which a fault occurs.
 
     Attributes:
-        pattern: Pattern of the nodes' paths; `*` matches any text, `/` included.
-        nth: Numbers of activations, counted from 1 over all matching nodes; empty: all.
-        probability: Probability of a fault in each of them.
-        seed: Random seed.
+        pattern: Pattern that the path of the node matches; `*` matches any text, also with `/`.
+        nth: Numbers of activations, counted from 1 over all matching nodes; empty: all activations.
+        probability: Probability of the fault in each of these activations, 0 to 1.
+        seed: Random seed, which determines the activations.
     """
 
     pattern: str
@@ -34,15 +34,15 @@ class DuringNode:
         return fnmatchcase(path, self.pattern)
 
     def includes(self, number: int) -> bool:
-        """Return True if the fault occurs in the activation with this number."""
+        """Return True if the fault occurs in the activation with this number, from 1."""
         if self.nth and number not in self.nth:
             return False
         return float(np.random.default_rng([self.seed, number]).random()) < self.probability
 
 
 @dataclass(frozen=True)
-class DuringTime:
-    """Time on the run's clock from `start` until before `end` [s]."""
+class TimeSpan:
+    """Time span on the run's clock in which a fault occurs: from `start`, until before `end` [s]."""
 
     start: float
     end: float
@@ -50,35 +50,35 @@ class DuringTime:
 
 @dataclass(frozen=True)
 class ScheduledFault:
-    """An effect on a cell, and its time."""
+    """A fault of a script: an effect on the cell, and the time of the effect."""
 
     effect: Effect
-    time: DuringNode | DuringTime
+    time: NodeActivations | TimeSpan
 
 
 def during(pattern: str, effect: Effect, *, nth: int | Collection[int] = ()) -> ScheduledFault:
     """Return a fault that lasts while a node runs.
 
     Args:
-        pattern: Pattern of the node's path: `*/Grasp`.
+        pattern: Pattern that the path of the node matches, for instance `*/Grasp`.
         effect: Effect of the fault.
-        nth: Numbers of activations, counted from 1 over all matching nodes; by default all.
+        nth: Numbers of activations, counted from 1 over all matching nodes; empty: all activations.
 
     Raises:
         InputError: A number is less than 1.
     """
-    numbers = (nth,) if isinstance(nth, int) else tuple(nth)
-    if any(number < 1 for number in numbers):
-        raise InputError(f"the number of an activation is at least 1, not {nth}")
-    return ScheduledFault(effect, DuringNode(pattern, numbers))
+    activation_numbers = (nth,) if isinstance(nth, int) else tuple(nth)
+    if any(number < 1 for number in activation_numbers):
+        raise InputError(f"the number of an activation must be at least 1, not {nth}")
+    return ScheduledFault(effect, NodeActivations(pattern, activation_numbers))
 
 
 def with_probability(probability: float, pattern: str, effect: Effect, *, seed: int) -> ScheduledFault:
-    """Return a fault that lasts while a node runs, in a random part of its activations.
+    """Return a fault that lasts while a node runs, in randomly chosen activations.
 
     Args:
-        probability: Probability in each activation, 0 to 1.
-        pattern: Pattern of the node's path: `*/Transit`.
+        probability: Probability of the fault in each activation, 0 to 1.
+        pattern: Pattern that the path of the node matches, for instance `*/Transit`.
         effect: Effect of the fault.
         seed: Random seed, which determines the activations.
 
@@ -86,21 +86,21 @@ def with_probability(probability: float, pattern: str, effect: Effect, *, seed: 
         InputError: The probability is not in 0 to 1.
     """
     if not 0.0 <= probability <= 1.0:
-        raise InputError(f"a probability is 0 to 1, not {probability:g}")
-    return ScheduledFault(effect, DuringNode(pattern, probability=probability, seed=seed))
+        raise InputError(f"a probability must be 0 to 1, not {probability:g}")
+    return ScheduledFault(effect, NodeActivations(pattern, probability=probability, seed=seed))
 
 
 def between(start: float, end: float, effect: Effect) -> ScheduledFault:
-    """Return a fault that lasts from one time on the run's clock until another [s].
+    """Return a fault that lasts from `start` until before `end`, times on the run's clock [s].
 
     Raises:
-        InputError: The end is not after the start.
+        InputError: `start` is negative, or not before `end`.
     """
     if not 0.0 <= start < end:
         raise InputError(f"a fault needs times with 0 <= start < end, not {start:g} s and {end:g} s")
-    return ScheduledFault(effect, DuringTime(start, end))
+    return ScheduledFault(effect, TimeSpan(start, end))
 
 
 def after(start: float, effect: Effect) -> ScheduledFault:
-    """Return a fault that lasts from a time on the run's clock [s] until the end."""
+    """Return a fault that lasts from `start`, a time on the run's clock [s], until the end of the run."""
     return between(start, math.inf, effect)

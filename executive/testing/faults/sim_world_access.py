@@ -1,4 +1,4 @@
-"""Access to the world of a simulated cell; the only part of the fault scripts that needs the simulator."""
+"""Access to the world of a simulated cell; the only module of fault scripts that imports the simulator."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.geometry import Pose
 from executive.testing.faults.world_access import TrueObject, WorldAccess
 
 SETTLING_STEPS = 240
-"""Number of control steps in which the arm and displaced objects come to rest."""
+"""Number of control steps in which arm and displaced objects come to rest, 1 s."""
 
 
 class SimWorldAccess(WorldAccess):
@@ -28,33 +28,33 @@ class SimWorldAccess(WorldAccess):
 
     @property
     def objects(self) -> Sequence[TrueObject]:
-        """All loose objects."""
+        """All loose objects, in the order of their creation."""
         return [self._describe(body) for body in self._world.bodies]
 
     @property
-    def held(self) -> TrueObject | None:
+    def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
         body = self._tool.held_body
         return None if body is None else self._describe(body)
 
-    def remove(self, removed: TrueObject) -> None:
+    def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world."""
-        self.drop(removed)
-        self._world.remove_object(removed.body)
+        self.release_if_held(true_object)
+        self._world.remove_object(true_object.body)
 
-    def move(self, moved: TrueObject, by: tuple[float, float]) -> None:
+    def move(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         """Displace an object."""
-        self.drop(moved)
-        X_WO = self._world.object_pose(moved.body)
-        position = X_WO.position + np.array([*by, 0.0])
-        self._world.place_object(moved.body, Pose(X_WO.rotation, position))
+        self.release_if_held(true_object)
+        X_WO = self._world.object_pose(true_object.body)
+        position = X_WO.position + np.array([*displacement, 0.0])
+        self._world.place_object(true_object.body, Pose(X_WO.rotation, position))
 
     def break_seal(self) -> None:
         """Break the seal of the tool."""
         self._tool.break_seal()
 
     def block_arm(self, message: str) -> None:
-        """Let the arm run into an obstacle."""
+        """Let the arm collide; `message` is the reported cause."""
         self._arm.run_into(message)
 
     def settle(self) -> None:

@@ -1,4 +1,4 @@
-"""Access to the world of a cell without the robot: true objects, the seal, and obstacles."""
+"""Access to the world of a fake or simulated cell: true objects, seal of the tool, and collisions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class TrueObject:
     """True state of an object.
 
     Attributes:
-        body: Identity of the object in its world.
+        body: Id of the object in a simulated world; the `FakeObject` of a fake world.
         label: Class of the object.
         position: Centre of the object `(3,)` [m].
     """
@@ -32,34 +32,34 @@ class TrueObject:
 
 
 class WorldAccess(Protocol):
-    """Changes the world of a cell in ways that no skill can."""
+    """Reads and changes the true state of the world of a cell, which skills cannot do."""
 
     @property
     def objects(self) -> Sequence[TrueObject]:
         """All loose objects, in the order of their creation."""
 
     @property
-    def held(self) -> TrueObject | None:
+    def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
 
-    def remove(self, removed: TrueObject) -> None:
-        """Remove an object from the world, and from the tool if it is held."""
+    def remove(self, true_object: TrueObject) -> None:
+        """Remove an object from the world, released if it is held."""
 
-    def move(self, moved: TrueObject, by: tuple[float, float]) -> None:
-        """Displace an object by `(x, y)` [m], out of the tool if it is held; it is at rest afterwards."""
+    def move(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
+        """Displace an object by `(x, y)` [m], released if it is held; the object is at rest afterwards."""
 
     def break_seal(self) -> None:
         """Break the seal of the tool; a held object falls."""
 
     def block_arm(self, message: str) -> None:
-        """Let the arm run into an obstacle; it brakes, and reports `message`."""
+        """Let the arm collide: it brakes and reports `message` as the cause."""
 
     def settle(self) -> None:
-        """Let the arm and the objects come to rest, in time that does not belong to a run."""
+        """Let the arm and the objects come to rest; the elapsed time belongs to no run."""
 
-    def drop(self, held: TrueObject) -> None:
-        """Break the seal if the tool holds this object."""
-        if self.held is not None and self.held.body == held.body:
+    def release_if_held(self, true_object: TrueObject) -> None:
+        """Break the seal of the tool if the tool holds this object."""
+        if self.held_object is not None and self.held_object.body == true_object.body:
             self.break_seal()
 
 
@@ -71,36 +71,36 @@ class FakeWorldAccess(WorldAccess):
 
     @property
     def objects(self) -> Sequence[TrueObject]:
-        """All objects."""
+        """All loose objects, in the order of their creation."""
         return [_describe(fake_object) for fake_object in self._fake.world.objects]
 
     @property
-    def held(self) -> TrueObject | None:
+    def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
         held = self._fake.world.held
         return None if held is None else _describe(held)
 
-    def remove(self, removed: TrueObject) -> None:
+    def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world."""
-        self.drop(removed)
-        self._fake.world.remove(removed.body)
+        self.release_if_held(true_object)
+        self._fake.world.remove(true_object.body)
 
-    def move(self, moved: TrueObject, by: tuple[float, float]) -> None:
+    def move(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         """Displace an object."""
-        self.drop(moved)
-        moved.body.position[:2] += np.array(by)
-        moved.body.rest_positions.append(moved.body.position.copy())
+        self.release_if_held(true_object)
+        true_object.body.position[:2] += np.array(displacement)
+        true_object.body.rest_positions.append(true_object.body.position.copy())
 
     def break_seal(self) -> None:
         """Break the seal of the tool."""
         self._fake.tool.break_seal()
 
     def block_arm(self, message: str) -> None:
-        """Let the arm run into an obstacle."""
+        """Let the arm collide; `message` is the reported cause."""
         self._fake.arm.run_into(message)
 
     def settle(self) -> None:
-        """Write the objects into the log; nothing moves by itself in a fake world."""
+        """Write the states of the objects to the log; in a fake world all objects are at rest."""
         self._fake.log_state()
 
 
@@ -113,7 +113,7 @@ def open_world(workcell: Workcell) -> WorldAccess:
     inner = innermost(workcell)
     if isinstance(inner, FakeCell):
         return FakeWorldAccess(inner)
-    # A fake cell must not import the simulator.
+    # Imported here, so that tests on a fake cell do not import the simulator.
     from executive.cells.sim.cell import SimCell
     from executive.testing.faults.sim_world_access import SimWorldAccess
 
@@ -121,7 +121,7 @@ def open_world(workcell: Workcell) -> WorldAccess:
         return SimWorldAccess(inner)
     raise InputError(
         f"faults cannot change the world of a {type(inner).__name__}; "
-        "give `with_faults` an `open_world` that returns a WorldAccess for it"
+        "pass a function `open_world` to `with_faults` that returns a WorldAccess for this cell"
     )
 
 

@@ -105,7 +105,7 @@ def test_a_run_that_never_ends_is_ended_and_found(campaign: Campaign) -> None:
     short = replace(campaign.rehearsal, robot_time=-5.0)
     trial = try_out(campaign.subject, short, {number: ever})
     assert trial.problems[0] == (
-        "it ended as FAULT at no node: the mission is not done after 10 s on its clock"
+        "it ended as FAULT at no node: the mission has not ended after 10 s on its clock"
     )
 
 

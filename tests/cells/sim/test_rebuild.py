@@ -152,7 +152,7 @@ def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(
     moved: list[tuple[int, Array]] = []
 
     def act(world) -> None:
-        held = world.held.body if world.held else None
+        held = world.held_object.body if world.held_object else None
         one, other = [thing for thing in world.objects if thing.body != held][:2]
         world.remove(other)
         world.move(one, (0.0, 0.3))

@@ -13,11 +13,11 @@ import pytest
 
 from executive.plugins import discover
 from executive.skill import Skill
-from executive.testing.conformance import conformance
+from executive.testing.conformance import list_conformance_checks
 from executive.testing.conformance.check import RULES, Check, ConformanceError
 
-ARRANGE = "as skills/README.md shows."
-FAULT = " That is a fault, which ends the run: fail with a declared reason, or correct the code."
+ARRANGE = "skills/README.md has an example."
+FAULT = " This is a fault, which ends the run: fail with a declared reason, or correct the code."
 FINALLY = "The code in finally must take no control step and raise no exception."
 REST = "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
 CHANCE = "The skill may not depend on chance, wall time or earlier runs; a seed may be a param."
@@ -26,7 +26,9 @@ EMPTY = "with an empty tool"
 
 
 def unmade(text: str) -> str:
-    return f'faulty_skills.py:N calls {text}(...) without running its steps. Write "yield from {text}(...)".'
+    return (
+        f'faulty_skills.py:N calls {text}(...) without executing its steps. Write "yield from {text}(...)".'
+    )
 
 
 def unraised(text: str) -> str:
@@ -35,13 +37,13 @@ def unraised(text: str) -> str:
 
 FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ("has_documentation", faulty.Undocumented, [
-        'the docstring of Undocumented begins with "", which is no sentence. State in the first line what is '
-        "true after success.",
-        'Undocumented.gap has no doc. Write param(..., doc="what it is").',
-        'Undocumented.target has no doc. Write port(..., doc="what it is").',
+        'the docstring of Undocumented begins with "", which is not a sentence. State in the first line what '
+        "the skill achieves.",
+        'Undocumented.gap has no doc. Write param(..., doc="its meaning").',
+        'Undocumented.target has no doc. Write port(..., doc="its meaning").',
     ]),
     ("has_allowed_defaults", faulty.BadDefaults, [
-        f"the default of BadDefaults.{problem}. Correct the default, or the limits." for problem in (
+        f"the default of BadDefaults.{problem}. Correct default or bounds." for problem in (
             "near must be at least 0.2 m, not 0.1",
             "far must be at most 0.2 m, not 0.3",
             'order must be "columns" or "none", not the text "rows"',
@@ -50,72 +52,72 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ]),
     ("declares_reasons", faulty.RaisesUndeclared, [
         'faulty_skills.py:N fails with "no_bins", which RaisesUndeclared does not declare. '
-        "Add it to reasons; there are: tired.",
+        "Add it to the reasons, which are: tired.",
     ]),
     ("declares_reasons", faulty.TextForTuple, [
-        'TextForTuple.reasons is the text "tired". Write a tuple: ("tired",).',
+        'TextForTuple.reasons is the string "tired". Write a tuple: ("tired",).',
     ]),
     ("declares_resources", faulty.TextForTuple, [
         "TextForTuple uses 'arm'. Write a tuple of arm, tool, camera.",
     ]),
     ("declares_resources", faulty.BadResources, [
         "BadResources uses gripper. Write a tuple of arm, tool, camera.",
-        'BadResources moves the arm but does not use it. Add "arm" to uses, or leave moves out.',
-        'BadResources.tool_left has "dropped", which is no reason of the skill. Allowed: tired, halt.',
+        'BadResources moves the arm but does not use it. Add "arm" to uses, or remove moves.',
+        'BadResources.tool_left has "dropped", which is not a reason of the skill. Allowed: tired, halt.',
     ]),
     ("calls_take_effect", faulty.StepsNotTaken, [
         unmade("follow"), unmade("follow"), unmade("cell.clock.sleep"), unmade("self._rest"), unmade("_wait"),
         unraised("self._tire"), unraised("self.failure"), unmade("follow"), unmade("cell.clock.sleep"),
     ]),
-    ("succeeds_somewhere", faulty.AlwaysFails, [
-        f'AlwaysFails never succeeded; {EMPTY} it failed with "tired" (after 1 step). Arrange a stage on '
-        f"which it succeeds: conformance(AlwaysFails, lambda stage: ...), {ARRANGE}",
+    ("can_succeed", faulty.AlwaysFails, [
+        f'AlwaysFails never succeeded; {EMPTY} it failed with "tired" (after 1 step). Set up a scene in '
+        f"which it succeeds: list_conformance_checks(AlwaysFails, lambda scene: ...); {ARRANGE}",
     ]),
-    ("succeeds_somewhere", faulty.Shake, [
+    ("can_succeed", faulty.Shake, [
         'Shake never succeeded; with an item in the tool it failed with "blocked" (the motion would bring '
-        "the held cube 0.030 m into the table, with the tool at (0.530, -0.110, 0.020) m). Arrange a stage "
-        f"on which it succeeds: conformance(Shake, lambda stage: ...), {ARRANGE}",
+        "the held cube 0.030 m into the table, with the tool at (0.530, -0.110, 0.020) m). Set up a scene "
+        f"in which it succeeds: list_conformance_checks(Shake, lambda scene: ...); {ARRANGE}",
     ]),
-    ("succeeds_somewhere", faulty.NeedsUnknown, [
-        'NeedsUnknown cannot be tried: no value can be generated for "plan" (dict) and "words" (a text). '
+    ("can_succeed", faulty.NeedsUnknown, [
+        'NeedsUnknown cannot be tested: no value can be generated for "plan" (dict) and "words" (a text). '
         f'Return it from a function in a test: '
-        f'conformance(NeedsUnknown, lambda stage: {{"plan": ..., "words": ...}}), {ARRANGE}',
+        f'list_conformance_checks(NeedsUnknown, lambda scene: {{"plan": ..., "words": ...}}); {ARRANGE}',
     ]),
-    ("comes_to_an_end", faulty.WaitsForEver, [
-        f"{EMPTY} WaitsForEver was not over after 60 s. Limit the duration of each wait, and fail with "
-        "a reason afterwards.",
+    ("terminates", faulty.WaitsForEver, [
+        f"{EMPTY} WaitsForEver was still running after 60 s. Limit the duration of each wait, and fail "
+        "with a reason when it expires.",
     ]),
     ("ends_as_declared", faulty.TrustsTheDetector, [
         f"{EMPTY} while the table is empty at tick 12 IndexError: tuple index out of range "
         f"(faulty_skills.py:N).{FAULT}",
-        f"{EMPTY} while the arm hides the table at tick 12 IndexError: tuple index out of range "
+        f"{EMPTY} while the arm occludes the table at tick 12 IndexError: tuple index out of range "
         f"(faulty_skills.py:N).{FAULT}",
         f"{EMPTY} while no detector answers at tick 12 Unavailable: detector embedded: the detector is dead "
         f"(injected fault) (faulty_skills.py:N).{FAULT}",
-        f"{EMPTY} while the detectors see nothing at tick 12 IndexError: tuple index out of range "
+        f"{EMPTY} while the detectors detect nothing at tick 12 IndexError: tuple index out of range "
         f"(faulty_skills.py:N).{FAULT}",
     ]),
     ("ends_as_declared", faulty.FailsWithoutSentence, [
         'with an item in the tool at tick 1 it failed with "tired" and no message. '
-        "Write what happened, with numbers: the operator reads only this message.",
+        "State what happened, with numbers: the operator reads only this message.",
     ]),
-    ("outputs_fit", faulty.WrongOutputs, [
+    ("has_outputs_of_declared_types", faulty.WrongOutputs, [
         f"{EMPTY} WrongOutputs.chosen is of the type int, not a text. "
         "Set a value of this type, or change the declaration.",
         f"{EMPTY} WrongOutputs.targets is of the type list, not a list of Target. "
         "Set a value of this type, or change the declaration.",
     ]),
-    ("keeps_inputs", faulty.ChangesInput, [
+    ("leaves_inputs_unchanged", faulty.ChangesInput, [
         f"{EMPTY} it changed the value of self.targets. Other nodes read the same value later: "
-        "work on a copy.",
+        "change a copy.",
     ]),
-    ("uses_only_what_it_declares", faulty.UsesUndeclared, [
+    ("uses_only_declared_parts", faulty.UsesUndeclared, [
         'UsesUndeclared calls cell.camera.capture and does not declare the camera. Add "camera" to uses.',
         "UsesUndeclared calls cell.camera.capture and does not declare that it senses. Add senses = True.",
         "UsesUndeclared calls cell.operator.ask and does not declare that it senses. Add senses = True.",
         'UsesUndeclared calls cell.arm.stop and does not declare the arm. Add "arm" to uses.',
     ]),
-    ("uses_only_what_it_declares", faulty.MovesUndeclared, [
+    ("uses_only_declared_parts", faulty.MovesUndeclared, [
         "MovesUndeclared calls cell.arm.start and does not declare that it moves. Add moves = True.",
     ]),
     ("leaves_tool_as_declared", faulty.LetsGo, [
@@ -123,7 +125,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f"tool_state. {TOOL}",
     ]),
     ("leaves_tool_as_declared", faulty.GraspsInSecret, [
-        f"{EMPTY} it succeeded, and the tool holds an object that the ledger does not know. "
+        f"{EMPTY} it succeeded, and the tool holds an object that is not in the ledger. "
         "Call cell.ledger.record_grasp, or open the tool in finally.",
     ]),
     ("leaves_tool_as_declared", faulty.HoldsOnWhenHalted, [
@@ -133,29 +135,29 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ("leaves_arm_at_rest", faulty.RunsOnWhenHalted, [
         f"{EMPTY} it was halted at tick 25, and the arm still moves. {REST}",
     ]),
-    ("halts_at_once", faulty.WaitsInFinally, [
+    ("halts_in_one_tick", faulty.WaitsInFinally, [
         f"{EMPTY} at tick 1 it yielded while it was halted; \"finally\" must not contain a yield. {FINALLY}",
     ]),
-    ("repeats_itself", faulty.DependsOnChance, [
+    ("is_deterministic", faulty.DependsOnChance, [
         f"{EMPTY}, in two equal runs, it set its outputs to different values. {CHANCE}",
     ]),
-    ("repeats_itself", faulty.CallsByChance, [
+    ("is_deterministic", faulty.CallsByChance, [
         f"{EMPTY}, in two equal runs, it called camera.area at tick 1 with different arguments. {CHANCE}",
     ]),
-    ("repeats_itself", faulty.WaitsByChance, [
+    ("is_deterministic", faulty.WaitsByChance, [
         f"{EMPTY}, in two equal runs, it ended as SUCCESS after 1 ticks and then as SUCCESS after 0. "
         f"{CHANCE}",
     ]),
-    ("ticks_are_quick", faulty.ComputesTooLong, [
-        "with an item in the tool it computed for N ms in tick 1, which blocks the arm. "
-        "Distribute the work over ticks by yield, or leave it to a detector.",
+    ("has_short_ticks", faulty.ComputesTooLong, [
+        "with an item in the tool tick 1 computed for N ms, which blocks the arm. "
+        "Distribute the work over ticks with yield, or do it in a detector.",
     ]),
 ]  # fmt: skip
 """Check, skill, and the first problems that the check tells of it."""
 
 
 def check_of(skill: type[Skill], name: str) -> Check:
-    return next(check for check in conformance(skill) if check.name == name)
+    return next(check for check in list_conformance_checks(skill) if check.name == name)
 
 
 def told(check: Check) -> list[str]:
@@ -178,14 +180,14 @@ def test_every_check_has_a_skill_that_fails_it() -> None:
 
 
 def test_a_check_has_the_name_under_which_the_skill_is_installed() -> None:
-    assert str(conformance(faulty.Pause, name="Break")[0]) == "Break.has_documentation"
+    assert str(list_conformance_checks(faulty.Pause, name="Break")[0]) == "Break.has_documentation"
 
 
 @pytest.mark.parametrize(
     "skill", [faulty.Push, faulty.Careful, faulty.ShakeInTheAir], ids=lambda skill: skill.__name__
 )
 def test_nothing_is_found_in_a_skill_that_conforms(skill: type[Skill]) -> None:
-    for check in conformance(skill):
+    for check in list_conformance_checks(skill):
         check()
 
 
@@ -197,7 +199,7 @@ QUICK = ("Grasp", "Release", "SelectTarget")
     "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in discover()]
 )
 def test_every_shipped_skill_conforms(name: str) -> None:
-    for check in conformance(discover()[name], name=name):
+    for check in list_conformance_checks(discover()[name], name=name):
         check()
 
 
@@ -217,15 +219,16 @@ def test_a_file_that_imports_another_clock_or_threads_is_found(statement: str, t
         del sys.modules[path.stem]
     package = statement.split()[1].partition(".")[0]
     assert check_of(module.Wave, "imports_allowed_modules").run().problems == (
-        f"waving.py:2 imports {package}. A skill takes the time from cell.clock and acts only through cell.",
+        f"waving.py:2 imports {package}. "
+        "A skill must get the time from cell.clock, and act only through cell.",
     )
 
 
 def test_a_problem_is_raised_with_the_rule_and_without_a_stage_nothing_succeeds() -> None:
     with pytest.raises(ConformanceError) as raised:
-        check_of(faulty.AlwaysFails, "succeeds_somewhere")()
+        check_of(faulty.AlwaysFails, "can_succeed")()
     assert str(raised.value).splitlines()[0] == (
-        "The skill can be tried, and succeeds in at least one situation. Violated:"
+        "The skill can be tested, and succeeds in at least one situation. Violated:"
     )
     check = check_of(faulty.NeedsUnknown, "leaves_arm_at_rest")
     assert check.run().status == "not run"
@@ -234,16 +237,16 @@ def test_a_problem_is_raised_with_the_rule_and_without_a_stage_nothing_succeeds(
 
 
 def test_a_tick_that_does_not_come_back_is_broken_off_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.testing.conformance.rehearsal.STUCK_TIMEOUT", 0.3)
+    monkeypatch.setattr("executive.testing.conformance.skill_test_run.STUCK_TIMEOUT", 0.3)
     answered = signal.getsignal(signal.SIGALRM)
-    checks = {check.name: check for check in conformance(faulty.LoopsWithoutYield)}
+    checks = {check.name: check for check in list_conformance_checks(faulty.LoopsWithoutYield)}
     problem = (
-        f"{EMPTY} while the table has changed since the look at tick 1 LoopsWithoutYield did not return "
-        "for 0.3 s, at faulty_skills.py:N. "
-        "A tick blocks the arm: yield in each loop that waits, and leave long computations to a detector."
+        f"{EMPTY} while the table has changed since the last image at tick 1 LoopsWithoutYield did not "
+        "return for 0.3 s, at faulty_skills.py:N. "
+        "A long tick blocks the arm: yield in each loop that waits, and do long computations in a detector."
     )
-    assert told(checks["comes_to_an_end"]) == told(checks["halts_at_once"]) == [problem]
-    assert [checks[name].run().status for name in ("halts_at_once", "has_allowed_defaults")] == [
+    assert told(checks["terminates"]) == told(checks["halts_in_one_tick"]) == [problem]
+    assert [checks[name].run().status for name in ("halts_in_one_tick", "has_allowed_defaults")] == [
         "not run",
         "ok",
     ]

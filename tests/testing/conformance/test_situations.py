@@ -1,4 +1,4 @@
-"""The situations of a skill, what is on the stage there, and when it is halted."""
+"""The situations of a skill, what is on the scene there, and when it is halted."""
 
 from __future__ import annotations
 
@@ -12,9 +12,15 @@ from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
 from executive.plugins import discover
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
-from executive.testing.conformance import Stage
-from executive.testing.conformance.check import leave_as_is
-from executive.testing.conformance.situations import Arrange, NotArranged, Situation, list_situations, prepare
+from executive.testing.conformance import SkillScene
+from executive.testing.conformance.check import arrange_nothing
+from executive.testing.conformance.situations import (
+    Arrange,
+    ArrangementFailed,
+    Situation,
+    list_situations,
+    prepare_scene,
+)
 from executive.testing.conformance.skill_runs import MAX_HALTS, SkillRuns
 
 
@@ -44,22 +50,22 @@ class Everything(Skill):
         yield
 
 
-def names(skill: type[Skill], arrange: Arrange = leave_as_is) -> list[str]:
+def names(skill: type[Skill], arrange: Arrange = arrange_nothing) -> list[str]:
     return [situation.name for situation in list_situations(skill, arrange)]
 
 
 def values_of(skill: type[Skill], situation: Situation) -> dict[str, Any]:
-    return prepare(skill, situation, leave_as_is)[1]
+    return prepare_scene(skill, situation, arrange_nothing)[1]
 
 
 def test_what_a_skill_needs_is_made_up() -> None:
-    stage, values = prepare(Everything, Situation("", False), leave_as_is)
-    assert [target.label for target in stage.targets] == ["cube", "sphere", "duck"]
-    assert values["targets"] == stage.targets and values["targets"] is not stage.targets
-    assert (values.pop("target"), values.pop("targets")[0]) == (stage.targets[0], stage.targets[0])
-    assert values.pop("detections") is stage.detections
+    scene, values = prepare_scene(Everything, Situation("", False), arrange_nothing)
+    assert [target.label for target in scene.targets] == ["cube", "sphere", "duck"]
+    assert values["targets"] == scene.targets and values["targets"] is not scene.targets
+    assert (values.pop("target"), values.pop("targets")[0]) == (scene.targets[0], scene.targets[0])
+    assert values.pop("detections") is scene.detections
     assert values == {
-        "item": stage.item, "bin": "red_bin", "label": "cube", "pose": "aside", "word": "some word",
+        "item": scene.item, "bin": "red_bin", "label": "cube", "pose": "aside", "word": "some word",
         "number": 0.5, "share": 0.05, "free": 0.1, "many": 3, "often": False, "order": "rows",
         "where": "embedded",
     }  # fmt: skip
@@ -79,43 +85,43 @@ def test_a_skill_is_tried_in_every_situation_that_it_may_begin_in() -> None:
     assert names(Everything)[:3] == [
         "with an empty tool", "with an item in the tool", "with an empty tool and all inputs given",
     ]  # fmt: skip
-    given = names(discover()["MoveToScan"], lambda stage: {"pose": "home"})
+    given = names(discover()["MoveToScan"], lambda scene: {"pose": "home"})
     assert given == ["with an empty tool", "with an item in the tool"], "a param that is given is not varied"
 
 
 @pytest.mark.parametrize(("needs", "held"), [(EMPTY, [False]), (HOLDING, [True]), (ANY, [False, True])])
 def test_the_tool_holds_what_the_skill_needs(needs: Any, held: list[bool]) -> None:
     skill = type("Needy", (faulty.Pause,), {"tool_state": (needs, ANY), "__annotations__": {}})
-    found = list(list_situations(skill, leave_as_is))
-    assert [situation.holding for situation in found] == held
+    found = list(list_situations(skill, arrange_nothing))
+    assert [situation.is_holding for situation in found] == held
     for situation in found:
-        stage, _ = prepare(skill, situation, leave_as_is)
-        assert stage.cell.tool.holding is situation.holding
-        assert (stage.cell.ledger.find_held_item() is not None) is situation.holding
-        assert (stage.item == stage.cell.ledger.find_held_item()) is (needs is HOLDING)
+        scene, _ = prepare_scene(skill, situation, arrange_nothing)
+        assert scene.cell.tool.holding is situation.is_holding
+        assert (scene.cell.ledger.find_held_item() is not None) is situation.is_holding
+        assert (scene.item == scene.cell.ledger.find_held_item()) is (needs is HOLDING)
 
 
 def test_a_skill_without_arm_finds_the_cup_on_its_target() -> None:
     for name, touches in (("Grasp", True), ("Approach", False)):
-        stage, _ = prepare(discover()[name], Situation("", False), leave_as_is)
-        assert stage.cell.tool.touching is touches
+        scene, _ = prepare_scene(discover()[name], Situation("", False), arrange_nothing)
+        assert scene.cell.tool.touching is touches
 
 
-def broken(stage: Stage) -> dict[str, Any]:
+def broken(scene: SkillScene) -> dict[str, Any]:
     raise KeyError("cube")
 
 
 @pytest.mark.parametrize(
     ("state", "arrange", "text"),
     [
-        ("empty", leave_as_is, "its tool_state is 'empty'; it must begin with ANY, EMPTY or HOLDING"),
-        ((), leave_as_is, "its tool_state is (); it must begin with ANY, EMPTY or HOLDING"),
+        ("empty", arrange_nothing, "its tool_state is 'empty'; it must begin with ANY, EMPTY or HOLDING"),
+        ((), arrange_nothing, "its tool_state is (); it must begin with ANY, EMPTY or HOLDING"),
         ((EMPTY, EMPTY), broken, "the function `arrange` raised KeyError: 'cube'"),
     ],
 )
 def test_a_skill_that_cannot_be_arranged_is_told_why(state: Any, arrange: Arrange, text: str) -> None:
     skill = type("Odd", (faulty.Pause,), {"tool_state": state, "__annotations__": {}})
-    with pytest.raises(NotArranged) as raised:
+    with pytest.raises(ArrangementFailed) as raised:
         names(skill, arrange)
     assert str(raised.value) == text
 
@@ -132,8 +138,8 @@ class Patient(faulty.Pause):
 
 
 def test_a_skill_is_halted_at_its_calls_and_now_and_then() -> None:
-    short = SkillRuns("Pause", faulty.Pause, leave_as_is)
-    assert [rehearsal.ticks for rehearsal in short.halted_runs] == [1, 2, 1, 2]
-    ticks = [rehearsal.ticks for rehearsal in SkillRuns("Patient", Patient, leave_as_is).halted_runs]
+    short = SkillRuns("Pause", faulty.Pause, arrange_nothing)
+    assert [test_run.ticks for test_run in short.halted_runs] == [1, 2, 1, 2]
+    ticks = [test_run.ticks for test_run in SkillRuns("Patient", Patient, arrange_nothing).halted_runs]
     assert {1, 201, 202, 400} <= set(ticks)
     assert MAX_HALTS <= len(set(ticks)) <= MAX_HALTS + 2

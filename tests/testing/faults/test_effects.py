@@ -64,22 +64,22 @@ MISSIONS: list[tuple[ScheduledFault, str, list[str], str, int]] = [
     (during("*/Grasp", effects.seal_fails(), nth=2), "*/Grasp", ["missed"], "SUCCESS", 0),
     (during("*/Transit", effects.seal_breaks(), nth=1), "*/Transit", ["dropped"], "SUCCESS", 0),
     (during("*/Release", effects.tool_sticks(), nth=(2, 3, 4)), "*/Release", ["stuck"] * 3, "FAILURE", 5),
-    (during("*/Approach", effects.arm_runs_into("a hand"), nth=2), "*/Approach", ["blocked"], "SUCCESS", 0),
+    (during("*/Approach", effects.arm_collides("a hand"), nth=2), "*/Approach", ["blocked"], "SUCCESS", 0),
     (during("tree/look/*/Detect", effects.detector_dead(), nth=1), "*/Detect", ["unavailable"], "SUCCESS", 0),
     (during("*/Transit", effects.object_removed(), nth=2), "*/Transit", ["dropped"], "FAILURE", 0),
 ]
 """A fault, a pattern of nodes, their failures, the status of sort_overhead, and what it rejects."""
 MORE: list[tuple[ScheduledFault, str, list[str], str, int]] = [
     (
-        during("*/Transit", effects.arm_runs_into(), nth=(1, 2, 3)),
+        during("*/Transit", effects.arm_collides(), nth=(1, 2, 3)),
         "*/Transit",
         ["blocked"] * 3,
         "INCOMPLETE",
         1,
     ),
-    (during("*/Approach", effects.no_way(), nth=2), "*/Approach", ["unreachable"], "INCOMPLETE", 1),
+    (during("*/Approach", effects.no_path(), nth=2), "*/Approach", ["unreachable"], "INCOMPLETE", 1),
     (during("tree/look/*/Detect", effects.detector_unsure(), nth=1), "*/Detect", ["unsure"], "SUCCESS", 0),
-    (during("tree/look/*/Detect", effects.workspace_hidden(), nth=1), "*/Detect", ["hidden"], "SUCCESS", 0),
+    (during("tree/look/*/Detect", effects.workspace_occluded(), nth=1), "*/Detect", ["hidden"], "SUCCESS", 0),
     (during("*/watch/*/Localize", effects.no_depth(), nth=1), "*/Localize", ["no_depth"], "SUCCESS", 0),
     (during("*/watch/*/Localize", effects.table_bumped(), nth=1), "*/Localize", ["stale"], "SUCCESS", 0),
 ]
@@ -126,10 +126,10 @@ def answered(cell: FaultyCell, request: Request) -> float:
     ("script", "asked", "due", "found"),
     [
         ([effects.detector_dead()], 0.0, LATENCY, None),
-        ([effects.detector_given_up(2.0)], 0.0, 2.0 + LATENCY, None),
+        ([effects.detector_times_out(2.0)], 0.0, 2.0 + LATENCY, None),
         ([effects.detector_hangs()], 0.5, 0.5 + LATENCY, 3),
         ([effects.detector_hangs()], 1.0, 3.0, 3),
-        ([effects.detector_hangs(until=2.0)], 1.0, 2.0, 3),
+        ([effects.detector_hangs(hang_end=2.0)], 1.0, 2.0, 3),
         ([effects.detector_slow(0.7)], 1.0, 1.7 + LATENCY, 3),
         ([effects.detector_slow(0.2), effects.detector_slow(0.3)], 1.0, 1.5 + LATENCY, 3),
         ([effects.detector_blind()], 1.0, 1.0 + LATENCY, 0),
@@ -160,9 +160,9 @@ def test_an_unsure_detector_sees_everything_and_believes_nothing() -> None:
 
 
 @pytest.mark.parametrize("share", [0.2, 0.8])
-@pytest.mark.parametrize("name", ["seal_breaks", "arm_runs_into"])
+@pytest.mark.parametrize("name", ["seal_breaks", "arm_collides"])
 def test_it_happens_so_far_on_the_way(name: str, share: float) -> None:
-    cell: Any = cell_with(getattr(effects, name)(share=share))
+    cell: Any = cell_with(getattr(effects, name)(fraction=share))
     hold(cell)
     start = cell.cell.arm.tool_pose.position
     whole = follow(cell)
@@ -197,10 +197,10 @@ def test_a_seal_breaks_over_a_wrong_bin() -> None:
     cell.advance()
     hold(cell)
     cell.fake.world.held.position[:2] = cell.cell.bins["red_bin"].slots[0][:2]
-    cell._step()
+    cell._update_occurrences()
     assert cell.fake.tool.holding, "the red bin is right for a cube"
     cell.fake.world.held.position[:2] = cell.cell.bins["blue_bin"].slots[0][:2]
-    cell._step()
+    cell._update_occurrences()
     assert not cell.fake.tool.holding
 
 
@@ -218,7 +218,11 @@ def test_a_tool_that_sticks_lets_go_when_it_is_opened_once_more() -> None:
 
 @pytest.mark.parametrize(
     ("effect", "sealed"),
-    [(effects.seal_fails(), False), (effects.object_refuses(2), True), (effects.object_refuses(1), False)],
+    [
+        (effects.seal_fails(), False),
+        (effects.object_unsealable(2), True),
+        (effects.object_unsealable(1), False),
+    ],
 )
 def test_nothing_seals_or_one_object_does_not(effect: Effect, sealed: bool) -> None:
     cell: Any = cell_with(effect)
@@ -229,7 +233,7 @@ def test_nothing_seals_or_one_object_does_not(effect: Effect, sealed: bool) -> N
 
 @pytest.mark.parametrize(("is_blocked", "error"), [(False, Unreachable), (True, Blocked)])
 def test_no_way_is_found_after_the_usual_time(is_blocked: bool, error: type[Exception]) -> None:
-    cell: Any = cell_with(effects.no_way(is_blocked=is_blocked))
+    cell: Any = cell_with(effects.no_path(is_blocked=is_blocked))
     planning = cell.cell.arm.plan("aside")
     assert not planning.ready
     wait(cell, 1.0)
@@ -241,10 +245,10 @@ def test_no_way_is_found_after_the_usual_time(is_blocked: bool, error: type[Exce
 
 
 def test_nothing_that_the_arm_hides_is_believed_and_it_is_told_once_a_control_step() -> None:
-    cell: Any = cell_with(effects.workspace_hidden())
+    cell: Any = cell_with(effects.workspace_occluded())
     assert run_skill(Detect, cell).reason == "hidden"
     assert not cell.cell.camera.sees_table() and not cell.cell.camera.capture().visible.any()
-    assert [one.name for one in cell.events] == ["workspace_hidden"]
+    assert [one.name for one in cell.events] == ["workspace_occluded"]
     assert run_skill(Detect, cell, inputs={"hidden": "pass"}).outputs["detections"].found == ()
 
 
@@ -271,7 +275,7 @@ def test_the_nearest_is_none_that_lies_in_a_bin_or_hangs_at_the_tool() -> None:
 
 
 def node(cell: FaultyCell, item: str) -> None:
-    cell.hear(at(1, NodeStarted("tree/Approach", "Approach", item)))
+    cell.on_event(at(1, NodeStarted("tree/Approach", "Approach", item)))
 
 
 def test_the_object_of_a_node_is_what_the_ledger_takes_for_its_item() -> None:
@@ -300,7 +304,7 @@ def test_the_object_of_a_node_is_what_the_ledger_takes_for_its_item() -> None:
 def test_an_object_that_is_moved_is_out_of_the_tool_and_at_rest_elsewhere() -> None:
     cell: Any = cell_with(effects.object_moved((0.1, -0.05), 3))
     hold(cell, "duck")
-    cell._step()
+    cell._update_occurrences()
     duck = cell.fake.world.objects[2]
     assert duck.position[:2] == pytest.approx([0.55, 0.15])
     assert not cell.fake.tool.holding
@@ -308,7 +312,7 @@ def test_an_object_that_is_moved_is_out_of_the_tool_and_at_rest_elsewhere() -> N
 
 
 def test_with_a_share_an_object_waits_until_the_arm_is_so_far() -> None:
-    cell: Any = cell_with(effects.object_removed("nearest", share=0.5))
+    cell: Any = cell_with(effects.object_removed("nearest", fraction=0.5))
     wait(cell, 0.2)
     assert len(labels(cell)) == 3
     follow(cell)

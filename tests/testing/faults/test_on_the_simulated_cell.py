@@ -68,7 +68,7 @@ def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["seal_breaks", "arm_runs_into", "no_way"])
+@pytest.mark.parametrize("name", ["seal_breaks", "arm_collides", "no_path"])
 def test_what_falls_or_is_put_down_is_not_taken_for_something_else(name: str) -> None:
     script = [during("*/Transit", getattr(effects, name)(), nth=2)]
     assert run_mission("sort_overhead", oracle_cell(), faults=script).agrees
@@ -93,7 +93,7 @@ def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
 
 @pytest.mark.slow
 def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
-    hand = during("*/Approach", effects.arm_runs_into("a hand"), nth=2)
+    hand = during("*/Approach", effects.arm_collides("a hand"), nth=2)
     result = watched.run(hand, lambda cell: cell.cell.arm.at_rest)
     assert (watched.seen["FaultInjected"], watched.seen["blocked"]) == (False, True)
     failed = next(one for one in result.events if getattr(one.event, "reason", "") == "blocked")

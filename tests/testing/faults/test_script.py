@@ -26,12 +26,12 @@ from executive.testing.faults import (
     with_faults,
     with_probability,
 )
-from executive.testing.faults.script import DuringNode
+from executive.testing.faults.script import NodeActivations
 from executive.testing.faults.world_access import open_world
 from executive.testing.run_mission import MissionResult, run_mission
 
 SLIPS = effects.seal_fails()
-SHARE = "a share of a motion is more than 0 and less than 1"
+SHARE = "a fraction of a motion must be more than 0 and less than 1"
 
 
 def sorted_with(*script: ScheduledFault) -> MissionResult:
@@ -75,7 +75,7 @@ def test_after_a_time_it_lasts_until_the_end() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_chance_is_met_as_often_as_it_says(probability: float, seed: int) -> None:
     time = with_probability(probability, "*", SLIPS, seed=seed).time
-    assert isinstance(time, DuringNode)
+    assert isinstance(time, NodeActivations)
     share = sum(time.includes(number) for number in range(1, 401)) / 400
     # Four standard deviations.
     assert abs(share - probability) <= 4 * math.sqrt(probability * (1 - probability) / 400)
@@ -84,15 +84,15 @@ def test_a_chance_is_met_as_often_as_it_says(probability: float, seed: int) -> N
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: during("*", SLIPS, nth=0), "the number of an activation is at least 1, not 0"),
+        (lambda: during("*", SLIPS, nth=0), "the number of an activation must be at least 1, not 0"),
         (lambda: between(5, 5, SLIPS), "0 <= start < end, not 5 s and 5 s"),
         (lambda: after(-1, SLIPS), "not -1 s and inf s"),
-        (lambda: with_probability(1.5, "*", SLIPS, seed=0), "a probability is 0 to 1, not 1.5"),
+        (lambda: with_probability(1.5, "*", SLIPS, seed=0), "a probability must be 0 to 1, not 1.5"),
         (lambda: effects.seal_breaks(1.0), f"{SHARE}, not 1"),
-        (lambda: effects.arm_runs_into(share=0.0), f"{SHARE}, not 0"),
-        (lambda: effects.object_removed(share=1.0), f"{SHARE}, not 1"),
-        (lambda: effects.object_removed(0), "the number of an object is at least 1, not 0"),
-        (lambda: effects.object_moved((0.1, 0.0), -1), "the number of an object is at least 1, not -1"),
+        (lambda: effects.arm_collides(fraction=0.0), f"{SHARE}, not 0"),
+        (lambda: effects.object_removed(fraction=1.0), f"{SHARE}, not 1"),
+        (lambda: effects.object_removed(0), "the number of an object must be at least 1, not 0"),
+        (lambda: effects.object_moved((0.1, 0.0), -1), "the number of an object must be at least 1, not -1"),
         (lambda: effects.detector_slow(-0.5), "the delay of a detector must be at least 0 s, not -0.5 s"),
     ],
 )
@@ -125,7 +125,7 @@ def test_a_mission_waits_for_a_detector_and_a_test_for_a_mission_for_so_long_onl
     assert (result.status, result.agrees) == ("SUCCESS", True)
     script = [during("tree/look/*/Detect", effects.detector_hangs())]
     result = run_mission("sort_overhead", faults=script, timeout=5.0)
-    assert result.message == "the mission is not done after 5 s on its clock"
+    assert result.message == "the mission has not ended after 5 s on its clock"
 
 
 def test_everything_else_is_the_cell_that_it_wraps() -> None:
@@ -155,7 +155,9 @@ def test_the_world_of_a_wrapped_cell_is_opened_and_that_of_an_unknown_cell_is_re
     assert [thing.label for thing in open_world(CellWrapper(CellWrapper(fake))).objects] == ["cube"]
     gone = [after(0.0, effects.object_removed(1))]
     strange: Any = SimpleNamespace(cell=FakeCell().cell, advance=lambda: None)
-    with pytest.raises(InputError, match="faults cannot change the world of a SimpleNamespace; give `with"):
+    with pytest.raises(
+        InputError, match="faults cannot change the world of a SimpleNamespace; pass a function `open_world`"
+    ):
         FaultyCell(strange, gone).advance()
     with_faults(lambda **_: strange, gone, open_world=lambda _: open_world(fake))().advance()
     assert fake.world.objects == []

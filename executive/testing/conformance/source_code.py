@@ -14,8 +14,8 @@ from typing import Any, get_origin, get_type_hints
 from executive.cell.protocols import Cell, Clock
 from executive.skill import Skill, SkillFailed
 
-_CONVENTIONAL_TYPES: Mapping[str, Any] = {"cell": Cell, "clock": Clock, "skill": Skill}
-"""Types of arguments and local variables with these names."""
+_TYPES_BY_CONVENTIONAL_NAME: Mapping[str, Any] = {"cell": Cell, "clock": Clock, "skill": Skill}
+"""Assumed types of arguments and local variables, by their name."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,8 @@ class FunctionSource:
 
     Attributes:
         function: The function.
-        tree: Its syntax tree, with the file's line numbers.
-        skill: The skill that has or calls the function.
+        tree: Syntax tree of the function, with the line numbers of its file.
+        skill: The skill that defines the function or, directly or indirectly, calls it.
     """
 
     function: FunctionType
@@ -33,15 +33,15 @@ class FunctionSource:
     skill: type[Skill]
 
     def locate(self, node: ast.expr | ast.stmt) -> str:
-        """Return file and line of a node of the tree: `wave.py:12`."""
+        """Return file and line of a node of the tree, for instance `wave.py:12`."""
         return f"{Path(self.function.__code__.co_filename).name}:{node.lineno}"
 
     def resolve_callee(self, call: ast.Call) -> Any:
-        """Return the called function or class, or None if it is known only during a run."""
+        """Return the called function or class, or None if the source code does not determine it."""
         return self._resolve(call.func)
 
     def _resolve(self, node: ast.expr) -> Any:
-        """Return the value of an expression, or only its class, or None."""
+        """Return the value of an expression; its class if only this is known; None if neither is known."""
         if isinstance(node, ast.Attribute):
             return _find_member(self._resolve(node.value), node.attr)
         if not isinstance(node, ast.Name):
@@ -50,35 +50,35 @@ class FunctionSource:
             return self.skill
         code = self.function.__code__
         if node.id in (*code.co_varnames, *code.co_cellvars):
-            return _CONVENTIONAL_TYPES.get(node.id)
+            return _TYPES_BY_CONVENTIONAL_NAME.get(node.id)
         return self.function.__globals__.get(node.id)
 
 
-def list_functions(skill: type[Skill]) -> list[FunctionType]:
-    """Return the functions of a skill's class, followed by those of its base skills."""
+def list_skill_functions(skill: type[Skill]) -> list[FunctionType]:
+    """Return the functions that the class of a skill and its base classes define, in this order."""
     parents = [parent for parent in skill.__mro__ if issubclass(parent, Skill) and parent is not Skill]
     members = [member for parent in parents for member in vars(parent).values()]
-    plain = [getattr(member, "__func__", member) for member in members]
-    return [member for member in plain if isinstance(member, FunctionType)]
+    functions = [getattr(member, "__func__", member) for member in members]
+    return [member for member in functions if isinstance(member, FunctionType)]
 
 
-def find_files(skill: type[Skill]) -> list[Path]:
-    """Return the files with the code of a skill and of its base skills, in this order."""
-    return [*dict.fromkeys(Path(function.__code__.co_filename) for function in list_functions(skill))]
+def find_source_files(skill: type[Skill]) -> list[Path]:
+    """Return the source files of the class of a skill and of its base classes, in this order."""
+    return [*dict.fromkeys(Path(function.__code__.co_filename) for function in list_skill_functions(skill))]
 
 
-def find_own_line(skill: type[Skill], frames: Iterable[tuple[str, int]]) -> str:
-    """Return the first of the `(file, line)` in the skill's own files, as `wave.py:12`, or ""."""
-    files = set(map(str, find_files(skill)))
+def find_skill_line(skill: type[Skill], frames: Iterable[tuple[str, int]]) -> str:
+    """Return the first `(file, line)` that is in a source file of the skill, as `wave.py:12`, or ""."""
+    files = set(map(str, find_source_files(skill)))
     return next((f"{Path(file).name}:{line}" for file, line in frames if file in files), "")
 
 
 def walk_functions(skill: type[Skill]) -> Iterator[FunctionSource]:
-    """Yield the functions of a skill's class, and the called functions of the same package."""
+    """Yield the functions of a skill, and the functions of the same package that they call."""
     package = skill.__module__.partition(".")[0]
-    waiting, seen = list_functions(skill), set[FunctionType]()
-    while waiting:
-        function = waiting.pop(0)
+    pending, seen = list_skill_functions(skill), set[FunctionType]()
+    while pending:
+        function = pending.pop(0)
         if function in seen or (tree := _parse(function)) is None:
             continue
         seen.add(function)
@@ -88,17 +88,17 @@ def walk_functions(skill: type[Skill]) -> Iterator[FunctionSource]:
             function_source.resolve_callee(node) for node in ast.walk(tree) if isinstance(node, ast.Call)
         ]
         functions = [callee for callee in callees if isinstance(callee, FunctionType)]
-        waiting += [callee for callee in functions if callee.__module__.partition(".")[0] == package]
+        pending += [callee for callee in functions if callee.__module__.partition(".")[0] == package]
 
 
 def is_returning_steps(callee: Any) -> bool:
-    """Return True if a call returns an iterator of steps."""
+    """Return True if a call of the function returns an iterator of control steps."""
     returned = _find_return_type(callee)
     return inspect.isgeneratorfunction(callee) or (get_origin(returned) or returned) in (Iterator, Generator)
 
 
 def is_returning_failure(callee: Any) -> bool:
-    """Return True if a call returns a SkillFailed."""
+    """Return True if a call of the function or class returns a SkillFailed."""
     return SkillFailed in (callee, _find_return_type(callee))
 
 
@@ -109,11 +109,11 @@ def _find_return_type(callee: Any) -> Any:
     try:
         return get_type_hints(callee).get("return")
     except (NameError, AttributeError, TypeError):
-        return None  # The type is imported only for type checkers.
+        return None  # A name in an annotation is imported only for type checkers.
 
 
 def _find_member(owner: Any, name: str) -> Any:
-    """Return a member of a module or class, or the declared type of an attribute, or None."""
+    """Return the declared type of an attribute, or else the member of a module or class, or None."""
     if owner is None:
         return None
     if isinstance(owner, type) and not issubclass(owner, Skill) and name in get_type_hints(owner):
@@ -123,7 +123,7 @@ def _find_member(owner: Any, name: str) -> Any:
 
 
 def _parse(function: FunctionType) -> ast.AST | None:
-    """Return the syntax tree of a function, or None without source text."""
+    """Return the syntax tree of a function, or None if its source code is not available."""
     try:
         lines, first = inspect.getsourcelines(function)
         tree = ast.parse(textwrap.dedent("".join(lines)))

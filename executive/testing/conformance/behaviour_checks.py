@@ -1,0 +1,233 @@
+"""Rules for the behaviour of a skill: in each situation, under each fault, and with a halt at any tick.
+
+Each public function is a rule: its docstring states the rule, and it yields one text per violation.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Union, get_args, get_origin
+
+from executive.mission.model.port_types import describe_type, find_element_type
+from executive.skill import ANY, EMPTY, HOLDING, ToolState
+from executive.testing.conformance.declaration_checks import HALT
+from executive.testing.conformance.situations import ArrangementFailed
+from executive.testing.conformance.skill_runs import SkillRuns, TickNotReturned
+from executive.testing.conformance.skill_test_run import MAX_TIME, SkillTestRun, has_equal_pickle
+
+MAX_TICK_TIME = 0.05
+"""Maximum computing time of a tick [s]."""
+
+_ACTIONS = ("arm.start", "arm.stop", "tool.open", "tool.close", "camera.capture")
+"""Commands to parts of the cell; the part must be in `uses` of the skill."""
+_MEASUREMENTS = ("camera.capture", "operator.ask")
+"""Calls that return new information; they require `senses` of the skill."""
+
+
+def can_succeed(runs: SkillRuns) -> Iterator[str]:
+    """The skill can be tested, and succeeds in at least one situation."""
+    try:
+        _ = runs.situations
+    except ArrangementFailed as error:
+        yield f"{runs.name} cannot be tested: {error}"
+        return
+    if not any(test_run.status == "SUCCESS" for test_run in runs.complete_runs):
+        yield (
+            f"{runs.name} never succeeded; {runs.complete_runs[0].ending}. "
+            "Set up a scene in which it succeeds: "
+            f"list_conformance_checks({runs.skill.__name__}, lambda scene: ...); "
+            "skills/README.md has an example."
+        )
+
+
+def terminates(runs: SkillRuns) -> Iterator[str]:
+    """Each tick returns, and the skill ends within 60 s on the run's clock."""
+    try:
+        _ = runs.complete_runs, runs.halted_runs
+    except TickNotReturned as error:
+        yield str(error)
+        return
+    for test_run in runs.complete_runs:
+        if test_run.status == "RUNNING":
+            yield (
+                f"{test_run.description} {runs.name} was still running after {MAX_TIME:g} s. "
+                "Limit the duration of each wait, and fail with a reason when it expires."
+            )
+
+
+def ends_as_declared(runs: SkillRuns) -> Iterator[str]:
+    """Under each fault the skill succeeds with all outputs, or fails with a declared reason and a message."""
+    for test_run in runs.complete_runs:
+        place = f"{test_run.description} at tick {test_run.ticks}"
+        if test_run.status == "FAULT":
+            yield (
+                f"{place} {test_run.message}. This is a fault, which ends the run: fail with a declared "
+                "reason, or correct the code."
+            )
+        elif test_run.status == "FAILURE" and not test_run.message.strip():
+            yield (
+                f'{place} it failed with "{test_run.reason}" and no message. '
+                "State what happened, with numbers: the operator reads only this message."
+            )
+
+
+def has_outputs_of_declared_types(runs: SkillRuns) -> Iterator[str]:
+    """Each output has its declared type."""
+    for test_run in runs.complete_runs:
+        for name, value in test_run.outputs.items():
+            declared = runs.skill.ports[name].type
+            if not _is_of_type(value, declared):
+                yield (
+                    f"{test_run.description} {runs.name}.{name} is of the type {type(value).__name__}, not "
+                    f"{describe_type(declared)}. Set a value of this type, or change the declaration."
+                )
+
+
+def leaves_inputs_unchanged(runs: SkillRuns) -> Iterator[str]:
+    """The skill does not change its params and inputs."""
+    for test_run in runs.complete_runs:
+        for name in test_run.changed_names:
+            yield (
+                f"{test_run.description} it changed the value of self.{name}. "
+                "Other nodes read the same value later: change a copy."
+            )
+
+
+def uses_only_declared_parts(runs: SkillRuns) -> Iterator[str]:
+    """The skill commands only parts in `uses`, moves only with `moves`, and senses only with `senses`."""
+    skill = runs.skill
+    for name in dict.fromkeys(call.name for test_run in runs.complete_runs for call in test_run.calls):
+        part = name.partition(".")[0]
+        if name in _ACTIONS and part not in skill.uses:
+            yield f'{runs.name} calls cell.{name} and does not declare the {part}. Add "{part}" to uses.'
+        if name == "arm.start" and not skill.moves:
+            yield f"{runs.name} calls cell.{name} and does not declare that it moves. Add moves = True."
+        if name in _MEASUREMENTS and not skill.senses:
+            yield f"{runs.name} calls cell.{name} and does not declare that it senses. Add senses = True."
+
+
+def leaves_tool_as_declared(runs: SkillRuns) -> Iterator[str]:
+    """After success, each failure and a halt at any tick, the tool is in the declared state."""
+    for test_run in _find_first_violations(
+        [*runs.complete_runs, *runs.halted_runs],
+        lambda test_run: bool(_describe_tool_problem(runs, test_run)),
+    ):
+        yield _describe_tool_problem(runs, test_run)
+
+
+def leaves_arm_at_rest(runs: SkillRuns) -> Iterator[str]:
+    """If the skill started the arm, the arm is at rest after the end or a halt of the skill."""
+    for test_run in _find_first_violations([*runs.complete_runs, *runs.halted_runs], _has_left_arm_moving):
+        yield (
+            f"{test_run.ending}, and the arm still moves. "
+            "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
+        )
+
+
+def halts_in_one_tick(runs: SkillRuns) -> Iterator[str]:
+    """A halt at any tick ends the skill in the same tick, without an exception."""
+    for test_run in _find_first_violations(runs.halted_runs, lambda test_run: test_run.status == "FAULT"):
+        yield (
+            f"{test_run.description} at tick {test_run.ticks} {test_run.message}. "
+            "The code in finally must take no control step and raise no exception."
+        )
+
+
+def is_deterministic(runs: SkillRuns) -> Iterator[str]:
+    """In equal situations the skill makes equal calls at equal ticks, and ends equally."""
+    for _, first, second in runs.repeated_runs:
+        if difference := _describe_difference(first, second):
+            yield (
+                f"{first.description}, in two equal runs, {difference}. "
+                "The skill may not depend on chance, wall time or earlier runs; a seed may be a param."
+            )
+
+
+def has_short_ticks(runs: SkillRuns) -> Iterator[str]:
+    """No tick computes for longer than 50 ms in the faster of two equal runs."""
+    for _, first, second in runs.repeated_runs:
+        tick_times = list(map(min, first.tick_times, second.tick_times))
+        longest = max(tick_times, default=0.0)
+        if longest > MAX_TICK_TIME:
+            yield (
+                f"{first.description} tick {tick_times.index(longest)} computed for {longest * 1000:.0f} ms, "
+                "which blocks the arm. Distribute the work over ticks with yield, or do it in a detector."
+            )
+
+
+def _describe_difference(run: SkillTestRun, other: SkillTestRun) -> str:
+    """Return a description of the first difference between two runs, or ""."""
+    for first, second in zip(run.calls, other.calls, strict=False):
+        if (first.tick, first.name) != (second.tick, second.name):
+            return f"it called {first.name} at tick {first.tick} and then {second.name} at tick {second.tick}"
+        if not has_equal_pickle(first.arguments, second.arguments):
+            return f"it called {first.name} at tick {first.tick} with different arguments"
+    if (run.ticks, run.status) != (other.ticks, other.status):
+        return (
+            f"it ended as {run.status} after {run.ticks} ticks and then as {other.status} after {other.ticks}"
+        )
+    return "" if has_equal_pickle(run.outputs, other.outputs) else "it set its outputs to different values"
+
+
+def _find_first_violations(
+    test_runs: Iterable[SkillTestRun], is_violation: Callable[[SkillTestRun], bool]
+) -> Iterable[SkillTestRun]:
+    """Return, for each situation, the first run that violates a rule."""
+    first_by_situation: dict[str, SkillTestRun] = {}
+    for test_run in filter(is_violation, test_runs):
+        first_by_situation.setdefault(test_run.description, test_run)
+    return first_by_situation.values()
+
+
+def _has_left_arm_moving(test_run: SkillTestRun) -> bool:
+    has_ended = test_run.status in ("SUCCESS", "FAILURE", "HALTED")
+    return has_ended and test_run.has_moved and not test_run.is_at_rest
+
+
+def _describe_tool_problem(runs: SkillRuns, test_run: SkillTestRun) -> str:
+    """Return the violation of the declared tool state at the end of a run, or ""."""
+    if test_run.status not in ("SUCCESS", "FAILURE", "HALTED"):
+        return ""
+    required, requirement = _find_required_tool_state(runs, test_run)
+    if required is not ANY and (required is HOLDING) != test_run.holds_after:
+        actual = "holds something" if test_run.holds_after else "is empty"
+        should = "hold something" if required is HOLDING else "be empty"
+        return (
+            f"{test_run.ending}, and the tool {actual}. It should {should}, {requirement}. "
+            "Leave the tool in this state, or change the declaration."
+        )
+    if test_run.holds_after and not test_run.is_item_held:
+        return (
+            f"{test_run.ending}, and the tool holds an object that is not in the ledger. "
+            "Call cell.ledger.record_grasp, or open the tool in finally."
+        )
+    return ""
+
+
+def _find_required_tool_state(runs: SkillRuns, test_run: SkillTestRun) -> tuple[ToolState, str]:
+    """Return the required state of the tool at the end of a run, and the declaration that requires it."""
+    before = HOLDING if test_run.holds_before else EMPTY
+    if test_run.status == "SUCCESS":
+        after = runs.skill.tool_state[1]
+        return (before, "as before") if after is ANY else (after, "by tool_state")
+    name = HALT if test_run.status == "HALTED" else test_run.reason
+    if name in runs.skill.tool_left:
+        return runs.skill.tool_left[name], f'by tool_left["{name}"]'
+    return before, f'as before, because tool_left has no "{name}"'
+
+
+def _is_of_type(value: Any, declared: Any) -> bool:
+    """Return True if a value, and each element of a list, has the declared type."""
+    if declared is Any:
+        return True
+    origin = get_origin(declared)
+    if origin in (Union, types.UnionType):
+        return any(_is_of_type(value, part) for part in get_args(declared))
+    if declared is float:
+        return isinstance(value, float | int)
+    kind = origin or declared
+    if isinstance(kind, type) and not isinstance(value, kind):
+        return False
+    element = None if isinstance(value, str | Mapping) else find_element_type(declared)
+    return element is None or all(_is_of_type(item, element) for item in value)

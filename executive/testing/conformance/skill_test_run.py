@@ -1,0 +1,211 @@
+"""Test run of a skill: one run in a situation, to its end or to a halt, with a record of its calls."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from time import perf_counter
+from traceback import extract_tb, walk_stack
+from types import FrameType
+from typing import Any
+
+from executive.cell.clock import STEP
+from executive.cell.protocols import Cell
+from executive.cell.proxy import Access, intercept
+from executive.errors import Fault
+from executive.events import NodeStarted, TimedEvent
+from executive.skill import Skill, SkillFailed
+from executive.testing.conformance.faults import NamedFault
+from executive.testing.conformance.situations import Arrange, Situation, prepare_scene
+from executive.testing.conformance.source_code import find_skill_line
+from executive.testing.faults import FaultyCell, during
+from executive.tree.skill_run import SkillRun
+
+MAX_TIME = 60.0
+"""Maximum duration of a skill on the run's clock [s]; no skill needs as long on the fake cell."""
+STUCK_TIMEOUT = 10.0
+"""Wall time without a new tick after which a tick counts as stuck [s]."""
+PROGRESS_CHECKS = 2
+"""Number of timer signals within `STUCK_TIMEOUT`: a suspended machine wakes up with only one of them."""
+_OBSERVED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "localizer", "operator")
+
+
+@dataclass(frozen=True)
+class Call:
+    """A recorded call of a method of a part of the cell.
+
+    Attributes:
+        tick: Number of the control step of the call, from 0.
+        name: Part and method, for instance `arm.start`.
+        arguments: Arguments of the call.
+    """
+
+    tick: int
+    name: str
+    arguments: tuple[Any, ...]
+
+
+class SkillTestRun:
+    """One run of a skill, which is ticked as in a behaviour tree; the constructor executes the run.
+
+    Args:
+        skill: Class of the skill.
+        situation: Situation in which the run begins.
+        arrange: Function of the author of the skill that changes the scene and returns values.
+        fault: Injected fault; None: no fault.
+        halt_at: Control step before which the skill is halted; None: no halt.
+
+    Attributes:
+        description: Situation and fault, as the beginning of a sentence.
+        status: `SUCCESS`; `FAILURE`; `HALTED`; `RUNNING`: no end within `MAX_TIME`; `STUCK`: a tick did not
+            return; `FAULT`: the skill raised an exception or violated its declarations.
+        reason: Reason of a failure, or "".
+        message: Message of a failure or fault, or duration and place of a stuck tick.
+        ticks: Number of complete control steps.
+        outputs: Values of the output ports by name, after success.
+        calls: All calls of parts of the cell, in order.
+        tick_times: Computing time of each tick [s].
+        changed_names: Names of the params and inputs whose values the skill changed.
+        holds_before: True if the tool held an object at the start.
+        holds_after: True if the tool holds an object at the end.
+        is_item_held: True if the tool holds an item at the end according to the ledger.
+        is_at_rest: True if the arm is at rest at the end.
+    """
+
+    def __init__(
+        self,
+        skill: type[Skill],
+        situation: Situation,
+        arrange: Arrange,
+        fault: NamedFault | None = None,
+        halt_at: int | None = None,
+    ) -> None:
+        scene, values = prepare_scene(skill, situation, arrange)
+        fake = scene.cell
+        before = values if halt_at else copy.deepcopy(values, {id(fake): fake})
+        script = [during("*", fault.effect)] * fault.count if fault else []
+        cell = FaultyCell(fake, script)
+        self.description = f"{situation.name} {fault.name}" if fault else situation.name
+        self.reason = self.message = ""
+        self.ticks, self._skill, self._halt_at = 0, skill, halt_at
+        self.outputs: Mapping[str, Any] = {}
+        self.calls, self.tick_times = list[Call](), list[float]()
+        self.holds_before = fake.tool.holding
+        observed_cell = intercept(cell.cell, self._record_call, _OBSERVED_ROLES)
+        try:
+            with detect_stuck_ticks(skill, lambda: self.ticks):
+                self.status = self._run_skill(values, cell, observed_cell, fault.tick if fault else 0)
+        except TickStuck as stuck:
+            self.status, self.message = "STUCK", str(stuck)
+        self.changed_names = [name for name in values if not has_equal_pickle(values[name], before[name])]
+        self.holds_after, self.is_item_held = fake.tool.holding, fake.ledger.find_held_item() is not None
+        self.is_at_rest = fake.arm.at_rest
+
+    @property
+    def ending(self) -> str:
+        """Situation, fault and result of the run, as a part of a sentence."""
+        texts = {
+            "SUCCESS": "it succeeded",
+            "FAILURE": f'it failed with "{self.reason}" ({self.message})',
+            "HALTED": f"it was halted at tick {self.ticks}",
+            "RUNNING": "it was still running",
+        }
+        return f"{self.description} {texts.get(self.status, f'it ended as a fault: {self.message}')}"
+
+    @property
+    def has_moved(self) -> bool:
+        """True if the skill started the arm."""
+        return any(call.name == "arm.start" for call in self.calls)
+
+    def _record_call(self, access: Access) -> Any:
+        if access.is_call and access.role in _OBSERVED_ROLES:
+            self.calls.append(Call(self.ticks, access.name, access.all_arguments))
+        return access.proceed()
+
+    def _run_skill(
+        self, values: Mapping[str, Any], cell: FaultyCell, observed_cell: Cell, fault_tick: int
+    ) -> str:
+        """Tick the skill until its end or halt, and return the status."""
+        skill = self._skill
+        run: SkillRun | None = None
+        try:
+            while self.ticks < MAX_TIME / STEP:
+                if run is not None and self.ticks == self._halt_at:
+                    run.halt()
+                    return "HALTED"
+                if self.ticks == fault_tick:
+                    cell.on_event(TimedEvent(0, 0.0, NodeStarted("skill")))
+                start = perf_counter()
+                run = run or SkillRun(skill(**values), observed_cell)
+                has_succeeded = run.step()
+                self.tick_times.append(perf_counter() - start)
+                if has_succeeded:
+                    self.outputs = run.read_outputs()
+                    return "SUCCESS"
+                cell.advance()
+                self.ticks += 1
+        except SkillFailed as failure:
+            self.reason, self.message = failure.reason, failure.message
+            return "FAILURE"
+        except Exception as error:
+            frames = extract_tb(error.__traceback__)
+            place = find_skill_line(
+                skill, ((frame.filename, frame.lineno or 0) for frame in reversed(frames))
+            )
+            kind = "" if isinstance(error, Fault) else f"{type(error).__name__}: "
+            self.message = f"{kind}{error}" + (f" ({place})" if place else "")
+            return "FAULT"
+        return "RUNNING"
+
+
+class TickStuck(BaseException):
+    """A tick did not return; the message, after the name of the skill, is a sentence with duration and place.
+
+    Not a subclass of Exception, so that a skill that catches exceptions is interrupted, too.
+    """
+
+
+@contextmanager
+def detect_stuck_ticks(skill: type[Skill], count_ticks: Callable[[], int]) -> Iterator[None]:
+    """Interrupt the body if `count_ticks` returns the same number during `STUCK_TIMEOUT`.
+
+    Bodies in other threads than the main thread are not interrupted: Python handles signals only there.
+
+    Raises:
+        TickStuck: The body was interrupted.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    last_tick, unchanged_checks = count_ticks(), 0
+
+    def on_timer(_: int, frame: FrameType | None) -> None:
+        nonlocal last_tick, unchanged_checks
+        tick = count_ticks()
+        unchanged_checks, last_tick = (unchanged_checks + 1 if tick == last_tick else 0), tick
+        if unchanged_checks >= PROGRESS_CHECKS:
+            place = find_skill_line(skill, ((f.f_code.co_filename, line) for f, line in walk_stack(frame)))
+            raise TickStuck(f"did not return for {STUCK_TIMEOUT:g} s{place and f', at {place}'}")
+
+    old_handler = signal.signal(signal.SIGALRM, on_timer)
+    old_timer = signal.setitimer(
+        signal.ITIMER_REAL, STUCK_TIMEOUT / PROGRESS_CHECKS, STUCK_TIMEOUT / PROGRESS_CHECKS
+    )
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, *old_timer)
+        signal.signal(signal.SIGALRM, old_handler or signal.SIG_DFL)
+
+
+def has_equal_pickle(value: Any, other: Any) -> bool:
+    """Return True if the pickles of two values are equal, or a value cannot be pickled."""
+    try:
+        return pickle.dumps(value) == pickle.dumps(other)
+    except (pickle.PicklingError, TypeError, AttributeError):
+        return True
