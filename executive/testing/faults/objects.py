@@ -26,7 +26,7 @@ def object_removed(choice: ObjectChoice = "node", fraction: float | None = None)
     """Return an effect: an object is removed once, also if the tool holds it.
 
     Args:
-        choice: The object, see `ObjectChoice`.
+        choice: Number of the object from 1, `nearest` to the tool, or the object of the `node`.
         fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
 
     Raises:
@@ -40,7 +40,7 @@ def object_moved(displacement: Pair, choice: ObjectChoice = "node", fraction: fl
 
     Args:
         displacement: Displacement along x and y [m]; a simulated object at the destination is pushed aside.
-        choice: The object, see `ObjectChoice`.
+        choice: Number of the object from 1, `nearest` to the tool, or the object of the `node`.
         fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
 
     Raises:
@@ -55,7 +55,7 @@ def object_bumped(x: Pair, y: Pair, choice: ObjectChoice = "node", fraction: flo
     Args:
         x: Allowed interval of x of the new place [m].
         y: Allowed interval of y of the new place [m].
-        choice: The object, see `ObjectChoice`.
+        choice: Number of the object from 1, `nearest` to the tool, or the object of the `node`.
         fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
 
     Raises:

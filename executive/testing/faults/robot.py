@@ -1,6 +1,6 @@
 """Faults of arm, tool, camera, localizer, table and operator.
 
-An effect that does not happen once lasts as long as its fault.
+An effect lasts as long as its fault, unless it happens once.
 """
 
 from __future__ import annotations
