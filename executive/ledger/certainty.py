@@ -1,4 +1,4 @@
-"""Rules by which an item is certain enough to be sorted, or so uncertain that it is rejected."""
+"""Rules for items that are certain enough to be sorted, and for items that are rejected as uncertain."""
 
 from __future__ import annotations
 
@@ -10,106 +10,111 @@ from executive.cell.config import LedgerConfig
 from executive.ledger.association import MIN_EXISTENCE_PROBABILITY
 from executive.ledger.item import REASON_UNCERTAIN, Record, State
 
-MIN_P_VALUE, REJECTION_P_VALUE = 0.01, 0.001
-"""Minimum p-value of the test whether the looks agree on the class of an item, to sort and to keep it."""
+MIN_P_VALUE = 0.01
+"""Minimum p-value of the class-consistency test (`Belief.p_value`) of an item that is sorted."""
+REJECTION_P_VALUE = 0.001
+"""p-value of the class-consistency test below which an item is rejected after `MIN_LOOKS_TO_REJECT` looks."""
 RETRY_STANDARD_ERROR_FACTOR = 2 / 3
-"""Factor on the allowed standard error of an item's position after a failed grasp."""
+"""Factor on the maximum standard error of an item's position after a failed grasp."""
 MIN_MISS_PROBABILITY = 0.1
-"""An item is picked only if the probability is larger that all looks since its last detection missed it."""
+"""Minimum probability, for a pick, that all looks since the last detection missed the item by chance."""
 MIN_LOOKS_TO_REJECT = 40
-"""Number of looks from which an item is rejected if they disagree about its class."""
+"""Minimum number of looks before an item is rejected because they disagree about its class."""
 MIN_CONTRADICTIONS_TO_REJECT = 3
-"""Number of contradicting looks from which an item may be rejected."""
-MAX_REPEATS = 2
-"""Number of repeats from a viewpoint after which more looks from it add hardly any evidence."""
+"""Minimum number of looks with evidence against the class of an item before the item is rejected."""
+MIN_REPEATS_FOR_SATURATION = 2
+"""Number of repeated answers from a viewpoint after which more looks from it add hardly any evidence."""
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
-"""Maximum probability of a wrong class for a touch, if the height of the touch determines the class."""
+"""Maximum class error of an item that may be touched to determine its class by its height."""
 MAX_UNCERTAIN_LOOKS = 10
-"""Number of looks without a confident detection of an item, from which the item is rejected."""
+"""Number of consecutive looks with only low-confidence detections of an item that lead to its rejection."""
 
 
 @dataclass(frozen=True)
 class Certainty:
     """Decides which items are certain enough to be sorted, and which are rejected.
 
+    A look is an image with its detections.
+
     Attributes:
-        config: Limits of the cell file.
-        distinct_by_touch: Classes whose height distinguishes them from all others.
+        config: Thresholds of the ledger, from the cell file.
+        labels_with_unique_height: Classes whose height distinguishes them from all others.
     """
 
     config: LedgerConfig
-    distinct_by_touch: Collection[str]
+    labels_with_unique_height: Collection[str]
 
-    def is_sure(self, record: Record) -> bool:
-        """Return True if an item's existence, class and position are certain enough.
+    def is_certain(self, record: Record) -> bool:
+        """Return True if an item's existence, class and position are certain enough to touch the item.
 
-        After a failed grasp, the position must be known more precisely. If looks from one viewpoint cannot
-        prove the class, but a touch can, the item is certain enough to be touched.
+        After a failed grasp, the position must be known more precisely. If more looks from the same viewpoint
+        cannot prove the class, but the height of a touch can, a larger class error is permitted.
         """
-        belief, limit = record.belief, self.config.misjudged
-        if belief.repeats >= MAX_REPEATS and record.label in self.distinct_by_touch:
-            limit = MAX_CLASS_ERROR_FOR_TOUCH
-        max_error = self.config.aim * (RETRY_STANDARD_ERROR_FACTOR if record.attempts else 1.0)
+        belief, max_class_error = record.belief, self.config.misjudged
+        is_saturated = belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
+        if is_saturated and record.label in self.labels_with_unique_height:
+            max_class_error = MAX_CLASS_ERROR_FOR_TOUCH
+        max_error = self.config.aim * (RETRY_STANDARD_ERROR_FACTOR if record.attempt_count else 1.0)
         return (
-            belief.probability >= MIN_EXISTENCE_PROBABILITY
-            and record.contradictions <= belief.looks
+            belief.existence_probability >= MIN_EXISTENCE_PROBABILITY
+            and record.contradiction_count <= belief.look_count
             and belief.miss_probability >= MIN_MISS_PROBABILITY
-            and belief.class_error <= limit
+            and belief.class_error <= max_class_error
             and belief.p_value >= MIN_P_VALUE
-            and math.hypot(record.std, record.bias) <= max_error
+            and math.hypot(record.standard_error, record.bias_std) <= max_error
         )
 
-    def is_possible(self, record: Record) -> bool:
-        """Return True if an open item may lie on the table."""
-        may_exist = record.belief.probability > self.config.overlooked
-        return record.state is State.SEEN and may_exist and not self.is_gone(record)
+    def may_be_on_table(self, record: Record) -> bool:
+        """Return True if an item in the state SEEN may still lie on the table."""
+        may_exist = record.belief.existence_probability > self.config.overlooked
+        return record.state is State.SEEN and may_exist and not self.is_position_empty(record)
 
-    def is_gone(self, record: Record) -> bool:
-        """Return True if looks have found the position of an item empty."""
+    def is_position_empty(self, record: Record) -> bool:
+        """Return True if looks have missed an item so often that its position is almost certainly empty."""
         return record.belief.miss_probability <= self.config.overlooked
 
     def reject_if_uncertain(self, record: Record, *, is_settled: bool) -> None:
-        """Reject an item if looks cannot prove its class, disagree about it, or remain unsure of the item.
+        """Reject an item in the state SEEN if more looks are unlikely to make the item certain.
 
         Args:
             record: The item.
-            is_settled: True if nothing may have moved the item since its last detection.
+            is_settled: True if the item cannot have moved since its last detection.
         """
         belief = record.belief
-        is_known = is_settled and self.is_sure(record)
-        if is_known:
-            belief.uncertain_looks = 0
+        is_certain = is_settled and self.is_certain(record)
+        if is_certain:
+            belief.uncertain_look_count = 0
         if record.state is not State.SEEN:
             return
-        if belief.looks >= MIN_LOOKS_TO_REJECT and belief.p_value < REJECTION_P_VALUE:
+        if belief.look_count >= MIN_LOOKS_TO_REJECT and belief.p_value < REJECTION_P_VALUE:
             counts = ", ".join(f"{count} {label}" for label, count in belief.label_counts.most_common())
-            record.set_state(State.REJECTED, f"its class is in doubt: {counts}")
+            record.set_state(State.REJECTED, f"looks disagree about its class: {counts}")
         elif self._cannot_prove_class(record):
-            chance = f"leave a chance of {belief.class_error:.1%} that it is no {record.label}"
+            error = f"leave a probability of {belief.class_error:.1%} that it is no {record.label}"
             limit = f"at most {self.config.misjudged:.1%} is allowed"
-            record.set_state(State.REJECTED, f"{belief.looks} looks from one pose {chance}; {limit}")
-        elif not is_known and (
-            belief.uncertain_looks >= MAX_UNCERTAIN_LOOKS
-            or record.contradictions >= max(MIN_CONTRADICTIONS_TO_REJECT, belief.looks + 1)
+            record.set_state(State.REJECTED, f"{belief.look_count} looks from one pose {error}; {limit}")
+        elif not is_certain and (
+            belief.uncertain_look_count >= MAX_UNCERTAIN_LOOKS
+            or record.contradiction_count >= max(MIN_CONTRADICTIONS_TO_REJECT, belief.look_count + 1)
         ):
-            details = f": {record.contradiction}" if record.contradiction else ""
+            details = f": {record.last_contradiction}" if record.last_contradiction else ""
             record.set_state(State.REJECTED, REASON_UNCERTAIN + details)
             belief.log_odds = max(belief.log_odds, 0.0)
 
-    def count_low_touch(self, record: Record) -> bool:
-        """Count a touch that is too low for the class; return True if the touch may have missed the top.
+    def register_low_touch(self, record: Record) -> bool:
+        """Count a touch below the height of the class; return True if the touch may have missed the top.
 
         Only the first low touch may have missed the top, and only if looks alone prove the class.
         """
-        record.low_touches += 1
-        return record.low_touches == 1 and record.belief.class_error <= self.config.misjudged
+        record.low_touch_count += 1
+        return record.low_touch_count == 1 and record.belief.class_error <= self.config.misjudged
 
     def _cannot_prove_class(self, record: Record) -> bool:
-        """Return True if all looks came from one viewpoint, and neither looks nor a touch prove the class."""
+        """Return True if neither more looks from the only viewpoint so far nor a touch prove the class."""
         belief = record.belief
         return (
             belief.class_error > self.config.misjudged
-            and belief.repeats >= MAX_REPEATS
-            and len(belief.answers) == 1
-            and record.label not in self.distinct_by_touch
+            and belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
+            and len(belief.last_label_by_viewpoint) == 1
+            and record.label not in self.labels_with_unique_height
         )

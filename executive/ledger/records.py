@@ -1,4 +1,4 @@
-"""Collection of the records of all items, which emits each change of an item as an event."""
+"""Collection of the records of all items; each change of an item is emitted as an event."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from executive.ledger.item import Record, State
 
 
 class Records:
-    """The items of a run, in the order of the first detection.
+    """Records of the items of a run, in the order of the first detection.
 
     Args:
-        emit: Takes the events.
+        emit: Function that receives the events.
     """
 
     def __init__(self, emit: Emit) -> None:
@@ -26,14 +26,14 @@ class Records:
         self._name_counts: Counter[str] = Counter()
 
     def __iter__(self) -> Iterator[Record]:
-        """Yield all items; items may be added and removed during the iteration."""
+        """Return an iterator over all records; records may be added and removed during the iteration."""
         return iter(list(self._records.values()))
 
     def find(self, item: Item) -> Record:
         """Return the record of an item.
 
         Raises:
-            Fault: There is no item of this name.
+            Fault: No item has this name.
         """
         try:
             return self._records[item]
@@ -41,33 +41,45 @@ class Records:
             known = ", ".join(self._records) or "none"
             raise Fault(f'the ledger knows no item "{item}"; it knows: {known}') from None
 
-    def add(self, belief: Belief, position: Array, epoch: int, stamp: float, has_appeared: bool) -> Record:
-        """Add an item, named by its class and a number, and return it; see `Record` for the arguments."""
+    def add(
+        self, belief: Belief, position: Array, change_count: int, stamp: float, *, appeared_during_run: bool
+    ) -> Record:
+        """Add an item with the name `<class>-<number>`, and return its record.
+
+        Args:
+            belief: Existence and class of the item.
+            position: Position of the item `(3,)` [m].
+            change_count: Number of changes of the table before the detection.
+            stamp: Capture time of the detection [s].
+            appeared_during_run: True if earlier looks had found the position empty.
+        """
         label = belief.first_label
         self._name_counts[label] += 1
-        record = Record(f"{label}-{self._name_counts[label]}", belief, position, epoch, stamp, has_appeared)
-        self._records[record.item] = record
+        name = f"{label}-{self._name_counts[label]}"
+        record = Record(name, belief, position, change_count, stamp, appeared_during_run)
+        self._records[name] = record
         return record
 
     def remove(self, record: Record) -> None:
-        """Remove an item that no event has reported."""
+        """Remove an item; no event may have reported the item before."""
         del self._records[record.item]
 
-    def report(self, record: Record) -> None:
-        """Emit the present state of an item."""
+    def emit_item(self, record: Record) -> None:
+        """Emit the present state of an item as an event."""
         self._emit(record.summary)
 
-    def change(self, record: Record, state: State) -> None:
-        """Change the state of an item."""
+    def change_state(self, record: Record, state: State) -> None:
+        """Set the state of an item, and emit the item."""
         record.state = state
-        self.report(record)
+        self.emit_item(record)
 
-    def place(self, record: Record, bin: str) -> None:
-        """Record that an item is in a bin."""
+    def set_placed(self, record: Record, bin: str) -> None:
+        """Set the state of an item to PLACED in the bin with the name `bin`."""
         record.bin = bin
-        self.change(record, State.PLACED)
+        self.change_state(record, State.PLACED)
 
     def reject(self, record: Record, reason: str) -> None:
-        """Reject an item; a held or dropped item keeps its state, with the reason of the later rejection."""
-        record.reason = f"{reason}: {record.contradiction}" if record.contradiction else reason
-        self.change(record, record.state if record.state in (State.HELD, State.DROPPED) else State.REJECTED)
+        """Reject an item; a held or dropped item keeps its state until it lies on the table again."""
+        record.reason = f"{reason}: {record.last_contradiction}" if record.last_contradiction else reason
+        is_off_table = record.state in (State.HELD, State.DROPPED)
+        self.change_state(record, record.state if is_off_table else State.REJECTED)

@@ -1,4 +1,4 @@
-"""Recovery of the items that the tool may have moved after the last event of an incomplete journal."""
+"""Recovery of items that the tool may have moved after the last event of an incomplete journal."""
 
 from __future__ import annotations
 
@@ -14,68 +14,70 @@ from executive.ledger.records import Records
 
 
 class Recovery:
-    """Search for items that the tool may have moved while nothing was recorded, on the table and in the bins.
+    """Search, on the table and in the bins, for items that the tool may have moved without a record.
 
     Args:
         records: All items.
-        bins: The bins.
+        bins: Bins of the cell.
     """
 
     def __init__(self, records: Records, bins: Bins) -> None:
         self._records, self._bins = records, bins
-        self._looks: dict[str, list[Counter[str]]] = defaultdict(list)
+        self._label_counts_by_bin: dict[str, list[Counter[str]]] = defaultdict(list)
+        """Number of visible objects of each class, by bin, in each look that shows the whole bin."""
 
-    def search(self, records: Collection[Record], epoch: int) -> None:
+    def mark_as_dropped(self, records: Collection[Record], change_count: int) -> None:
         """Set items to DROPPED, so that looks search for them on the table and in the bins.
 
-        `epoch` is the number of changes of the table so far.
+        `change_count` is the number of changes of the table so far.
         """
         for record in records:
-            record.epoch, record.is_untracked = epoch, True
+            record.change_count, record.is_untracked = change_count, True
             record.bin_log_odds.clear()
-            self._records.change(record, State.DROPPED)
+            self._records.change_state(record, State.DROPPED)
 
-    def add(self, look: Detections, content: Mapping[Observation, str | None]) -> None:
-        """Count the objects that a look has shown in the bins that it has searched.
+    def add_look(self, look: Detections, bin_by_observation: Mapping[Observation, str | None]) -> None:
+        """Count the objects in each bin whose whole floor is visible in a look.
 
         Args:
-            look: A look at the whole image.
-            content: Bin of each observation, or None.
+            look: Detections in a whole image.
+            bin_by_observation: Name of the bin in which each observed object lies, or None.
         """
         for name in self._bins.bins:
-            if self._bins.is_searched(name, look):
-                inside = (seen for seen, bin in content.items() if bin == name and seen.confident)
-                self._looks[name].append(Counter(seen.detection.label for seen in inside))
+            if self._bins.is_floor_visible(name, look):
+                inside = (seen for seen, bin in bin_by_observation.items() if bin == name and seen.confident)
+                self._label_counts_by_bin[name].append(Counter(seen.detection.label for seen in inside))
 
-    def record_bin_contents(self, epoch: int) -> None:
-        """Record a placed or rejected item for each object in a bin beyond the known items there.
+    def record_bin_contents(self, change_count: int) -> None:
+        """Record a placed or rejected item for each object in a bin that is no known item of the bin.
 
-        `epoch` is the number of changes of the table so far.
+        `change_count` is the number of changes of the table so far.
         """
-        for label, bin in self._find_surplus():
-            searched = (item for item in self._records if item.state is State.DROPPED and item.is_untracked)
-            record = next((item for item in searched if item.label == label), None)
+        for label, bin in self._find_unknown_objects():
+            untracked = (item for item in self._records if item.state is State.DROPPED and item.is_untracked)
+            record = next((item for item in untracked if item.label == label), None)
             if record is None:
                 belief = Belief(label, LOG_ODDS_OF_PROOF, is_proved=True)
-                record = self._records.add(belief, self._bins.bins[bin].position, epoch, 0.0, True)
+                position = self._bins.bins[bin].position
+                record = self._records.add(belief, position, change_count, 0.0, appeared_during_run=True)
             if bin in self._bins.routes.get(label, ()):
-                record.reason = "found there when the run was resumed"
-                self._records.place(record, bin)
+                record.reason = "found in the bin when the run was resumed"
+                self._records.set_placed(record, bin)
             else:
                 self._records.reject(record, f"found in {bin} when the run was resumed")
 
-    def _find_surplus(self) -> Iterator[tuple[str, str]]:
-        """Yield the class and the bin of each object in a bin beyond the known items there.
+    def _find_unknown_objects(self) -> Iterator[tuple[str, str]]:
+        """Yield class and bin of each object in a bin that is no known item of the bin.
 
-        The median of the looks counts. Classes for which the bin is right come first, because a look may show
-        a known item with a wrong class.
+        The number of visible objects is the median over the looks. Classes with a route to the bin come
+        first, because a look may show a known item with a wrong class.
         """
-        for bin, looks in self._looks.items():
-            shown = {label: median_low(look[label] for look in looks) for label in set().union(*looks)}
-            surplus = sum(shown.values()) - self._bins.count_in(bin, self._records)
-            right = {label for label in shown if bin in self._bins.routes.get(label, ())}
-            for label in [*sorted(right), *sorted(shown.keys() - right)]:
-                known = sum(item.bin == bin and item.label == label for item in self._records)
-                count = max(min(shown[label] - known, surplus), 0)
-                surplus -= count
+        for bin, looks in self._label_counts_by_bin.items():
+            counts = {label: median_low(look[label] for look in looks) for label in set().union(*looks)}
+            unknown_count = sum(counts.values()) - self._bins.count_in(bin, self._records)
+            permitted = {label for label in counts if bin in self._bins.routes.get(label, ())}
+            for label in [*sorted(permitted), *sorted(counts.keys() - permitted)]:
+                known_count = sum(item.bin == bin and item.label == label for item in self._records)
+                count = max(min(counts[label] - known_count, unknown_count), 0)
+                unknown_count -= count
                 yield from [(label, bin)] * count

@@ -1,4 +1,4 @@
-"""Staleness of positions: changes of the table by the robot, which may have moved objects."""
+"""Staleness of positions: record of the robot's changes of the table, which may have moved objects."""
 
 from __future__ import annotations
 
@@ -11,35 +11,45 @@ from executive.ledger.item import Record
 
 
 class Staleness:
-    """Changes of the table, in the order of time, each with the area in which it may have moved objects."""
+    """Changes of the table in chronological order, numbered from 1.
+
+    The methods ignore the first `change_count` changes, which happened before a given look.
+    """
 
     def __init__(self) -> None:
         self._changes: list[tuple[Array, float]] = []
+        """Centre `(3,)` [m] and radius [m] of the circle in which each change may have moved objects."""
 
     @property
-    def epoch(self) -> int:
+    def change_count(self) -> int:
         """Number of changes so far."""
         return len(self._changes)
 
     def record_change(self, centre: Array, radius: float) -> None:
-        """Record that all objects within `radius` [m] (infinite: the whole table) may have been moved."""
+        """Record that objects within `radius` [m] of `centre` `(3,)` [m] may have been moved.
+
+        An infinite radius stands for the whole table.
+        """
         self._changes.append((centre, radius))
 
     def is_settled(self, record: Record) -> bool:
-        """Return True if nothing may have moved an item since its last detection."""
-        return self.is_unchanged(record.position, record.epoch)
+        """Return True if no change after the last detection of an item may have moved the item."""
+        return self.is_unchanged(record.position, record.change_count)
 
-    def is_unchanged(self, position: Array, epoch: int) -> bool:
-        """Return True if no change after `epoch` may have moved an object at `position` `(3,)` [m]."""
-        return self.find_change(position, epoch) is None
+    def is_unchanged(self, position: Array, change_count: int) -> bool:
+        """Return True if no change after `change_count` may have moved an object at `position` `(3,)` [m]."""
+        return self.find_change(position, change_count) is None
 
-    def find_change(self, position: Array, epoch: int) -> int | None:
-        """Return the number of the first change after `epoch` that may have moved an object, or None."""
-        for number, (centre, radius) in enumerate(self._changes[epoch:], epoch + 1):
+    def find_change(self, position: Array, change_count: int) -> int | None:
+        """Return the number of the first change after `change_count` that may have moved an object, or None.
+
+        `position` `(3,)` [m] is the position of the object.
+        """
+        for number, (centre, radius) in enumerate(self._changes[change_count:], change_count + 1):
             if float(np.linalg.norm(centre[:2] - position[:2])) <= radius:
                 return number
         return None
 
-    def is_table_unchanged(self, epoch: int) -> bool:
-        """Return True if no change after `epoch` may have moved all objects."""
-        return all(math.isfinite(radius) for _, radius in self._changes[epoch:])
+    def is_table_unchanged(self, change_count: int) -> bool:
+        """Return True if no change after `change_count` may have moved all objects on the table."""
+        return all(math.isfinite(radius) for _, radius in self._changes[change_count:])

@@ -1,4 +1,4 @@
-"""Tracker of all items: records looks and actions of the robot, and answers the queries of skills."""
+"""Tracker of all items: it records looks and actions of the robot, and answers the queries of skills."""
 
 from __future__ import annotations
 
@@ -17,12 +17,17 @@ from executive.cell.protocols import Routes
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
-from executive.ledger.accounts import count_states, find_final_state, find_lost_elsewhere, forget_rejected
-from executive.ledger.bins import Bins, find_believed_bin
+from executive.ledger.bins import Bins, find_probable_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import LYING, Record, State
-from executive.ledger.look import Update, describe_look
+from executive.ledger.look import LookUpdate, make_look_event
+from executive.ledger.outcomes import (
+    count_states,
+    discard_moved_items,
+    discard_rejected_items,
+    find_final_state,
+)
 from executive.ledger.records import Records
 from executive.ledger.recovery import Recovery
 from executive.ledger.staleness import Staleness
@@ -31,20 +36,20 @@ from executive.ledger.staleness import Staleness
 class Tracker:
     """Tracks each object from its first look to its final state; implements `executive.cell.ledger.Ledger`.
 
-    The tracker owns the records of the items and emits each change of an item as an event. The methods of the
-    protocol are documented there.
+    A look is an image with its detections. The tracker owns the records of the items and emits each change of
+    an item as an event. `Ledger` documents the methods in detail.
 
     Args:
-        config: Limits of the cell file.
+        config: Thresholds of the ledger, from the cell file.
         table: The workspace.
         bins: Bins by name.
-        routes: Names of the right bins by class.
-        emit: Emits an event.
-        distinct_by_touch: Classes whose height distinguishes them from all others.
+        routes: Names of the permitted bins by class.
+        emit: Function that receives the events.
+        labels_with_unique_height: Classes whose height distinguishes them from all others.
 
     Attributes:
         unknown: Largest number of boxes in one look for each label that is not in the cell file.
-        doubts: Reasons for assuming the error rates of detectors, in the order of the looks.
+        doubts: Reasons why error rates of detectors are assumed and not measured, one text for each kind.
     """
 
     def __init__(
@@ -54,16 +59,16 @@ class Tracker:
         bins: Mapping[str, Bin],
         routes: Routes,
         emit: Emit,
-        distinct_by_touch: Collection[str] = (),
+        labels_with_unique_height: Collection[str] = (),
     ) -> None:
         self._config, self._routes, self._emit = config, routes, emit
         self._records = Records(emit)
-        self._certainty = Certainty(config, distinct_by_touch)
+        self._certainty = Certainty(config, labels_with_unique_height)
         self._bins = Bins(config, bins, routes)
         self._coverage, self._staleness = Coverage(table), Staleness()
         self._recovery: Recovery | None = None
-        """Search for untracked items since `lose_track`, until `record_bin_contents`."""
-        self._frame = 0
+        """Search for untracked items, from `lose_track` to `record_bin_contents`, or None."""
+        self._last_frame_id = 0
         self.unknown: Counter[str] = Counter()
         self.doubts: list[str] = []
 
@@ -75,25 +80,25 @@ class Tracker:
     @property
     def epoch(self) -> int:
         """Number of changes of the table by the robot."""
-        return self._staleness.epoch
+        return self._staleness.change_count
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
         """Update all items with one search of a frame, and return the targets."""
         frame = detections.frame
         self.unknown |= Counter(detection.label for detection in detections.unknown)
-        # The numbers after the colon in the text of a doubt differ between frames: one text per kind is kept.
+        # The numbers after the colon of a doubt differ between frames, so only one text per kind is kept.
         kind = detections.error_rates.doubt.partition(":")[0]
         if kind and not any(doubt.startswith(kind) for doubt in self.doubts):
             self.doubts.append(detections.error_rates.doubt)
-        if frame.id != self._frame:
-            self._frame = frame.id
+        if frame.id != self._last_frame_id:
+            self._last_frame_id = frame.id
             self._update(detections, observations)
         self._emit(FrameTaken(frame))
-        self._emit(describe_look(detections, observations))
+        self._emit(make_look_event(detections, observations))
         return self.find_targets()
 
     def find_targets(self) -> Sequence[Target]:
-        """Return one target per open item on the table whose position is known now."""
+        """Return a target for each item in the state SEEN that cannot have moved since its last detection."""
         return [
             record.target
             for record in self.records
@@ -106,18 +111,18 @@ class Tracker:
             record.target
             for record in self.records
             if record.state in LYING
-            and record.belief.probability >= 0.5
-            and not self._certainty.is_gone(record)
+            and record.belief.existence_probability >= 0.5
+            and not self._certainty.is_position_empty(record)
         ]
 
     def find_uncertain_items(self) -> Sequence[Item]:
-        """Return the open items in the workspace that need a further look."""
+        """Return the unsorted items in the workspace that need another look to become certain."""
         return [
             record.item
             for record in self.records
-            if self._certainty.is_possible(record)
+            if self._certainty.may_be_on_table(record)
             and self._coverage.is_in_workspace(record.position)
-            and not (self._certainty.is_sure(record) and self._staleness.is_settled(record))
+            and not (self._certainty.is_certain(record) and self._staleness.is_settled(record))
         ]
 
     def find_held_item(self) -> Item | None:
@@ -125,7 +130,7 @@ class Tracker:
         return next((record.item for record in self.records if record.state is State.HELD), None)
 
     def is_current(self, frame: Frame) -> bool:
-        """Return True if no change of the whole table happened after the capture of a frame."""
+        """Return True if no change after the capture of a frame may have moved all objects."""
         return self._staleness.is_table_unchanged(frame.epoch)
 
     def is_fresh(self, target: Target) -> bool:
@@ -133,21 +138,24 @@ class Tracker:
         return self._staleness.is_unchanged(target.position, target.epoch)
 
     def is_open(self, item: Item) -> bool:
-        """Return True if an item is still to be sorted."""
+        """Return True if an item is on the table or dropped, and not rejected."""
         record = self._records.find(item)
         return record.state in (State.SEEN, State.DROPPED) and not record.reason
 
     def is_sure(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough."""
-        return self._certainty.is_sure(self._records.find(item))
+        return self._certainty.is_certain(self._records.find(item))
 
     def is_table_empty(self, label: str | None = None) -> bool:
-        """Return True if no object with a route is left on the visible table."""
+        """Return True if the visible table is almost certainly empty, except for objects without a route.
+
+        If `label` is given, only objects of this class count.
+        """
         return self._coverage.max_object_probability <= self._config.overlooked and not any(
-            # An item without a confident detection counts with any class, because its class is uncertain.
-            ((record.label in self._routes and label in (None, record.label)) or not record.belief.looks)
-            and self._certainty.is_possible(record)
-            and self._coverage.is_in_sight(record.position)
+            # An item without a confident detection counts for every class, because its class is uncertain.
+            ((record.label in self._routes and label in (None, record.label)) or not record.belief.look_count)
+            and self._certainty.may_be_on_table(record)
+            and self._coverage.is_visible(record.position)
             for record in self.records
         )
 
@@ -157,44 +165,44 @@ class Tracker:
 
     def count_attempts(self, item: Item) -> int:
         """Return the number of failed attempts to pick an item."""
-        return self._records.find(item).attempts
+        return self._records.find(item).attempt_count
 
     def count_in(self, bin: str) -> int:
         """Return the number of objects in a bin."""
         return self._bins.count_in(bin, self.records)
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
-        """Record a touch, which proves that an item exists, and return True if the item may be of its class.
+        """Record a touch, which proves that an item exists; return False if the touch contradicts its class.
 
-        If an earlier touch was at the height of the class, no later height contradicts the class, because the
-        item may have fallen over.
+        After a touch at the height of the class, no other height contradicts the class, because the item may
+        have fallen over.
         """
         record = self._records.find(item)
-        record.belief.is_proved, record.had_contact, record.empty_probes = True, True, 0
+        record.belief.is_proved, record.had_contact, record.empty_probe_count = True, True, 0
         if not contradiction:
-            record.touched_label, record.low_touches = record.label, 0
+            record.touched_label, record.low_touch_count = record.label, 0
         elif record.touched_label != record.label:
-            if may_miss_top and self._certainty.count_low_touch(record):
+            if may_miss_top and self._certainty.register_low_touch(record):
                 return True
-            record.contradiction = contradiction
-            self._invalidate(record.position, self._config.neighbourhood)
-            self._records.report(record)
+            record.last_contradiction = contradiction
+            self._invalidate_near(record.position, self._config.neighbourhood)
+            self._records.emit_item(record)
             return False
         return True
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
-        """Record a failed attempt to pick an item; all positions are uncertain now."""
+        """Record a failed attempt to pick an item, which may have moved any object."""
         record = self._records.find(item)
-        record.attempts += 1
-        record.empty_probes += found_table
+        record.attempt_count += 1
+        record.empty_probe_count += found_table
         self.invalidate_positions()
-        self._records.report(record)
+        self._records.emit_item(record)
 
     def record_grasp(self, item: Item) -> None:
-        """Record that the tool holds an item; its neighbours may have been moved.
+        """Record that the tool holds an item, and that the grasp may have moved neighbouring objects.
 
         Raises:
-            Fault: The tool holds another item, and no skill has recorded the end of that grasp.
+            Fault: The tool holds another item, because no skill has recorded the release of that item.
         """
         if (other := self.find_held_item()) not in (None, item):
             raise Fault(
@@ -202,18 +210,18 @@ class Tracker:
                 "record_placement, record_drop or record_put_down of the ledger"
             )
         record = self._records.find(item)
-        self._records.change(record, State.HELD)
+        self._records.change_state(record, State.HELD)
         record.belief.is_proved = True
-        self._invalidate(record.position, self._config.neighbourhood)
+        self._invalidate_near(record.position, self._config.neighbourhood)
 
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
-        """Record that the tool lost an item during a motion; all positions are uncertain now."""
+        """Record that the tool lost an item during a motion, which may have moved any object."""
         record = self._records.find(item)
         record.is_untracked = False
-        self._records.change(record, State.DROPPED)
-        self._bins.set_prior(record, landing)
-        record.attempts += 1
-        record.epoch = self.epoch
+        self._records.change_state(record, State.DROPPED)
+        self._bins.set_prior_log_odds(record, landing)
+        record.attempt_count += 1
+        record.change_count = self.epoch
         self.invalidate_positions()
 
     def record_placement(self, item: Item, bin: str) -> None:
@@ -221,74 +229,74 @@ class Tracker:
         record = self._records.find(item)
         if record.state is State.HELD:
             record.reason = ""
-        self._records.place(record, bin)
+        self._records.set_placed(record, bin)
 
     def record_put_down(self, item: Item, position: Array) -> None:
-        """Record that an item was put back on the table at `position` `(3,)` [m]; a look must confirm it."""
+        """Record that an item was put down at `position` `(3,)` [m]; a look must confirm the position."""
         record = self._records.find(item)
-        record.locate(position, self._config.gate, is_settled=False)
-        record.epoch = self.epoch
-        self._records.change(record, State.REJECTED if record.reason else State.SEEN)
+        record.update_position(position, self._config.gate, is_settled=False)
+        record.change_count = self.epoch
+        self._records.change_state(record, State.REJECTED if record.reason else State.SEEN)
         self.invalidate_positions()
 
     def reject(self, item: Item, reason: str) -> None:
-        """Reject an item: it is reported and not tried again.
+        """Reject an item: no skill selects the item again.
 
-        A held item stays HELD until its release; looks continue to search for a dropped item.
+        A held item stays HELD until its release, and a dropped item stays DROPPED until a look detects it.
         """
         self._records.reject(self._records.find(item), reason)
 
     def invalidate_positions(self) -> None:
         """Record that any object on the table may have been moved."""
-        self._invalidate(np.zeros(3), math.inf)
+        self._invalidate_near(np.zeros(3), math.inf)
 
     def lose_track(self) -> None:
         """Record that the tool may have moved any item that is not in a bin."""
         self._recovery = Recovery(self._records, self._bins)
-        self._search_everywhere([item for item in self._records if item.state in (State.HELD, State.DROPPED)])
+        self._mark_as_dropped([item for item in self._records if item.state in (State.HELD, State.DROPPED)])
 
     def mark_unseen_as_dropped(self) -> None:
-        """Have looks search for every item that none has shown since `lose_track`."""
-        self._search_everywhere(
+        """Set each item on the table that no look has detected since `lose_track` to DROPPED."""
+        self._mark_as_dropped(
             [
                 record
                 for record in self.records
                 if record.state is State.SEEN
-                and record.belief.probability >= 0.5
+                and record.belief.existence_probability >= 0.5
                 and not self._staleness.is_settled(record)
             ]
         )
 
     def record_bin_contents(self) -> None:
-        """Record an item for each object that the full looks since `lose_track` have shown in a bin."""
+        """Record an item for each unknown object in a bin, according to the looks since `lose_track`."""
         recovery, self._recovery = self._recovery, None
         assert recovery is not None, "the contents of bins are recorded after `lose_track`"
         recovery.record_bin_contents(self.epoch)
 
     def close(self, *, completed: bool) -> None:
-        """Decide the final state of each item; `completed` is True if the tree succeeded."""
-        touched_any = any(record.touched_label for record in self.records)
+        """Set the final state of each item; `completed` is True if the behaviour tree succeeded."""
+        has_touched_item = any(record.touched_label for record in self.records)
         dropped = [record for record in self.records if record.state is State.DROPPED]
         for record in self.records:
-            final = find_final_state(
-                record, self._certainty, has_route=record.label in self._routes, completed=completed,
-                touched_any=touched_any,
+            final_state = find_final_state(
+                record, self._certainty, has_route=record.label in self._routes, is_completed=completed,
+                has_touched_item=has_touched_item,
             )  # fmt: skip
-            if bin := find_believed_bin(record):
-                record.bin, final = bin, (State.PLACED, "it fell there")
-            if final is not None:
-                record.set_state(*final)
-                self._records.report(record)
-        for record in find_lost_elsewhere(self.records, dropped):
-            self._records.report(record)
+            if bin := find_probable_bin(record):
+                record.bin, final_state = bin, (State.PLACED, "it probably fell into the bin")
+            if final_state is not None:
+                record.set_state(*final_state)
+                self._records.emit_item(record)
+        for record in discard_moved_items(self.records, dropped):
+            self._records.emit_item(record)
 
     def reopen(self) -> None:
-        """Forget the items that were left on the table; the next look adds those that still lie there."""
-        for record in forget_rejected(self.records):
-            self._records.report(record)
+        """Discard the items that were left on the table; the next look adds their objects again."""
+        for record in discard_rejected_items(self.records):
+            self._records.emit_item(record)
 
     def count_states(self) -> dict[str, int]:
-        """Return the counts `seen, placed, rejected, skipped, lost, phantom`."""
+        """Return the counts `seen` (no phantoms), `placed`, `rejected`, `skipped`, `lost` and `phantom`."""
         return count_states(self.records)
 
     def summaries(self) -> Sequence[ItemChanged]:
@@ -296,24 +304,27 @@ class Tracker:
         return [record.summary for record in self.records]
 
     def _update(self, detections: Detections, observations: Sequence[Observation]) -> None:
-        """Update the items on the table with observations there, and dropped items with those in bins."""
-        bias = detections.error_rates.bias
-        bins = {seen: self._bins.find_bin(seen, bias, self.records) for seen in observations}
-        update = Update(self._config, self._records, self._coverage, self._staleness, detections)
-        for record in update.apply([seen for seen, bin in bins.items() if bin is None]):
+        """Update the items on the table and the dropped items with the observations of a look."""
+        bias_std = detections.error_rates.bias
+        bin_by_observation = {
+            seen: self._bins.find_bin(seen, bias_std, self.records) for seen in observations
+        }
+        update = LookUpdate(self._config, self._records, self._coverage, self._staleness, detections)
+        for record in update.apply([seen for seen, bin in bin_by_observation.items() if bin is None]):
             self._certainty.reject_if_uncertain(record, is_settled=self._staleness.is_settled(record))
-            self._records.report(record)
+            self._records.emit_item(record)
         if detections.view == "full" and self._recovery is not None:
-            self._recovery.add(detections, bins)
+            self._recovery.add_look(detections, bin_by_observation)
         elif detections.view == "full":
-            for record in self._bins.find_dropped(detections, bins, self.records):
-                self._records.report(record)
+            for record in self._bins.place_dropped_items(detections, bin_by_observation, self.records):
+                self._records.emit_item(record)
 
-    def _search_everywhere(self, records: Collection[Record]) -> None:
-        assert self._recovery is not None, "items are searched everywhere after `lose_track`"
-        self._recovery.search(records, self.epoch)
+    def _mark_as_dropped(self, records: Collection[Record]) -> None:
+        assert self._recovery is not None, "items are marked as dropped after `lose_track`"
+        self._recovery.mark_as_dropped(records, self.epoch)
         self.invalidate_positions()
 
-    def _invalidate(self, centre: Array, radius: float) -> None:
+    def _invalidate_near(self, centre: Array, radius: float) -> None:
+        """Record that any object within `radius` [m] of `centre` `(3,)` [m] may have been moved."""
         self._staleness.record_change(centre, radius)
         self._coverage.reset_near(centre, radius, self.epoch)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from executive.cell.workcell import Accounts
 from executive.errors import ExecutiveError, Fault
-from executive.ledger.accounts import is_balanced
+from executive.ledger.outcomes import is_balanced
 from executive.tree.failure import Failure
 
 

@@ -29,7 +29,7 @@ from executive.cells.sim.arm import SimArm
 from executive.errors import ExecutiveError
 from executive.events import RunEnded
 from executive.geometry import Array
-from executive.ledger.accounts import is_balanced
+from executive.ledger.outcomes import is_balanced
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import cell_kind

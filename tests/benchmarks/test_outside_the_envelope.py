@@ -23,7 +23,7 @@ from tests.benchmarks.scenes_outside import DECLARED, OVERHEAD, WRIST, Case, lis
 
 PLACED = Report("cube", "placed", "")
 DOUBTED = Report("cube", "placed", "seen in its bin once")
-REJECTED = Report("cube", "rejected", "its class is in doubt")
+REJECTED = Report("cube", "rejected", "looks disagree about its class")
 SPHERE = FoundObject("sphere", "right", "blue_bin", False, ("sphere-1",), (PLACED,))
 
 

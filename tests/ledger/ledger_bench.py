@@ -41,7 +41,7 @@ def area_of(view: str) -> tuple[float, float, float, float]:
 class Bench:
     """A ledger with a camera above it that sees exactly what a test says."""
 
-    def __init__(self, distinct_by_touch: Sequence[str] = ()) -> None:
+    def __init__(self, labels_with_unique_height: Sequence[str] = ()) -> None:
         self.config = LedgerConfig()
         self.events: list[Event] = []
         size, slots = np.array([0.22, 0.24, 0.06]), np.zeros((6, 2))
@@ -56,7 +56,7 @@ class Bench:
             bins,
             {"cube": ("red_bin", "pink_bin")},
             self.events.append,
-            distinct_by_touch,
+            labels_with_unique_height,
         )
         self.frames = 0
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.cell.error_rates import ErrorRates
-from executive.ledger.association import max_distance
+from executive.ledger.association import find_max_distance
 from executive.ledger.belief import Belief
 from executive.ledger.bins import update_bin_log_odds
 from executive.ledger.item import Record
@@ -55,21 +55,21 @@ def test_what_looks_say_of_existence_adds_up() -> None:
     assert seen.log_odds == -1.0, "the first look is in the prior"
     seen.add_detection("cube", GOOD)
     assert seen.log_odds == pytest.approx(-1.0 + math.log(0.98 / (0.02 * 0.02)))
-    assert (seen.is_proved, seen.looks) == (False, 2)
+    assert (seen.is_proved, seen.look_count) == (False, 2)
     seen.add_detection("cube", GOOD)
-    assert (seen.is_proved, seen.probability) == (True, 1.0)
+    assert (seen.is_proved, seen.existence_probability) == (True, 1.0)
     beside = belief(3.0)
     beside.add_detection("cube", GOOD, is_ambiguous=True)
     beside.add_detection("cube", GOOD, is_ambiguous=True)
     assert beside.log_odds == pytest.approx(math.log(0.1)), "it may as well be a known item"
-    assert beside.probability == pytest.approx(0.1 / 1.1)
+    assert beside.existence_probability == pytest.approx(0.1 / 1.1)
 
 
 def test_looks_into_a_bin_add_up_from_nothing() -> None:
     fallen = record()
-    update_bin_log_odds(fallen, "red_bin", GOOD, is_shown=False)
+    update_bin_log_odds(fallen, "red_bin", GOOD, is_visible=False)
     assert fallen.bin_log_odds == {"red_bin": 0.0}
-    update_bin_log_odds(fallen, "red_bin", GOOD, is_shown=True)
+    update_bin_log_odds(fallen, "red_bin", GOOD, is_visible=True)
     assert fallen.bin_log_odds == {"red_bin": pytest.approx(math.log(0.98 / (0.02 * 0.04)))}
 
 
@@ -85,10 +85,10 @@ def test_the_chance_of_a_wrong_class_is_one_and_the_label_is_the_likeliest(votes
 @given(st.floats(-5, 5), st.integers(0, 200))
 def test_an_item_that_is_searched_in_vain_becomes_ever_less_likely(existence: float, looks: int) -> None:
     item = belief(existence)
-    before = item.probability
+    before = item.existence_probability
     for _ in range(looks):
         item.add_miss(BAD)
-    assert item.probability <= before
+    assert item.existence_probability <= before
     assert item.miss_probability == pytest.approx(0.2**looks, abs=1e-12)
 
 
@@ -97,25 +97,25 @@ def test_what_the_tool_has_met_exists_however_often_it_is_overlooked() -> None:
     item.is_proved = True
     for _ in range(50):
         item.add_miss(BAD)
-    assert item.probability == 1.0
+    assert item.existence_probability == 1.0
 
 
 def test_looks_that_agree_sharpen_a_place_and_a_push_starts_anew() -> None:
     item = record()
     for offset in (-0.01, 0.01, -0.01, 0.01):
-        item.locate(HERE + np.array([offset, 0, 0]), 0.013, is_settled=True)
+        item.update_position(HERE + np.array([offset, 0, 0]), 0.013, is_settled=True)
     assert item.position == pytest.approx(HERE)
-    assert item.std == pytest.approx(0.013 / 2)
-    item.locate(HERE + np.array([0.05, 0, 0]), 0.013, is_settled=False)
+    assert item.standard_error == pytest.approx(0.013 / 2)
+    item.update_position(HERE + np.array([0.05, 0, 0]), 0.013, is_settled=False)
     assert item.position[0] == pytest.approx(0.55)
-    assert item.std == 0.013
+    assert item.standard_error == 0.013
     assert item.first_position == pytest.approx(HERE), "where it was before it was moved"
 
 
 def test_measurements_count_by_how_good_they_are() -> None:
     item = record()
-    item.locate(HERE, 0.001, is_settled=True)
-    item.locate(HERE + np.array([0.011, 0, 0]), 0.0031623, is_settled=True)
+    item.update_position(HERE, 0.001, is_settled=True)
+    item.update_position(HERE + np.array([0.011, 0, 0]), 0.0031623, is_settled=True)
     assert item.position[0] - HERE[0] == pytest.approx(0.001, rel=0.02)
 
 
@@ -125,5 +125,5 @@ def test_measurements_count_by_how_good_they_are() -> None:
 )
 def test_the_gate_is_as_wide_as_the_measurements_scatter(spread: float, new: float, allowed: float) -> None:
     item = record()
-    item.std = spread
-    assert max_distance(item, new, 0.025) == pytest.approx(allowed)
+    item.standard_error = spread
+    assert find_max_distance(item, new, 0.025) == pytest.approx(allowed)

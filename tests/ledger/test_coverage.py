@@ -12,7 +12,7 @@ from executive.cell.config import TableConfig
 from executive.cell.detection import Detections
 from executive.cell.error_rates import ErrorRates
 from executive.ledger.coverage import (
-    MIN_PROBABILITY,
+    MIN_MISS_PROBABILITY,
     PRIOR_INSIDE,
     PRIOR_OUTSIDE,
     PRIOR_OUTSIDE_AFTER_CHANGE,
@@ -44,14 +44,14 @@ def test_every_look_leaves_as_much_doubt_as_its_detector_misses(coverage: Covera
 def test_before_anything_was_dropped_hardly_anything_lies_beside_the_workspace(coverage: Coverage) -> None:
     beside = np.array([0.53, 0.40, 0.025])
     assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE
-    coverage.reset_near(MIDDLE, math.inf, epoch=1)
+    coverage.reset_near(MIDDLE, math.inf, change=1)
     assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE_AFTER_CHANGE
 
 
 def test_looks_at_the_workspace_alone_never_show_that_nothing_lies_beside_it(coverage: Coverage) -> None:
     for _ in range(20):
         coverage.update(look(view="table"))
-    assert coverage.find_miss_probability(MIDDLE) == MIN_PROBABILITY, "looks are not wholly independent"
+    assert coverage.find_miss_probability(MIDDLE) == MIN_MISS_PROBABILITY, "looks are not wholly independent"
     assert coverage.max_object_probability == 1.0
 
 
@@ -71,7 +71,7 @@ def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage:
 
 def test_a_change_brings_the_doubt_back_whatever_a_frame_from_before_shows(coverage: Coverage) -> None:
     for _ in range(2):
-        coverage.reset_near(CORNER, 0.07, epoch=1)
+        coverage.reset_near(CORNER, 0.07, change=1)
         coverage.update(look(epoch=0))
     assert coverage.find_miss_probability(CORNER) == 1.0
     assert coverage.find_miss_probability(MIDDLE) == pytest.approx(0.2**2)
@@ -91,7 +91,7 @@ def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_
     coverage: Coverage,
 ) -> None:
     coverage.update(look())
-    coverage.reset_near(MIDDLE, math.inf, epoch=1)
+    coverage.reset_near(MIDDLE, math.inf, change=1)
     # The workspace is in the middle columns; on the left the arm stays in the way from now on.
     worst = []
     for _ in range(8):
@@ -108,12 +108,12 @@ def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_
 )
 def test_a_place_counts_if_all_places_around_it_do(coverage: Coverage, y: float, counts: bool) -> None:
     coverage.update(look(hidden=slice(0, 174)))
-    assert coverage.is_in_sight(np.array([0.53, y, 0.025])) is counts
+    assert coverage.is_visible(np.array([0.53, y, 0.025])) is counts
 
 
 def test_a_place_beyond_the_table_or_near_something_unsure_does_not_count(coverage: Coverage) -> None:
     coverage.update(look(), [MIDDLE])
-    assert not coverage.is_in_sight(np.array([0.53, 2.0, 0.025]))
+    assert not coverage.is_visible(np.array([0.53, 2.0, 0.025]))
     assert coverage.find_miss_probability(np.array([0.53, 2.0, 0.025])) == PRIOR_OUTSIDE
     missed = [coverage.find_miss_probability(np.add(MIDDLE, (x, 0, 0))) for x in (0.0, 0.04)]
     assert missed == [1.0, pytest.approx(0.2)]

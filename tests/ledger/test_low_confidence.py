@@ -9,7 +9,7 @@ from executive.events import FrameSearched, ItemChanged
 from executive.ledger.certainty import MAX_UNCERTAIN_LOOKS
 
 THERE = ("cube", 0.5, 0.0)
-UNSURE = ("rejected", "no look is sure of it")
+UNSURE = ("rejected", "no look is certain of it")
 PHANTOM = ("phantom", "more looks missed it than saw it")
 
 
@@ -81,13 +81,17 @@ def test_a_sure_look_makes_an_item_of_an_uncertain_detection_as_good_as_any(benc
 
 def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) -> None:
     bench.look(THERE, unsure=[("duck", 0.51, 0.01)])
-    assert (len(bench.ledger.summaries()), bench.ledger.records[0].belief.uncertain_looks) == (1, 0), (
+    assert (len(bench.ledger.summaries()), bench.ledger.records[0].belief.uncertain_look_count) == (1, 0), (
         "a second, weaker box"
     )
     for _ in range(5):
         bench.look(unsure=[("duck", 0.51, 0.0)])
     record = bench.ledger.records[0]
-    assert (record.belief.miss_probability, record.label, record.belief.uncertain_looks) == (1.0, "cube", 0)
+    assert (record.belief.miss_probability, record.label, record.belief.uncertain_look_count) == (
+        1.0,
+        "cube",
+        0,
+    )
     assert bench.end() == {"cube-1": ("skipped", "the mission was completed without it")}
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from ledger_bench import EYE, Bench
 
-from executive.ledger.belief import repeat_probability
+from executive.ledger.belief import compute_repeat_probability
 from executive.ledger.certainty import Certainty
 
 DOUBTFUL = replace(EYE, confused=0.05, repeated=0.8)
@@ -20,8 +20,8 @@ def record_of(bench: Bench):
 
 
 def test_the_probability_of_the_same_answer_again_is_that_of_a_copy_or_of_another_such_answer():
-    assert (repeat_probability(0.05, 0.0), repeat_probability(0.05, 1.0)) == (0.05, 1.0)
-    assert repeat_probability(0.05, 0.8) == pytest.approx(0.81)
+    assert (compute_repeat_probability(0.05, 0.0), compute_repeat_probability(0.05, 1.0)) == (0.05, 1.0)
+    assert compute_repeat_probability(0.05, 0.8) == pytest.approx(0.81)
 
 
 def test_the_same_answer_from_the_same_pose_proves_a_class_only_a_little_more(bench):
@@ -37,12 +37,12 @@ def test_the_same_answer_from_the_same_pose_proves_a_class_only_a_little_more(be
 def test_after_three_looks_an_item_without_other_evidence_is_rejected_with_both_values(bench):
     for _ in range(3):
         bench.look(CUBE, by=DOUBTFUL)
-    why = "3 looks from one pose leave a chance of 3.4% that it is no cube; at most 0.5% is allowed"
+    why = "3 looks from one pose leave a probability of 3.4% that it is no cube; at most 0.5% is allowed"
     assert bench.states() == {"cube-1": ("rejected", why)}
 
 
 def test_an_item_whose_class_a_touch_can_prove_is_sure_enough_to_be_touched_after_three_looks():
-    bench = Bench(distinct_by_touch=("cube",))
+    bench = Bench(labels_with_unique_height=("cube",))
     sure = []
     for _ in range(3):
         bench.look(CUBE, by=DOUBTFUL)
@@ -62,7 +62,7 @@ def test_an_item_that_was_moved_is_looked_at_as_if_for_the_first_time(bench):
     bench.ledger.invalidate_positions()
     bench.look(CUBE, by=DOUBTFUL)
     record = record_of(bench)
-    assert (record.belief.repeats, 1 / record.belief.class_error - 1) == (0, pytest.approx(19**2))
+    assert (record.belief.repeat_count, 1 / record.belief.class_error - 1) == (0, pytest.approx(19**2))
 
 
 def test_a_place_searched_again_from_the_same_pose_is_hardly_emptier():
@@ -79,4 +79,4 @@ def test_the_systematic_error_of_a_position_does_not_shrink_with_the_number_of_l
     for _ in range(5):
         bench.look(CUBE, by=replace(EYE, bias=0.006))
     record = record_of(bench)
-    assert (record.std < 0.002, certainty.is_sure(record)) == (True, False)
+    assert (record.standard_error < 0.002, certainty.is_certain(record)) == (True, False)

@@ -145,7 +145,7 @@ def test_three_looks_that_contradict_the_class_of_an_item_reject_it(bench: Bench
     for _ in range(3):
         assert bench.states().get("cube-1", ("seen", ""))[0] == "seen"
         bench.look(unsure=[CUBE], contradiction="its box is 80 mm long")
-    assert bench.states() == {"cube-1": ("rejected", "no look is sure of it: its box is 80 mm long")}
+    assert bench.states() == {"cube-1": ("rejected", "no look is certain of it: its box is 80 mm long")}
 
 
 def test_a_frame_from_before_a_pick_brings_nothing_back(bench: Bench) -> None:
@@ -244,7 +244,7 @@ def test_an_item_whose_class_looks_keep_contradicting_is_given_up_in_the_end(ben
     for look in range(60):
         bench.look(("cube" if look % 2 else "duck", 0.50, 0.0))
         assert look <= 2 or not bench.ledger.is_sure("duck-1")
-    assert bench.states() == {"duck-1": ("rejected", "its class is in doubt: 20 duck, 20 cube")}
+    assert bench.states() == {"duck-1": ("rejected", "looks disagree about its class: 20 duck, 20 cube")}
 
 
 def test_one_slip_about_the_class_costs_some_looks_and_no_more(bench: Bench) -> None:
@@ -359,7 +359,7 @@ def test_what_lies_where_something_was_invented_before_the_table_changed_is_new(
     for _ in range(4):
         bench.look(("cube", 0.6, 0.1))
     bench.look(("cube", 0.6, 0.1), ("duck", 0.5, 0.0))
-    assert bench.ledger.records[1].belief.probability < 0.5, "nothing was there in four looks"
+    assert bench.ledger.records[1].belief.existence_probability < 0.5, "nothing was there in four looks"
     bench.drop("cube-1")
     for _ in range(3):
         bench.look(("cube", 0.5, 0.02))
@@ -369,7 +369,7 @@ def test_what_lies_where_something_was_invented_before_the_table_changed_is_new(
 @pytest.mark.parametrize(
     ("probes", "touches_other", "moved", "final"),
     [
-        (3, True, 0.0, ("phantom", "the tool found only the table at its place, 3 times")),
+        (3, True, 0.0, ("phantom", "the tool found only the table at its position, 3 times")),
         (2, True, 0.0, ("rejected", "could not be picked")),
         (3, False, 0.0, ("rejected", "could not be picked")),
         (3, True, 0.02, ("rejected", "could not be picked")),

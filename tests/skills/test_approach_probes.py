@@ -25,7 +25,7 @@ def test_the_fourth_attempt_searches_for_an_object_almost_down_to_the_table(
         messages.append(run_skill(Approach(target=current), fake).message)
     heights = [message.removeprefix("no contact down to ").split(" mm")[0] for message in messages]
     assert heights == ["35", "35", "35", "5"]
-    assert [record.empty_probes for record in fake.ledger.records] == [1]
+    assert [record.empty_probe_count for record in fake.ledger.records] == [1]
 
 
 def test_a_probe_far_beside_the_middle_proves_nothing(
@@ -35,11 +35,11 @@ def test_a_probe_far_beside_the_middle_proves_nothing(
     fake.world.put("sphere", 0.6, 0.1)
     _, target = look()
     fake.world.objects.clear()
-    for offset, empty_probes in ((0.02, 0), (0.0025, 1)):
+    for offset, empty_probe_count in ((0.02, 0), (0.0025, 1)):
         for _ in range(3):
             fake.ledger.record_miss(target.item)
         run_skill(Approach(target=replace(target, epoch=fake.ledger.epoch), offset=offset), fake)
-        assert fake.ledger.records[1].empty_probes == empty_probes
+        assert fake.ledger.records[1].empty_probe_count == empty_probe_count
 
 
 @pytest.mark.parametrize(

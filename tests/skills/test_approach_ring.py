@@ -58,4 +58,4 @@ def test_nothing_is_felt_for_below_the_middle_of_a_thin_part(
     assert (result.reason, result.message) == (
         "no_contact", "no contact down to 4 mm, duck-1 was expected at 8 mm",
     )  # fmt: skip
-    assert fake.ledger.records[0].empty_probes == 0, "a thin part cannot be distinguished from the table"
+    assert fake.ledger.records[0].empty_probe_count == 0, "a thin part cannot be distinguished from the table"

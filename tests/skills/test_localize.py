@@ -58,7 +58,8 @@ def test_an_object_too_high_for_its_class_in_the_depth_image_contradicts_it(fake
     (row,) = fake.ledger.summaries()
     assert (row.state, row.why) == (
         "rejected",
-        "no look is sure of it: its top is 80 mm above the table, and that of a cube 50, 100, 106 or 110 mm",
+        "no look is certain of it: its top is 80 mm above the table, "
+        "and that of a cube 50, 100, 106 or 110 mm",
     )
 
 

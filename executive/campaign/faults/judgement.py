@@ -12,8 +12,8 @@ from executive.campaign.faults.fault import InjectedError, PlannedFault
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.frame import Frame, FrameTaken
 from executive.events import FaultInjected, FrameSearched, ItemChanged, RunEnded, TimedEvent
-from executive.ledger.accounts import is_balanced
 from executive.ledger.item import State
+from executive.ledger.outcomes import is_balanced
 from executive.mission.flow.endings import Ending
 from executive.testing.faults.world_access import TrueObject
 
