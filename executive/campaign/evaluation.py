@@ -251,7 +251,7 @@ def store_evaluation(
                 objects=sum(row.values()),
                 missed=row.get(NOTHING, 0),
                 confused=sum(row.values()) - row.get(NOTHING, 0) - row.get(label, 0),
-                invented=table.get(NOTHING, {}).get(label, 0),
+                false_detections=table.get(NOTHING, {}).get(label, 0),
             )
             for label, row in table.items()
             if label != NOTHING

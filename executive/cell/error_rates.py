@@ -11,9 +11,9 @@ class ErrorRates:
 
     Attributes:
         threshold: Confidence from which a detection counts.
-        misses: Share of the objects in full view that one look misses.
-        confused: Share of the found objects that get a wrong class.
-        invented: Number of false detections per look.
+        miss_rate: Share of the objects in full view that one look misses.
+        confusion_rate: Share of the found objects that get a wrong class.
+        false_detections: Number of false detections per look.
         jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
         repeated: Share of the errors that a second look from the same pose repeats.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
@@ -21,9 +21,9 @@ class ErrorRates:
     """
 
     threshold: float
-    misses: float
-    confused: float
-    invented: float
+    miss_rate: float
+    confusion_rate: float
+    false_detections: float
     jitter: float
     repeated: float = 0.0
     bias: float = 0.0
@@ -37,5 +37,12 @@ def assume_rates(threshold: float, doubt: str) -> ErrorRates:
     average, and repeated most errors in every look. The rates below are at least as high.
     """
     return ErrorRates(
-        threshold, misses=0.15, confused=0.05, invented=0.2, jitter=2.0, repeated=0.8, bias=0.002, doubt=doubt
+        threshold,
+        miss_rate=0.15,
+        confusion_rate=0.05,
+        false_detections=0.2,
+        jitter=2.0,
+        repeated=0.8,
+        bias=0.002,
+        doubt=doubt,
     )

@@ -87,7 +87,7 @@ def find_moved_item(
         new.state is not State.SEEN
         or new.attempt_count
         or new.belief.existence_probability < MIN_EXISTENCE_PROBABILITY
-        or new.belief.class_error > config.misjudged
+        or new.belief.class_error > config.max_class_error
     ):
         return None
     candidates = [old for old in records if _may_be_same_object(old, new, staleness, config)]
@@ -116,7 +116,7 @@ def _may_be_same_object(old: Record, new: Record, staleness: Staleness, config: 
     may_be_moved_by_person = (
         _find_horizontal_distance(old, new) <= MAX_PUSH_DISTANCE
         and new.first_stamp > old.stamp
-        and old.belief.miss_probability <= config.overlooked
+        and old.belief.miss_probability <= config.max_miss_probability
     )
     is_phantom = old.state is State.PHANTOM and old.reason == REASON_NOT_FOUND and old.attempt_count > 0
     is_missing = (

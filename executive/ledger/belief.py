@@ -130,21 +130,23 @@ class Belief:
         repeated = rates.repeated if self.last_label_by_viewpoint.get(viewpoint) == label else 0.0
         self.repeat_count += repeated > 0.0
         self.last_label_by_viewpoint[viewpoint] = label
-        self.log_likelihoods[label] += _compute_log_ratio(1.0 - rates.confused, rates.confused, repeated)
-        self.max_confusion_rate = max(self.max_confusion_rate, rates.confused)
+        self.log_likelihoods[label] += _compute_log_ratio(
+            1.0 - rates.confusion_rate, rates.confusion_rate, repeated
+        )
+        self.max_confusion_rate = max(self.max_confusion_rate, rates.confusion_rate)
         if is_ambiguous and not self.look_count:
             self.log_odds = min(self.log_odds, MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM)
         elif not is_ambiguous and (self.look_count or self.uncertain_look_count):
-            false_positive_rate = min(rates.invented * ITEM_AREA_FRACTION, 1.0)
-            self.log_odds += _compute_log_ratio(1.0 - rates.misses, false_positive_rate, repeated)
+            false_positive_rate = min(rates.false_detections * ITEM_AREA_FRACTION, 1.0)
+            self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, repeated)
         self.label_counts[label] += 1
         self.uncertain_look_count = 0
         self.is_proved = self.is_proved or self.log_odds >= LOG_ODDS_OF_PROOF
 
     def add_miss(self, rates: ErrorRates) -> None:
         """Update the existence with a look that shows the item's position without a detection of the item."""
-        self.miss_probability *= rates.misses
-        self.log_odds += math.log(rates.misses)
+        self.miss_probability *= rates.miss_rate
+        self.log_odds += math.log(rates.miss_rate)
 
     def merge(self, other: Belief) -> None:
         """Add the detections of an item that is the same object."""

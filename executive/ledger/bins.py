@@ -100,7 +100,7 @@ class Bins:
                 is_visible = visible_counts[record.label, bin] > known_count
                 if is_visible or self.is_floor_visible(bin, look):
                     update_bin_log_odds(record, bin, look.error_rates, is_visible=is_visible)
-                if record.bin_log_odds[bin] >= -math.log(self.config.overlooked):
+                if record.bin_log_odds[bin] >= -math.log(self.config.max_miss_probability):
                     record.bin = bin
                     record.set_state(State.PLACED, "")
                     placed.append(record)
@@ -127,6 +127,6 @@ def update_bin_log_odds(record: Record, bin: str, rates: ErrorRates, *, is_visib
 
     `is_visible` is True if the look shows more objects of the item's class in the bin than known items.
     """
-    miss_rate, false_positive_rate = rates.misses, rates.invented * BIN_AREA_FRACTION
+    miss_rate, false_positive_rate = rates.miss_rate, rates.false_detections * BIN_AREA_FRACTION
     likelihood_ratio = (1.0 - miss_rate) / false_positive_rate if is_visible else miss_rate
     record.bin_log_odds[bin] = max(0.0, record.bin_log_odds[bin] + math.log(likelihood_ratio))

@@ -50,11 +50,13 @@ class Certainty:
         After a failed grasp, the position must be known more precisely. If more looks from the same viewpoint
         cannot prove the class, but the height of a touch can, a larger class error is permitted.
         """
-        belief, max_class_error = record.belief, self.config.misjudged
+        belief, max_class_error = record.belief, self.config.max_class_error
         is_saturated = belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
         if is_saturated and record.label in self.labels_with_unique_height:
             max_class_error = MAX_CLASS_ERROR_FOR_TOUCH
-        max_error = self.config.aim * (RETRY_STANDARD_ERROR_FACTOR if record.attempt_count else 1.0)
+        max_error = self.config.max_position_std * (
+            RETRY_STANDARD_ERROR_FACTOR if record.attempt_count else 1.0
+        )
         return (
             belief.existence_probability >= MIN_EXISTENCE_PROBABILITY
             and record.contradiction_count <= belief.look_count
@@ -66,12 +68,12 @@ class Certainty:
 
     def may_be_on_table(self, record: Record) -> bool:
         """Return True if an item in the state SEEN may still lie on the table."""
-        may_exist = record.belief.existence_probability > self.config.overlooked
+        may_exist = record.belief.existence_probability > self.config.max_miss_probability
         return record.state is State.SEEN and may_exist and not self.is_position_empty(record)
 
     def is_position_empty(self, record: Record) -> bool:
         """Return True if looks have missed an item so often that its position is almost certainly empty."""
-        return record.belief.miss_probability <= self.config.overlooked
+        return record.belief.miss_probability <= self.config.max_miss_probability
 
     def reject_if_uncertain(self, record: Record, *, is_settled: bool) -> None:
         """Reject an item in the state SEEN if more looks are unlikely to make the item certain.
@@ -91,7 +93,7 @@ class Certainty:
             record.set_state(State.REJECTED, f"looks disagree about its class: {counts}")
         elif self._cannot_prove_class(record):
             error = f"leave a probability of {belief.class_error:.1%} that it is no {record.label}"
-            limit = f"at most {self.config.misjudged:.1%} is allowed"
+            limit = f"at most {self.config.max_class_error:.1%} is allowed"
             record.set_state(State.REJECTED, f"{belief.look_count} looks from one pose {error}; {limit}")
         elif not is_certain and (
             belief.uncertain_look_count >= MAX_UNCERTAIN_LOOKS
@@ -107,13 +109,13 @@ class Certainty:
         Only the first low touch may have missed the top, and only if looks alone prove the class.
         """
         record.low_touch_count += 1
-        return record.low_touch_count == 1 and record.belief.class_error <= self.config.misjudged
+        return record.low_touch_count == 1 and record.belief.class_error <= self.config.max_class_error
 
     def _cannot_prove_class(self, record: Record) -> bool:
         """Return True if neither more looks from the only viewpoint so far nor a touch prove the class."""
         belief = record.belief
         return (
-            belief.class_error > self.config.misjudged
+            belief.class_error > self.config.max_class_error
             and belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
             and len(belief.last_label_by_viewpoint) == 1
             and record.label not in self.labels_with_unique_height

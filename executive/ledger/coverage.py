@@ -78,7 +78,7 @@ class Coverage:
         # A detector gets another image in another view: of 31 objects that the detector of the cell fasteners
         # missed in the view `table`, the detector missed 4 in the view `full` of the same pose.
         viewpoint = f"{make_viewpoint_key(look)} {look.view}"
-        miss_rate, repeated = look.error_rates.misses, look.error_rates.repeated
+        miss_rate, repeated = look.error_rates.miss_rate, look.error_rates.repeated
         repeated_miss_rate = compute_repeat_probability(miss_rate, repeated)
         searched_before = self._masks_by_viewpoint.setdefault(viewpoint, np.zeros(len(self._points), bool))
         miss_rates = np.where(searched_before[unchanged], repeated_miss_rate, miss_rate)

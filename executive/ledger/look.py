@@ -94,7 +94,7 @@ class LookUpdate:
         detected = []
         for observation in observations:
             # Prior odds: expected undetected objects at the position, per expected false detection.
-            odds = self._find_expected_count(observation) / rates.invented
+            odds = self._find_expected_count(observation) / rates.false_detections
             record = matches.get(observation) or self._add_item(observation, odds)
             if record.reason.startswith(REASON_UNCERTAIN) and not record.attempt_count:
                 record.set_state(State.SEEN, "")
@@ -123,13 +123,13 @@ class LookUpdate:
                 record
                 for record in self.records
                 if record.state in LYING
-                and record.belief.miss_probability > self.config.overlooked
+                and record.belief.miss_probability > self.config.max_miss_probability
                 and may_show(observation, record, self.config.gate)
             ]
             record = min(near, key=lambda record: record.distance_to(observation.position), default=None)
             if record is None:
                 odds = self._find_expected_count(observation) * ITEM_AREA_FRACTION
-                if odds <= self.config.overlooked:
+                if odds <= self.config.max_miss_probability:
                     continue
                 record = self._add_item(observation, odds)
                 record.observe(observation, self.look.frame, 0.0, is_settled=True)
@@ -148,7 +148,7 @@ class LookUpdate:
         phantoms = []
         for record in compress(records, self.look.is_searched(positions)):
             record.belief.add_miss(self.look.error_rates)
-            if record.belief.existence_probability <= self.config.overlooked:
+            if record.belief.existence_probability <= self.config.max_miss_probability:
                 record.set_state(State.PHANTOM, REASON_NOT_FOUND)
                 phantoms.append(record)
         return phantoms
@@ -191,7 +191,7 @@ class LookUpdate:
         """Add a new item; `odds` are the prior odds that the item exists."""
         belief, frame = Belief(observation.detection.label, math.log(odds)), self.look.frame
         position = observation.position
-        has_appeared = self.coverage.find_miss_probability(position) <= self.config.overlooked
+        has_appeared = self.coverage.find_miss_probability(position) <= self.config.max_miss_probability
         return self.records.add(belief, position, frame.epoch, frame.stamp, appeared_during_run=has_appeared)
 
     def _find_expected_count(self, observation: Observation) -> float:

@@ -151,7 +151,7 @@ class Tracker:
 
         If `label` is given, only objects of this class count.
         """
-        return self._coverage.max_object_probability <= self._config.overlooked and not any(
+        return self._coverage.max_object_probability <= self._config.max_miss_probability and not any(
             # An item without a confident detection counts for every class, because its class is uncertain.
             ((record.label in self._routes and label in (None, record.label)) or not record.belief.look_count)
             and self._certainty.may_be_on_table(record)

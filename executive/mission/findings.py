@@ -151,9 +151,25 @@ def suggest(word: str, known: Iterable[str]) -> str | None:
     return by_lower[close[0]] if close else None
 
 
+RENAMED_KEYS = {
+    "aim": "max_position_std",
+    "confused": "confusion_rate",
+    "invented": "false_detections",
+    "least_force": "min_force",
+    "misjudged": "max_class_error",
+    "misses": "miss_rate",
+    "most": "max",
+    "overlooked": "max_miss_probability",
+    "planning": "planning_time",
+}
+"""New names by the former names of keys in mission and cell files."""
+
+
 def alternatives(word: str, known: Iterable[str], lead: str) -> str:
-    """Return a hint with the most similar known word, `lead` and the known words."""
+    """Return a hint with the new name or the most similar known word, `lead` and the known words."""
     known = list(known)
+    if (renamed := RENAMED_KEYS.get(word)) in known:
+        return f'The key is now called "{renamed}".'
     meant = suggest(word, known)
     more = f" and {len(known) - _MAX_ALTERNATIVES} more" if len(known) > _MAX_ALTERNATIVES else ""
     listed = f"{lead}: {', '.join(known[:_MAX_ALTERNATIVES]) or 'none'}{more}."

@@ -28,19 +28,19 @@ class Backoff(KeySection):
 
     first: Seconds = key(gt=0, shorthand=True, doc="Delay before the second attempt [s].")
     factor: float = key(default=1.0, ge=1, doc="Ratio of each delay to the previous delay; 1 if not given.")
-    most: Seconds = key(default=inf, gt=0, doc="Maximum delay [s].")
+    max: Seconds = key(default=inf, gt=0, doc="Maximum delay [s].")
 
     def __str__(self) -> str:
         factor = f", times {self.factor:g} each" if self.factor != 1 else ""
-        limit = f", at most {self.most:g} s" if isfinite(self.most) else ""
+        limit = f", at most {self.max:g} s" if isfinite(self.max) else ""
         return f"{self.first:g} s{factor}{limit}"
 
     def compute_delay(self, attempt: int) -> float:
         """Return the delay after the failure of an attempt, counted from 1 [s]."""
         try:
-            return min(self.first * self.factor ** (attempt - 1), self.most)
+            return min(self.first * self.factor ** (attempt - 1), self.max)
         except OverflowError:
-            return self.most
+            return self.max
 
 
 class Retry(Loop):
@@ -57,7 +57,7 @@ class Retry(Loop):
     on: Reasons = key(default=(), doc="Failures after which the body runs again; every failure if not given.")
     recover: Child | None = key(default=None, doc="Node to run before every further attempt.")
     backoff: Backoff | None = key(
-        default=None, doc="Delay before every further attempt [s], or first, factor and most."
+        default=None, doc="Delay before every further attempt [s], or first, factor and max."
     )
     do: Child = key(doc="Body, run in every attempt.")
 

@@ -162,6 +162,6 @@ class SceneGenerator:
             seal = measure_contact(self._world.client, X_WT, {body}, tool.cup_radius, tool.reach)
             force = breakaway_force(seal, tool)
             surface -= seal.distance if seal else 0.0
-        if force < tool.least_force:
+        if force < tool.min_force:
             raise Unreachable(f"no seal holds the {self._world.bodies[body]} at its middle")
         return surface, force

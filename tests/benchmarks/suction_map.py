@@ -114,7 +114,7 @@ def _find_places(cell: CellConfig, label: str, offset: float) -> Iterator[Array]
 def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[Array]) -> Figures:
     """Return quantiles of rim gap [m], tilt [rad] and breakaway force [N], and the share of good seals.
 
-    The gap is infinite beside the object; a seal is good if it bears the tool's `least_force`.
+    The gap is infinite beside the object; a seal is good if it bears the tool's `min_force`.
     """
     X_WO = world.object_pose(body)
     top = world.client.getAABB(body)[1][2] + tool.reach
@@ -133,7 +133,7 @@ def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[
         "placements": len(gaps),
         **_quantiles("gap", gaps, 6),
         **_quantiles("tilt", tilts, 4),
-        "sealed": round(float(np.mean(np.array(forces) >= tool.least_force)), 4),
+        "sealed": round(float(np.mean(np.array(forces) >= tool.min_force)), 4),
         **_quantiles("force", forces, 3),
     }
 

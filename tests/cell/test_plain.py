@@ -40,7 +40,7 @@ class Pair:
     right: tuple[int, ...]
 
 
-EYE = ErrorRates(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.6)
+EYE = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.6)
 FRAME = Frame(
     7, "overhead", np.zeros((4, 4, 3), np.uint8), None, np.eye(3), Pose.identity(), 1 / 3,
     np.ones((4, 4), bool), 0,

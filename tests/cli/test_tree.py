@@ -41,7 +41,7 @@ tree:
                 attempts: 3
                 on: [Grasp.missed]
                 recover: {use: look}
-                backoff: {first: 0.5, factor: 2, most: 8}
+                backoff: {first: 0.5, factor: 2, max: 8}
                 do: [Approach, Grasp, Transit, Release]
               as: pick
             catch:

@@ -16,7 +16,7 @@ from executive.events import Event
 from executive.ledger.tracker import Tracker
 from tests.camera_poses import looking_down
 
-EYE = ErrorRates(threshold=0.5, misses=0.03, confused=0.004, invented=0.02, jitter=1.0)
+EYE = ErrorRates(threshold=0.5, miss_rate=0.03, confusion_rate=0.004, false_detections=0.02, jitter=1.0)
 
 Thing = tuple[str, float, float]
 

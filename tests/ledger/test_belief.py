@@ -15,8 +15,8 @@ from executive.ledger.belief import Belief
 from executive.ledger.bins import update_bin_log_odds
 from executive.ledger.item import Record
 
-GOOD = ErrorRates(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
-BAD = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=5.0)
+GOOD = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.7)
+BAD = ErrorRates(threshold=0.5, miss_rate=0.2, confusion_rate=0.1, false_detections=0.5, jitter=5.0)
 HERE = np.array([0.5, 0.0, 0.025])
 
 

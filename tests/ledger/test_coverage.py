@@ -21,7 +21,7 @@ from executive.ledger.coverage import (
 
 TABLE = TableConfig()
 MIDDLE, CORNER = np.array([0.53, 0.0, 0.025]), np.array([0.43, 0.21, 0.025])
-EYE = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
+EYE = ErrorRates(threshold=0.5, miss_rate=0.2, confusion_rate=0.1, false_detections=0.5, jitter=1.0)
 
 
 def look(*, view: str = "full", epoch: int = 0, hidden: slice = slice(0, 0)) -> Detections:

@@ -10,7 +10,7 @@ from ledger_bench import EYE, Bench
 from executive.ledger.belief import compute_repeat_probability
 from executive.ledger.certainty import Certainty
 
-DOUBTFUL = replace(EYE, confused=0.05, repeated=0.8)
+DOUBTFUL = replace(EYE, confusion_rate=0.05, repeated=0.8)
 CUBE = ("cube", 0.5, 0.0)
 
 
@@ -69,7 +69,7 @@ def test_a_place_searched_again_from_the_same_pose_is_hardly_emptier():
     once, twice, apart = Bench(), Bench(), Bench()
     for bench, views in ((once, ["eye"]), (twice, ["eye", "eye"]), (apart, ["eye", "other"])):
         for detector in views:
-            bench.look(by=replace(EYE, misses=0.2, repeated=0.8), view="full", detector=detector)
+            bench.look(by=replace(EYE, miss_rate=0.2, repeated=0.8), view="full", detector=detector)
     # A chance of 0.2 after the first look, times 0.8 + 0.2 * 0.2 or times 0.2 after the second one.
     assert [bench.overlooked(0.5, 0.0) for bench in (once, twice, apart)] == pytest.approx([0.2, 0.168, 0.04])
 

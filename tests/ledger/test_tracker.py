@@ -258,7 +258,7 @@ def test_one_slip_about_the_class_costs_some_looks_and_no_more(bench: Bench) -> 
 
 
 def test_a_misread_object_is_nobody_who_is_missed_before_its_class_is_sure(bench: Bench) -> None:
-    bad = ErrorRates(threshold=0.5, misses=0.2, confused=0.1, invented=0.5, jitter=1.0)
+    bad = ErrorRates(threshold=0.5, miss_rate=0.2, confusion_rate=0.1, false_detections=0.5, jitter=1.0)
     for _ in range(4):
         bench.look(CUBE, ("duck", 0.60, 0.15), by=bad)
     bench.drop("duck-1")
@@ -299,7 +299,7 @@ def test_what_is_put_down_stands_there_and_waits_for_a_look(bench: Bench) -> Non
 
 
 def test_what_is_likelier_an_invention_or_gone_stands_nowhere(bench: Bench) -> None:
-    wild = ErrorRates(threshold=0.5, misses=0.5, confused=0.004, invented=3.0, jitter=1.0)
+    wild = ErrorRates(threshold=0.5, miss_rate=0.5, confusion_rate=0.004, false_detections=3.0, jitter=1.0)
     bench.look(CUBE, by=wild)
     bench.look(by=wild)
     assert bench.ledger.find_objects_on_table() == []

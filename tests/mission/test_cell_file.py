@@ -61,6 +61,12 @@ def test_findings_say_what_and_where(old: str, new: str, expected: str, small_ce
     assert expected in complaint(small_cell.replace(old, new, 1))
 
 
+def test_a_renamed_key_is_found_with_its_new_name(small_cell: str) -> None:
+    text = small_cell.replace("min_force: 3.0", "least_force: 3.0")
+    assert 'tool has no key "least_force"' in complaint(text)
+    assert 'The key is now called "min_force".' in complaint(text)
+
+
 def test_a_finding_shows_line_and_caret(small_cell: str) -> None:
     text = small_cell.replace("source: a test\n    position", "sorce: a test\n    position")
     assert complaint(text).endswith(
@@ -193,7 +199,7 @@ def test_a_finding_about_a_value_of_the_base_stands_in_the_base(small_cell: str)
         "   2 | table: {x: [0.4]}\n"
         "     |         ^\n"
         "parts/base.yaml:12:34: error[out-of-range]: tool.force must be at least 0.001, not 0\n"
-        "  12 | tool: {cup_radius: 0.006, force: 0, gap: 0.008, tilt_deg: 30, least_force: 3.0, source: a test}\n"
+        "  12 | tool: {cup_radius: 0.006, force: 0, gap: 0.008, tilt_deg: 30, min_force: 3.0, source: a test}\n"
         "     |                                  ^"
     )
 

@@ -106,7 +106,7 @@ tree:
   - retry:
       attempts: $tries
       on: Pick.missed
-      backoff: {first: 0.5, factor: 2, most: 8}
+      backoff: {first: 0.5, factor: 2, max: 8}
       recover: Look
       do: [Look, Pick]
   - retry: {attempts: 2, backoff: 1, do: Look}

@@ -14,7 +14,7 @@ from executive.errors import DeadlinePassed, Unavailable
 from executive.perception.detectors.requests import Pending
 
 FOUND = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]
-ERROR_RATES = ErrorRates(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
+ERROR_RATES = ErrorRates(threshold=0.5, miss_rate=0.1, confusion_rate=0.1, false_detections=0.1, jitter=1.0)
 
 
 @pytest.fixture

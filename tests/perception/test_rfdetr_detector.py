@@ -91,7 +91,7 @@ def test_any_exported_model_can_be_used_by_path_and_the_embedded_one_needs_no_op
 
 
 def test_an_answer_shows_after_the_latency_with_its_detector_and_the_cells_names():
-    config = DetectorConfig(kind="rfdetr", threshold=0.6, misses=0.2)
+    config = DetectorConfig(kind="rfdetr", threshold=0.6, miss_rate=0.2)
     detector = RfdetrDetector(BrightSpots(256), config, setting(), {"spot": "cube"})
     clock = detector._setting.clock
     clock.now = 1.0

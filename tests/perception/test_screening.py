@@ -15,7 +15,7 @@ from executive.errors import Crowded, Unavailable
 from executive.geometry import Pose
 from executive.perception.detectors.screening import MAX_BOXES, screen, screen_detectors
 
-RATES = ErrorRates(threshold=0.5, misses=0.02, confused=0.0025, invented=0.02, jitter=0.7)
+RATES = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.7)
 VISIBLE = np.ones((20, 20), bool)
 VISIBLE[:, 10:] = False  # The arm hides the right half.
 FRAME = Frame(1, "eye", np.zeros((20, 20, 3), np.uint8), None, np.eye(3), Pose.identity(), 0.0, VISIBLE, 0)

@@ -21,7 +21,7 @@ def test_an_answer_becomes_visible_after_the_detectors_latency(fake: FakeCell) -
     detections = result.outputs["detections"]
     assert (result.status, [found.label for found in detections.found]) == ("SUCCESS", ["cube"])
     assert result.ticks == 12, "0.05 s at 240 Hz"
-    assert (detections.detector, detections.error_rates.misses) == ("embedded", 0.03)
+    assert (detections.detector, detections.error_rates.miss_rate) == ("embedded", 0.03)
 
 
 @pytest.mark.parametrize(

@@ -56,8 +56,8 @@ def lead(site: NodeContext, children: Sequence[Behaviour]) -> Parallel:
     return Parallel(site, do=children, wait_for="lead")
 
 
-def make_backoff(first: float, factor: float = 1.0, most: float = inf) -> Backoff:
-    return Backoff(first=first, factor=factor, most=most)
+def make_backoff(first: float, factor: float = 1.0, max: float = inf) -> Backoff:
+    return Backoff(first=first, factor=factor, max=max)
 
 
 def retry(

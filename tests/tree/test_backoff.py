@@ -16,8 +16,8 @@ from executive.tree.retry import Backoff, Retry
     [
         (make_backoff(0.5), [0.5, 0.5, 0.5, 0.5]),
         (make_backoff(0.5, 2), [0.5, 1.0, 2.0, 4.0]),
-        (make_backoff(0.5, 3, most=2.0), [0.5, 1.5, 2.0, 2.0]),
-        (make_backoff(3.0, most=2.0), [2.0, 2.0, 2.0, 2.0]),
+        (make_backoff(0.5, 3, max=2.0), [0.5, 1.5, 2.0, 2.0]),
+        (make_backoff(3.0, max=2.0), [2.0, 2.0, 2.0, 2.0]),
     ],
 )
 def test_waits_grow_by_the_factor_up_to_the_most(backoff: Backoff, delays: list[float]) -> None:
@@ -26,7 +26,7 @@ def test_waits_grow_by_the_factor_up_to_the_most(backoff: Backoff, delays: list[
 
 @pytest.mark.parametrize("factor", [2, 2.0])
 def test_no_number_of_attempts_is_too_large(factor: float) -> None:
-    assert make_backoff(0.5, factor, most=8.0).compute_delay(100_000) == 8.0
+    assert make_backoff(0.5, factor, max=8.0).compute_delay(100_000) == 8.0
 
 
 def runs(node: Retry, clock: Any, times: list[float]) -> str:
@@ -51,7 +51,7 @@ def test_a_retry_waits_on_the_clock_then_recovers_then_tries_again(
 
 
 def test_every_wait_is_the_next_one_of_the_backoff(leaf: Any, site: Any, clock: Any, log: Any) -> None:
-    node = retry(site(), leaf("A", "lost"), 4, [], None, make_backoff(0.25, 2, most=0.75), clock)
+    node = retry(site(), leaf("A", "lost"), 4, [], None, make_backoff(0.25, 2, max=0.75), clock)
     began = []
     for tick in range(20):
         clock.now = tick * clock.step

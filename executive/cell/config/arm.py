@@ -107,7 +107,7 @@ class ToolConfig(Section):
     """Rim gap at which the breakaway force has fallen to zero [m]."""
     tilt_deg: float = Field(ge=1, lt=90)
     """Angle between surface normal and tool axis at which the breakaway force has fallen to zero [degree]."""
-    least_force: Force
+    min_force: Force
     """Breakaway force under which the vacuum sensor reports no seal [N]."""
     source: str
     """Source of the constants."""
@@ -128,7 +128,7 @@ class MotionConfig(Section):
     straight: float = Field(0.0, ge=0, le=0.2)
     """Length of the straight vertical segment at the end of a motion into a bin and at the start of a motion
     upwards [m]."""
-    planning: float = Field(0.1, ge=0.1, le=60)
+    planning_time: float = Field(0.1, ge=0.1, le=60)
     """Time for planning a motion on the clock of the run, unless the motion was planned ahead [s]. The lower
     bound is the 99th percentile of the planning time measured on two cores, 94 ms, rounded up
     (`tests/benchmarks/README.md`)."""

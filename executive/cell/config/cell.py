@@ -20,11 +20,11 @@ class LedgerConfig(Section):
     """Largest distance between a precise detection and the item that it shows [m]."""
     neighbourhood: Distance = 0.07
     """Radius around a picked item in which others may have been moved [m]."""
-    overlooked: float = Field(0.001, ge=1e-9, lt=1)
+    max_miss_probability: float = Field(0.001, ge=1e-9, lt=1)
     """Largest probability of an overlooked object at a position that counts as empty."""
-    misjudged: float = Field(0.005, ge=1e-9, lt=1)
+    max_class_error: float = Field(0.005, ge=1e-9, lt=1)
     """Largest probability of a wrong class with which an item is sorted."""
-    aim: Length = 0.005
+    max_position_std: Length = 0.005
     """Largest standard error of the position of an item to approach [m]; two thirds after a failed grasp."""
 
 

@@ -23,12 +23,12 @@ class DetectorConfig(Section):
     """Confidence below which a box is ignored."""
     latency: Seconds = 0.05
     """Time from a frame to the answer on the clock of the run [s]."""
-    misses: float = Field(0.03, gt=0, lt=1)
+    miss_rate: float = Field(0.03, gt=0, lt=1)
     """Share of the objects in full view that one look misses. This and the next three keys are only for fake
     detectors; `executive evaluate` measures the error rates of others."""
-    confused: float = Field(0.004, gt=0, lt=1)
+    confusion_rate: float = Field(0.004, gt=0, lt=1)
     """Share of the found objects that get a wrong class."""
-    invented: float = Field(0.02, gt=0, le=100)
+    false_detections: float = Field(0.02, gt=0, le=100)
     """Number of false detections per look."""
     jitter: float = Field(1.0, gt=0, le=1000)
     """Standard deviation of the random error of a box's centre, along each axis [pixel]."""
@@ -42,7 +42,9 @@ class DetectorConfig(Section):
     @property
     def error_rates(self) -> ErrorRates:
         """Error rates that the cell file declares."""
-        return ErrorRates(self.threshold, self.misses, self.confused, self.invented, self.jitter)
+        return ErrorRates(
+            self.threshold, self.miss_rate, self.confusion_rate, self.false_detections, self.jitter
+        )
 
     @property
     def options(self) -> dict[str, Any]:

@@ -71,7 +71,7 @@ class FakeArm:
         self._height = travel_height(config)
         self._joint_count = config.arm.joint_count
         self._obstacles = FakeObstacles(config)
-        self._plans = Plans(self._plan_motion, clock, config.motion.planning, emit)
+        self._plans = Plans(self._plan_motion, clock, config.motion.planning_time, emit)
         self._tool = self.poses["home"]
         self._path: list[Pose] = []
         self._half_length = 0

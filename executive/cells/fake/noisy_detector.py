@@ -38,9 +38,9 @@ class NoisyOptions(Section):
 class NoisyDetector:
     """Adds errors to the answers of another detector; implements `executive.cell.protocols.Detector`.
 
-    The errors in each frame are random and depend on the seed. The detector omits the fraction `misses` of
-    the detections, gives the fraction `confused` a wrong class with low confidence, shifts each box along
-    each axis by a normal deviate with the standard deviation `jitter`, and adds `invented` boxes on average.
+    The errors in each frame are random and depend on the seed. The detector omits the fraction `miss_rate` of
+    the detections, gives the fraction `confusion_rate` a wrong class with low confidence, shifts each box along
+    each axis by a normal deviate with the standard deviation `jitter`, and adds `false_detections` boxes on average.
     The ledger assumes the same rates, because they come from the same section of the cell file.
 
     Attributes:
@@ -84,15 +84,15 @@ class NoisyDetector:
     def _add_errors(self, answer: Answer, frame: Frame, view: str) -> Answer:
         """Return the answer with random errors, which depend on the seed, the frame and the view."""
         random = np.random.default_rng([self._setting.seed, frame.id, len(view)])
-        kept = [detection for detection in answer.found if random.random() >= self._config.misses]
+        kept = [detection for detection in answer.found if random.random() >= self._config.miss_rate]
         found = [self._shift_box(self._replace_class(detection, random), random) for detection in kept]
-        false_count = random.poisson(self._config.invented)
+        false_count = random.poisson(self._config.false_detections)
         found += [self._make_false_detection(frame, view, random) for _ in range(false_count)]
         found.sort(key=lambda detection: -detection.confidence)
         return Answer(self._setting.name, tuple(found), self._config.error_rates)
 
     def _replace_class(self, detection: Detection, random: np.random.Generator) -> Detection:
-        if random.random() >= self._config.confused:
+        if random.random() >= self._config.confusion_rate:
             return detection
         wrong_labels = [label for label in self._options.classes if label != detection.label]
         return replace(

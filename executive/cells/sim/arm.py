@@ -66,7 +66,7 @@ class SimArm:
         self.planner = planner
         self._world = world
         self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
-        self._plans = Plans(self._solve, clock, config.motion.planning, emit)
+        self._plans = Plans(self._solve, clock, config.motion.planning_time, emit)
         self._contacts = Contacts(world, held)
         self._motion: Trajectory | None = None
         self._time = 0.0

@@ -135,7 +135,7 @@ class SuctionTool:
         world, config = self._world, self._config
         seal = measure_contact(world.client, world.tool_pose(), movable, config.cup_radius, config.reach)
         bears = breakaway_force(seal, config)
-        if seal is not None and bears >= config.least_force:
+        if seal is not None and bears >= config.min_force:
             self.fallen.discard(seal.body)
             self._grip = _Grip(seal.body, self._attach(seal.body), bears)
             # Cup and body overlap slightly; their contact forces would act against the constraint.

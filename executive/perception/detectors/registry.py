@@ -13,7 +13,7 @@ from executive.perception.detectors.setting import ClosableDetector, DetectorSet
 from executive.plugins import PluginEntry, list_entries
 
 GROUP = "executive.detectors"
-FAKE_ERROR_RATES = frozenset({"misses", "confused", "invented", "jitter"})
+FAKE_ERROR_RATES = frozenset({"miss_rate", "confusion_rate", "false_detections", "jitter"})
 """Keys of the error rates that only the section of a fake detector may have."""
 
 

@@ -23,9 +23,9 @@ MAX_FILE_SIZE = 1_000_000
 class StoredErrorRates(Section):
     """Stored fields of `executive.cell.error_rates.ErrorRates`."""
 
-    misses: float = Field(gt=0, lt=1)
-    confused: float = Field(gt=0, lt=1)
-    invented: float = Field(gt=0)
+    miss_rate: float = Field(gt=0, lt=1)
+    confusion_rate: float = Field(gt=0, lt=1)
+    false_detections: float = Field(gt=0)
     jitter: float = Field(gt=0)
     repeated: float = Field(ge=0, lt=1)
     bias: float = Field(ge=0)
@@ -41,7 +41,7 @@ class ErrorCounts(Section):
     objects: int
     missed: int
     confused: int
-    invented: int
+    false_detections: int
 
 
 class Measurement(Section):
@@ -57,8 +57,8 @@ class Measurement(Section):
     """Duration of the measurement [s]."""
     images: int
     rates: StoredErrorRates
-    """`misses`, `confused`, `invented`: upper 95 % bounds; `repeated`: Laplace estimate; `jitter`, `bias`:
-    standard deviations."""
+    """`miss_rate`, `confusion_rate`, `false_detections`: upper 95 % bounds; `repeated`: Laplace estimate;
+    `jitter`, `bias`: standard deviations."""
     classes: dict[str, ErrorCounts]
     """Errors by class; a false detection counts for the class that it was given."""
     counts: dict[str, ErrorCounts]

@@ -52,17 +52,17 @@ class MeasuredErrorRates:
     """Measured error rates of a detector on objects in full view.
 
     Attributes:
-        misses: Rate of missed objects in full view.
-        confused: Rate of wrong classes among the found objects in full view.
-        invented: Rate of false detections per look.
+        miss_rate: Rate of missed objects in full view.
+        confusion_rate: Rate of wrong classes among the found objects in full view.
+        false_detections: Rate of false detections per look.
         jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
         repeated: Laplace estimate of the share of the errors that a second look from the same pose repeats.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
     """
 
-    misses: CountedRate
-    confused: CountedRate
-    invented: CountedRate
+    miss_rate: CountedRate
+    confusion_rate: CountedRate
+    false_detections: CountedRate
     jitter: float
     repeated: float
     bias: float
@@ -71,9 +71,9 @@ class MeasuredErrorRates:
     def rates(self) -> StoredErrorRates:
         """Rates for the ledger, rounded up: the bounds, the repeated share and the standard deviations."""
         return StoredErrorRates(
-            misses=min(round_up(self.misses.bound), MAX_SHARE),
-            confused=min(round_up(self.confused.bound), MAX_SHARE),
-            invented=round_up(self.invented.bound),
+            miss_rate=min(round_up(self.miss_rate.bound), MAX_SHARE),
+            confusion_rate=min(round_up(self.confusion_rate.bound), MAX_SHARE),
+            false_detections=round_up(self.false_detections.bound),
             jitter=max(round_up(self.jitter), MIN_JITTER),
             repeated=min(round_up(self.repeated), MAX_SHARE),
             bias=round_up(self.bias),

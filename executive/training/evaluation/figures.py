@@ -73,8 +73,8 @@ class Evaluation:
         unavailable: Images about which the detector gave no usable answer.
         why: What it said when it did so for the last time, or "".
         answered_by: Number of answers by the name of the detector.
-        by_count: Numbers of `objects` in full view, `missed`, `confused` and `invented` ones by the number of
-            objects on the image.
+        by_count: Numbers of `objects` in full view, `missed` and `confused` ones, and `false_detections`,
+            by the number of objects on the image.
         reliability: Error rates for the ledger; None where nothing was answered.
         frames: Brightness, contrast and colours of the workspace; None if no image showed all of it.
     """

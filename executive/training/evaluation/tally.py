@@ -27,8 +27,8 @@ class Tally:
         localizer: Computes the positions of detections, which are compared with the true ones.
 
     Attributes:
-        by_count: Numbers of `objects` in full view, `missed`, `confused` and `invented` ones by the number of
-            objects on the image.
+        by_count: Numbers of `objects` in full view, `missed` and `confused` ones, and `false_detections`,
+            by the number of objects on the image.
         confusion: Number of detections by true and found class, `nothing` among both.
         centre: Distances between the centres of found and true box, of right detections [pixel of the image].
         position: These distances in the world, at the object's height, of objects wholly in view [mm].
@@ -56,9 +56,9 @@ class Tally:
                 counts.update(objects=1, missed=one is None, confused=is_confused)
             if one is not None and one.right:
                 self._measure(one, number, sample, frame)
-        invented = [one.detection.label for one in matches if one.number is None]
-        self.confusion.update((NOTHING, label) for label in invented)
-        counts.update(invented=len(invented))
+        false_detections = [one.detection.label for one in matches if one.number is None]
+        self.confusion.update((NOTHING, label) for label in false_detections)
+        counts.update(false_detections=len(false_detections))
 
     @property
     def objects(self) -> int:
@@ -101,9 +101,9 @@ class Tally:
         counts = sum(self.by_count.values(), Counter[str]())
         total = float(np.sqrt(np.mean(self._squares))) if self._squares else 0.0
         return MeasuredErrorRates(
-            misses=CountedRate.share(counts["missed"], counts["objects"]),
-            confused=CountedRate.share(counts["confused"], counts["objects"] - counts["missed"]),
-            invented=CountedRate.per_trial(counts["invented"], self._looks),
+            miss_rate=CountedRate.share(counts["missed"], counts["objects"]),
+            confusion_rate=CountedRate.share(counts["confused"], counts["objects"] - counts["missed"]),
+            false_detections=CountedRate.per_trial(counts["false_detections"], self._looks),
             jitter=total if repeats.jitter is None else repeats.jitter,
             repeated=repeats.repeated_share,
             bias=repeats.bias,
@@ -169,9 +169,9 @@ class RepeatedErrors:
             self.repeated += found != label and found == again
             if one and other and one.right and other.right:
                 self._compare(one, other, sample, frame)
-        invented = [one.detection for one in second if one.number is None]
+        false_detections = [one.detection for one in second if one.number is None]
         for false in (one.detection for one in first if one.number is None):
-            alike = [one.box for one in invented if one.label == false.label]
+            alike = [one.box for one in false_detections if one.label == false.label]
             self.errors += 1
             self.repeated += bool(overlap([false.box], alike).max(initial=0.0) >= MIN_OVERLAP)
 

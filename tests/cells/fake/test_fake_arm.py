@@ -16,7 +16,7 @@ from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
 from executive.geometry import Array, tool_down
 
-LATENCY = load_empty_cell().motion.planning
+LATENCY = load_empty_cell().motion.planning_time
 BESIDE = Goal((0.5, 0.2, 0.03), guarded=0.02, speed=0.05)
 
 

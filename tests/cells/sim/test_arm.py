@@ -34,7 +34,7 @@ def test_a_plan_takes_its_time_on_the_clock_and_is_told(rig: Rig) -> None:
     while not planning.ready:
         rig.step()
         waited += 1
-    assert waited == round(rig.config.motion.planning * 240) == 24
+    assert waited == round(rig.config.motion.planning_time * 240) == 24
     duration = round(planning.result().duration, 4)
     assert rig.events == [MotionPlanned(False, 0.1, duration)]
 

@@ -13,7 +13,7 @@ from executive.geometry import tool_down
 
 REACH = 0.002
 TOOL = ToolConfig(
-    cup_radius=0.006, reach=REACH, force=8.0, gap=0.004, tilt_deg=60, least_force=1.0, source="test"
+    cup_radius=0.006, reach=REACH, force=8.0, gap=0.004, tilt_deg=60, min_force=1.0, source="test"
 )
 
 

@@ -23,7 +23,9 @@ from executive.perception.envelope.rated_detectors import (
     find_unmeasured,
 )
 
-RATES = StoredErrorRates(misses=0.01, confused=0.002, invented=0.015, jitter=0.1, repeated=0.5, bias=0.001)
+RATES = StoredErrorRates(
+    miss_rate=0.01, confusion_rate=0.002, false_detections=0.015, jitter=0.1, repeated=0.5, bias=0.001
+)
 WOOD = FrameRange(brightness=(180, 195), contrast=(0, 6), red=(210, 225), green=(190, 205), blue=(150, 165))
 
 
@@ -66,7 +68,7 @@ def test_a_measurement_of_another_camera_pose_does_not_hold_and_the_change_is_na
 def test_a_damaged_file_is_named_and_the_rates_are_assumed(overhead, tmp_path):
     (tmp_path / "overhead.measured.json").write_text("{")
     error_rates = find_envelopes(overhead, tmp_path, [tmp_path])["embedded"].error_rates
-    assert (error_rates.misses, error_rates.repeated) == (0.15, 0.8)
+    assert (error_rates.miss_rate, error_rates.repeated) == (0.15, 0.8)
     reason = error_rates.doubt
     assert "was never measured in this cell" in reason
     assert f"the measurements in {tmp_path}/overhead.measured.json cannot be read" in reason

@@ -15,7 +15,7 @@ from executive.training.labelled_image import LabelledImage
 CUBE, DUCK, HALF_HIDDEN = (10.0, 10.0, 40.0, 40.0), (100.0, 100.0, 140.0, 130.0), (200.0, 20.0, 230.0, 50.0)
 
 
-ERROR_RATES = ErrorRates(threshold=0.5, misses=0.1, confused=0.1, invented=0.1, jitter=1.0)
+ERROR_RATES = ErrorRates(threshold=0.5, miss_rate=0.1, confusion_rate=0.1, false_detections=0.1, jitter=1.0)
 
 
 class Scripted:

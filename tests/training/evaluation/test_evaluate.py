@@ -31,7 +31,9 @@ def off(sample):
 
 def counts(measured):
     stated = measured.reliability
-    return [(one.events, one.trials) for one in (stated.misses, stated.confused, stated.invented)]
+    return [
+        (one.events, one.trials) for one in (stated.miss_rate, stated.confusion_rate, stated.false_detections)
+    ]
 
 
 def test_a_perfect_detector_is_perfect(saying, sample, both):
@@ -43,9 +45,9 @@ def test_a_perfect_detector_is_perfect(saying, sample, both):
     plain = measured.as_dict()
     perfect = {"objects": 1, "precision": 1, "recall": 1}
     assert plain["by_class"] == {"cube": perfect, "duck": perfect}
-    bounds = {"misses": 0.78, "confused": 0.78, "invented": 3.0}
+    bounds = {"miss_rate": 0.78, "confusion_rate": 0.78, "false_detections": 3.0}
     assert plain["reliability"]["rates"] == {**bounds, "jitter": 0.01, "repeated": 0.5, "bias": 0.0}
-    assert plain["by_count"] == {2: {"objects": 2, "missed": 0, "confused": 0, "invented": 0}}
+    assert plain["by_count"] == {2: {"objects": 2, "missed": 0, "confused": 0, "false_detections": 0}}
 
 
 def test_a_miss_lowers_recall_and_a_phantom_lowers_precision(saying, sample, both):
@@ -105,7 +107,7 @@ def test_a_detector_that_is_unavailable_is_counted_apart(saying, sample, both):
     measured = evaluate(saying(both, "the server is gone", both), [sample] * 4)
     assert (measured.images, measured.unavailable, measured.why) == (4, 1, "the server is gone")
     assert (measured.objects, measured.recall, measured.answered_by) == (6, 1, {"scripted": 3})
-    assert measured.reliability.invented.trials == 3
+    assert measured.reliability.false_detections.trials == 3
 
 
 def test_without_answers_there_are_zeros_and_no_spreads(saying, sample):
@@ -151,14 +153,24 @@ def rates(full_view_count, missed, confused, invented, looks, jitter):
 
 def test_the_rates_for_the_ledger_are_upper_bounds_rounded_up():
     assert rates(1344, 0, 2, 1, 300, 0.432).rates == StoredErrorRates(
-        misses=0.0023, confused=0.0047, invented=0.016, jitter=0.44, repeated=0.76, bias=0.0012
+        miss_rate=0.0023,
+        confusion_rate=0.0047,
+        false_detections=0.016,
+        jitter=0.44,
+        repeated=0.76,
+        bias=0.0012,
     )
 
 
 @pytest.mark.parametrize("full_view_count", [0, 5])
 def test_no_rate_is_zero_or_one_even_if_nothing_was_counted(full_view_count):
     extreme = rates(full_view_count, full_view_count, 0, 0, 1, 0.0).rates
-    assert (extreme.misses, extreme.confused, extreme.invented, extreme.jitter) == (0.99, 0.99, 3.0, 0.01)
+    assert (extreme.miss_rate, extreme.confusion_rate, extreme.false_detections, extreme.jitter) == (
+        0.99,
+        0.99,
+        3.0,
+        0.01,
+    )
 
 
 @pytest.mark.parametrize(
@@ -172,7 +184,7 @@ def test_no_rate_is_zero_or_one_even_if_nothing_was_counted(full_view_count):
 def test_the_bounds_are_those_of_the_tables(full_view_count, missed, invented, expected):
     """Clopper and Pearson's, and Garwood's: half the 95 % quantile of chi-squared with 2 k + 2 degrees."""
     found = rates(full_view_count, missed, 0, invented, 100, 0.1)
-    assert (found.misses.bound, found.invented.bound) == pytest.approx(expected, rel=1e-4)
+    assert (found.miss_rate.bound, found.false_detections.bound) == pytest.approx(expected, rel=1e-4)
 
 
 def test_a_bound_is_rounded_up():
