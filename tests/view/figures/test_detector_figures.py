@@ -44,7 +44,8 @@ def test_rates_classes_confusions_who_answered_and_the_rates_for_the_ledger_are_
         "precision 99.10%, recall 98.00%, mAP50 0.9950, mAP50-95 0.8000",
         "cube 900 99.10% 98.00%", "taken for cube nothing", "cube 882 18", "nothing 8",
         "frame to detections [ms] 15.00 16.00 17.00 18.00",
-        "miss_rate 0.0079, confusion_rate 0.0038, false_detections 0.049, jitter 0.5, repeated 0.8, bias 0.001",
+        "miss_rate 0.0079, confusion_rate 0.0038, false_detections 0.049, "
+        "jitter 0.5, repeated 0.8, bias 0.001",
     }  # fmt: skip
     assert not any("unavailable" in line or "answered" in line for line in lines)
     other = replace(MEASURED, answered_by={"server": 290, "embedded": 10})
