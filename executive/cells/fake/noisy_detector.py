@@ -40,7 +40,7 @@ class NoisyDetector:
 
     The errors in each frame are random and depend on the seed. The detector omits the fraction `miss_rate`
     of the detections, gives the fraction `confusion_rate` a wrong class with low confidence, shifts each box
-    along each axis by a normal deviate with the standard deviation `jitter`, and adds `false_detections` boxes
+    along each axis by a normal deviate with standard deviation `jitter`, and adds `false_detections` boxes
     on average. The ledger assumes the same rates, because they come from the same section of the cell file.
 
     Attributes:
