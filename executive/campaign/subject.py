@@ -56,6 +56,6 @@ def load_subject(mission: str, overrides: Mapping[str, str], oracle: bool, seed:
         raise InputError(
             f"--oracle is for simulated cells, but {loaded.mission.name} has a cell of kind {kind}; omit it"
         )
-    from executive.testing.oracle import oracle_cell
+    from executive.testing.oracle import make_oracle_kind
 
-    return Subject(loaded, skills, oracle_cell(), "sim, detections from the truth", seed)
+    return Subject(loaded, skills, make_oracle_kind(), "sim, detections from the truth", seed)

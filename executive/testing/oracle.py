@@ -1,7 +1,7 @@
-"""Simulated cell with true detections: physics and motion are simulated, detections are the true boxes.
+"""Simulated cell with true detections: physics and motion are simulated, detectors return the true boxes.
 
-A whole simulated sort takes about a second of computing time, without errors of a network. Each frame carries
-its true detections, so that a detector knows no more than its frame shows.
+A simulated sort takes about a second of computing time, and no network makes errors. Each frame contains its
+true detections, so that a detector knows only the objects that are visible in its frame.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from executive.geometry import Array
 from executive.perception.camera_model import NEAR, project
 from executive.perception.detectors.requests import Pending
 
-CONFIDENCE = 0.9
+ORACLE_CONFIDENCE = 0.9
 """Confidence of all detections of an oracle."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrueFrame(Frame):
-    """A frame with its true detections.
+    """A frame with the true detections of its objects.
 
     Attributes:
-        truth: Boxes around the outlines of the loose objects before the lens; an object whose centre is
-            hidden by another one is missing.
+        true_detections: Boxes around the outlines of the loose objects in front of the camera, without those
+            whose centre is occluded by another object.
     """
 
-    truth: tuple[Detection, ...]
+    true_detections: tuple[Detection, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +60,8 @@ class _Outline:
     pixels: Array
     distance: float
 
-    def is_hiding(self, other: _Outline) -> bool:
-        """Return True if this object is nearer than another one and covers the centre of the other box."""
+    def is_occluding(self, other: _Outline) -> bool:
+        """Return True if this object is nearer than `other` and occludes the centre of the box of `other`."""
         left, top, right, bottom = outline_box(other.pixels)
         hull = cv2.convexHull(self.pixels.astype(np.float32))
         centre = ((left + right) / 2, (top + bottom) / 2)
@@ -69,19 +69,22 @@ class _Outline:
 
 
 class TruthCamera(SimCamera):
-    """A simulated camera whose frames carry true detections; images are black without `rendered` or depth."""
+    """A simulated camera whose frames contain true detections.
 
-    def __init__(self, world: World, *args: Any, rendered: bool = False, **options: Any) -> None:
+    Images are black unless `renders_images` is True or the camera measures depth.
+    """
+
+    def __init__(self, world: World, *args: Any, renders_images: bool = False, **options: Any) -> None:
         super().__init__(world, *args, **options)
-        self._rendered = rendered
+        self._renders_images = renders_images
 
     def capture(self) -> TrueFrame:
-        """Return a new frame with its true detections."""
+        """Capture an image and return the frame with its true detections."""
         frame = super().capture()
-        return TrueFrame(**vars(frame), truth=self._find_true_detections())
+        return TrueFrame(**vars(frame), true_detections=self._find_true_detections())
 
     def _capture_images(self) -> tuple[Image, Array | None]:
-        if self._rendered or self.config.depth:
+        if self._renders_images or self.config.depth:
             return super()._capture_images()
         return np.zeros((self.config.height, self.config.width, 3), np.uint8), None
 
@@ -96,71 +99,69 @@ class TruthCamera(SimCamera):
                 pixels = project(matrix, X_WC, outline)
                 outlines.append(_Outline(label, pixels, float(distances.mean())))
         return tuple(
-            Detection(outline.label, CONFIDENCE, outline_box(outline.pixels))
+            Detection(outline.label, ORACLE_CONFIDENCE, outline_box(outline.pixels))
             for outline in outlines
-            if outline.label != UNKNOWN and not any(other.is_hiding(outline) for other in outlines)
+            if outline.label != UNKNOWN and not any(other.is_occluding(outline) for other in outlines)
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Oracle:
-    """A detector that answers with the truth of a `TrueFrame`; implements `cell.protocols.Detector`.
+    """A detector that returns the true detections of a `TrueFrame`; implements `cell.protocols.Detector`.
 
-    It reports the boxes whose centre is in the searched part of the image and not hidden by the arm.
+    Detections are returned if their centre is in the searched region and not occluded by the arm.
 
     Attributes:
         name: Name of the detector in the cell file.
-        config: Threshold and latency of the detector; the kind is ignored.
+        config: Section of the detector in the cell file; only threshold, error rates and latency are used.
         camera: Camera of the frames.
         clock: Clock of the run.
-        jitter: Standard deviation of each side of a box [pixel].
-        seed: Random seed of the jitter, together with the number of the frame.
+        box_std: Standard deviation of the noise of each box coordinate [pixel].
+        seed: Random seed of the noise; each frame has its own noise.
     """
 
     name: str
     config: DetectorConfig
     camera: CameraConfig
     clock: Clock
-    jitter: float
+    box_std: float
     seed: int
 
     def request(self, frame: Frame, view: str) -> Pending:
         """Request the true detections of `frame`, which are available after the latency of the detector."""
-        assert isinstance(frame, TrueFrame), "an oracle needs the frames of a TruthCamera"
+        assert isinstance(frame, TrueFrame), "an oracle requires frames of a TruthCamera"
         random = np.random.default_rng([self.seed, frame.id])
         found = []
-        for true in frame.truth:
-            box = np.array(true.box) + random.normal(0.0, self.jitter, 4)
-            seen = Detection(true.label, true.confidence, (box[0], box[1], box[2], box[3]))
-            column, row = seen.centre
+        for true in frame.true_detections:
+            box = np.array(true.box) + random.normal(0.0, self.box_std, 4)
+            detection = Detection(true.label, true.confidence, (box[0], box[1], box[2], box[3]))
+            column, row = detection.centre
             left, top, right, bottom = self.camera.area(view)
             if left <= column < right and top <= row < bottom and frame.visible[int(row), int(column)]:
-                found.append(seen)
+                found.append(detection)
         answer: Future[list[Detection]] = Future()
         answer.set_result(found)
-        due = self.clock.now + self.config.latency
-        return Pending(answer, due, self.clock, self.name, self.config.error_rates)
+        answer_time = self.clock.now + self.config.latency
+        return Pending(answer, answer_time, self.clock, self.name, self.config.error_rates)
 
     def close(self) -> None:
         """Do nothing: an oracle holds no resources."""
 
 
-def oracle_cell(*, jitter: float = 0.7, rendered: bool = False) -> Callable[..., SimCell]:
-    """Return a kind of cell for `RunOptions.kind`: a simulated cell with oracles as detectors.
+def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> Callable[..., SimCell]:
+    """Return a function for `RunOptions.kind` that makes simulated cells with oracles as detectors.
 
     Args:
-        jitter: Standard deviation of each side of a box [pixel].
-        rendered: True to render the images of the camera; otherwise they are black.
+        box_std: Standard deviation of the noise of each box coordinate [pixel].
+        renders_images: True to render the images of the camera; otherwise they are black.
     """
-    camera = partial(TruthCamera, rendered=rendered)
-    return partial(SimCell, camera=camera, detectors=partial(_build_oracles, jitter=jitter))
+    camera = partial(TruthCamera, renders_images=renders_images)
+    return partial(SimCell, camera=camera, detectors=partial(_build_oracles, box_std=box_std))
 
 
 def _build_oracles(
-    config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path], jitter: float
+    config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path], box_std: float
 ) -> dict[str, Oracle]:
     del base, folders
     camera = next(iter(config.cameras.values()))
-    return {
-        name: Oracle(name, section, camera, clock, jitter, seed) for name, section in config.detectors.items()
-    }
+    return {name: Oracle(name, part, camera, clock, box_std, seed) for name, part in config.detectors.items()}

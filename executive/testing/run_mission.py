@@ -23,20 +23,20 @@ from executive.testing.faults.faulty_cell import FaultyCell, with_faults
 from executive.testing.faults.script import ScheduledFault
 from executive.tree.skill_leaf import SkillLeaf
 
-TIMEOUT = 600.0
-"""Time on the run's clock after which a mission counts as endless [s]."""
+MISSION_TIMEOUT = 600.0
+"""Default time on the run's clock after which a mission ends as a fault [s]."""
 
 
 @dataclass(frozen=True)
 class MissionResult(RunEnded):
-    """End and record of a mission.
+    """Result of a mission run: its `RunEnded` event, all events, and the final counts.
 
     Attributes:
         events: All events of the run, in order.
-        items: Counts of the items by final state; see `Accounts.count_states`.
+        items: Number of items of the ledger by final state; see `Accounts.count_states`.
         accounts: The ledger, with the final state of each item.
-        audit: True final counts of the objects, or None if they are unknown.
-        cell: The innermost cell of the run, closed.
+        audit: True number of objects by final place; None if the cell has no ground truth.
+        cell: The closed cell of the run, without wrappers.
     """
 
     events: Sequence[TimedEvent]
@@ -47,22 +47,22 @@ class MissionResult(RunEnded):
 
     @property
     def agrees(self) -> bool:
-        """True if the ledger and the audit agree, or there is no audit."""
+        """True if the counts of ledger and audit agree, or there is no audit."""
         return self.audit is None or agrees(self.items, self.audit, self.empty)
 
-    def find_activations(self, pattern: str) -> list[str]:
-        """Return the path of each activated node whose path matches a pattern, in order."""
+    def list_activated_nodes(self, pattern: str) -> list[str]:
+        """Return the paths of all activated nodes, in order of activation, that match the pattern."""
         started = (timed.event.node for timed in self.events if isinstance(timed.event, NodeStarted))
         return [node for node in started if fnmatchcase(node, pattern)]
 
-    def find_reasons(self, pattern: str = "*") -> list[str]:
-        """Return the reason of each failure of a skill whose node's path matches a pattern, in order."""
+    def list_failure_reasons(self, pattern: str = "*") -> list[str]:
+        """Return the reasons of all failures of skills, in order, whose node has a path that matches."""
         ended = (timed.event for timed in self.events if isinstance(timed.event, NodeEnded))
         failures = (event for event in ended if event.skill and event.status == "FAILURE")
         return [event.reason for event in failures if fnmatchcase(event.node, pattern)]
 
-    def find_faults(self) -> list[FaultInjected]:
-        """Return the injected faults, in order."""
+    def list_injected_faults(self) -> list[FaultInjected]:
+        """Return the `FaultInjected` events, in order."""
         return [timed.event for timed in self.events if isinstance(timed.event, FaultInjected)]
 
 
@@ -77,26 +77,26 @@ def run_mission(
     faults: Sequence[ScheduledFault] = (),
     arrange: Callable[[Any], object] | None = None,
     observers: Sequence[Observer] = (),
-    timeout: float = TIMEOUT,
+    timeout: float = MISSION_TIMEOUT,
 ) -> MissionResult:
     """Run a mission to its end, close the cell and return the result.
 
     Args:
-        mission: A mission file, or the name of a shipped mission.
-        kind: Makes the work cell, instead of the kind in the mission's cell file.
+        mission: Mission file, or name of a shipped mission.
+        kind: Function that makes the work cell, instead of the kind in the cell file.
         seed: Random seed.
-        set: Values of params by name, and of keys of the cell file as `cell.<key>.<key>`.
+        set: Values by name of a param, or by `cell.<key>.<key>` for a key of the cell file.
         requests: Requests of the operator, in order.
-        substitutes: Skills that replace those of nodes, by a pattern of the node's path.
-        faults: Faults of the cell, and their times.
-        arrange: Called with the cell before the run, to put objects on its table.
-        observers: Called with each event.
+        substitutes: Skills that replace the skills of nodes, by a pattern that the paths of the nodes match.
+        faults: Fault script of the cell.
+        arrange: Function that changes the cell before the run, for instance puts objects on the table.
+        observers: Functions that are called with each event.
         timeout: Time on the run's clock after which the run ends as a fault [s].
 
     Raises:
-        MissionError: The mission is wrong.
-        InputError: The mission does not exist, or a pattern matches no node, or a node with another skill
-            than that of the substitute.
+        MissionError: The mission has errors.
+        InputError: The mission does not exist, a pattern matches no node, or a substitute is no subclass of
+            the skill that it replaces.
     """
     skills = discover()
     loaded = load_mission(mission, skills, set)
@@ -119,11 +119,11 @@ def run_mission(
     assert isinstance(workcell, FaultyCell)
     try:
         workcell.check_patterns([getattr(node, "path", node.name) for node in run.root.iterate()])
-        _require_matching_substitutes(run, skills)
+        _check_substitutes(run, skills)
         run.add_observer(workcell.on_event)
-        outcome = run.execute()
+        run_ended = run.execute()
         return MissionResult(
-            **asdict(outcome),
+            **asdict(run_ended),
             events=events,
             items=run.count_items(),
             accounts=workcell.accounts,
@@ -134,11 +134,11 @@ def run_mission(
         run.close()
 
 
-def _require_matching_substitutes(run: Run, skills: Mapping[str, type[Skill]]) -> None:
-    """Return if each node runs its own skill or a subclass of it."""
+def _check_substitutes(run: Run, skills: Mapping[str, type[Skill]]) -> None:
+    """Raise InputError if a node runs neither the skill of the mission nor a subclass of this skill."""
     for node in run.root.iterate():
         if isinstance(node, SkillLeaf) and not issubclass(node.skill_type, skills[node.skill_name]):
             raise InputError(
-                f"{node.path} runs {node.skill_name}, and {node.skill_type.__name__} is not a subclass; "
-                "give the substitute a pattern that matches only nodes of its own skill"
+                f"{node.path} runs {node.skill_name}, but {node.skill_type.__name__} is not a subclass; "
+                "give the substitute a pattern that matches only nodes of its skill"
             )

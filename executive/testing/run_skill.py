@@ -1,4 +1,4 @@
-"""Execution of one skill in a test, without a tree."""
+"""Execution of one skill in a test, without a behaviour tree."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from executive.run.run_context import MAX_BRAKING_TIME
 from executive.skill import Skill, SkillFailed
 from executive.tree.skill_run import SkillRun
 
-_ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
-_COMMANDS = COMMANDS | {
+_INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "operator")
+_LOGGED_CALLS = COMMANDS | {
     "camera.capture", "camera.next_pose", "operator.ask", "ledger.observe", "ledger.record_touch",
     "ledger.record_miss", "ledger.record_grasp", "ledger.record_drop", "ledger.record_placement",
     "ledger.record_put_down", "ledger.reject", "ledger.invalidate_positions",
@@ -29,17 +29,17 @@ _COMMANDS = COMMANDS | {
 
 @dataclass(frozen=True)
 class SkillResult:
-    """End of a skill, and its commands.
+    """Result of a run of a skill.
 
     Attributes:
-        status: `SUCCESS`, `FAILURE`, `HALTED`, or `RUNNING` if it was still running after `ticks`.
+        status: `SUCCESS`, `FAILURE`, `HALTED`, or `RUNNING` if the skill has not ended.
         reason: The declared reason of a failure, or "".
         message: Message of the failure, or "".
-        outputs: Values of the output ports, on success.
+        outputs: Values of the output ports by name, on success.
         ticks: Number of control steps.
-        commanded: Commands to the cell, in order, as texts (`note_commands`).
-        braking: Number of control steps from a halt until the arm was at rest; None if the arm still moved
-            after `MAX_BRAKING_TIME`.
+        commands: Commands to the cell, in order; `log_commands` defines the texts.
+        braking_steps: Number of control steps from a halt until the arm was at rest; None if the arm was not
+            at rest after `MAX_BRAKING_TIME`.
     """
 
     status: str
@@ -47,8 +47,8 @@ class SkillResult:
     message: str = ""
     outputs: dict[str, Any] = field(default_factory=dict)
     ticks: int = 0
-    commanded: list[str] = field(default_factory=list)
-    braking: int | None = 0
+    commands: list[str] = field(default_factory=list)
+    braking_steps: int | None = 0
 
 
 def run_skill(
@@ -59,39 +59,39 @@ def run_skill(
     ticks: int = 20_000,
     halt_at: int | None = None,
 ) -> SkillResult:
-    """Tick a skill on `workcell` until it ends, is halted at tick `halt_at`, or `ticks` have passed.
+    """Tick a skill until it ends, is halted, or has taken the maximum number of control steps.
 
-    After a halt the function waits until the arm is at rest. An exception that is no declared failure is
-    raised unchanged; in a mission it would be a fault.
+    After a halt the function waits until the arm is at rest. An exception that is not a declared failure,
+    which would be a fault in a mission, is raised unchanged.
 
     Args:
-        skill: The skill, or its class.
+        skill: The skill, or the class of the skill.
         workcell: Cell in which the skill runs.
-        inputs: Params and inputs of the class by name, at least those without a default.
+        inputs: Values of params and inputs by name, if `skill` is a class.
         ticks: Maximum number of control steps.
         halt_at: Control step before which the skill is halted; None: no halt.
 
     Raises:
-        InputError: An input is missing or unknown.
-        Fault: The skill violated its declarations: it succeeded without setting an output, failed with an
-            undeclared reason, yielded a value, or raised an exception while it was halted.
+        InputError: An input is missing or unknown, or `inputs` are given with an instance.
+        Fault: The skill succeeded without setting an output, failed with an undeclared reason, yielded a
+            value, or raised an exception while it was halted.
     """
-    commanded: list[str] = []
-    run = SkillRun(_instantiate(skill, inputs), note_commands(workcell.cell, commanded))
+    commands: list[str] = []
+    run = SkillRun(_instantiate(skill, inputs), log_commands(workcell.cell, commands))
     for tick in range(ticks):
         if tick == halt_at:
             run.halt()
             return SkillResult(
-                "HALTED", ticks=tick, commanded=commanded, braking=_count_braking_steps(workcell)
+                "HALTED", ticks=tick, commands=commands, braking_steps=_count_braking_steps(workcell)
             )
         try:
             has_succeeded = run.step()
         except SkillFailed as failure:
-            return SkillResult("FAILURE", failure.reason, failure.message, ticks=tick, commanded=commanded)
+            return SkillResult("FAILURE", failure.reason, failure.message, ticks=tick, commands=commands)
         if has_succeeded:
-            return SkillResult("SUCCESS", outputs=run.read_outputs(), ticks=tick, commanded=commanded)
+            return SkillResult("SUCCESS", outputs=run.read_outputs(), ticks=tick, commands=commands)
         workcell.advance()
-    return SkillResult("RUNNING", ticks=ticks, commanded=commanded)
+    return SkillResult("RUNNING", ticks=ticks, commands=commands)
 
 
 def _instantiate(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -> Skill:
@@ -99,12 +99,12 @@ def _instantiate(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -
         return skill(**(inputs or {}))
     if inputs is not None:
         name = type(skill).__name__
-        raise InputError(f"this {name} has its inputs already; pass the class {name} with them, or none")
+        raise InputError(f"an instance of {name} takes no `inputs`; pass the class {name}, or omit `inputs`")
     return skill
 
 
 def _count_braking_steps(workcell: Workcell) -> int | None:
-    """Wait until the arm is at rest; return the number of control steps, or None at `MAX_BRAKING_TIME`."""
+    """Wait until the arm is at rest; return the number of control steps, or None after `MAX_BRAKING_TIME`."""
     arm, clock = workcell.cell.arm, workcell.cell.clock
     steps, deadline = 0, clock.now + MAX_BRAKING_TIME
     while not arm.at_rest:
@@ -115,30 +115,30 @@ def _count_braking_steps(workcell: Workcell) -> int | None:
     return steps
 
 
-def note_commands(cell: Cell, commands: list[str]) -> Cell:
-    """Return a cell that appends the text of each command to its parts to `commands`.
+def log_commands(cell: Cell, commands: list[str]) -> Cell:
+    """Return a wrapper of the cell that appends a text to `commands` for every command.
 
-    A text is the part, the method and the arguments with a short text: `arm.plan home`,
-    `arm.plan (0.5, 0.0, 0.035)`, `tool.close`, `embedded.request table`, `ledger.reject cube-1`.
+    A text consists of the part, the method, and each argument for which `describe_argument` is not empty:
+    `arm.plan home`, `arm.plan (0.5, 0.0, 0.035)`, `tool.close`, `embedded.request table`.
     """
 
-    def note(command: str, *arguments: Any) -> None:
-        commands.append(" ".join([command, *filter(None, map(short_text, arguments))]))
+    def log(command: str, *arguments: Any) -> None:
+        commands.append(" ".join([command, *filter(None, map(describe_argument, arguments))]))
 
-    def note_access(access: Access) -> Any:
-        if access.name in _COMMANDS:
-            note(f"{access.detector or access.role}.{access.member}", *access.all_arguments)
+    def log_access(access: Access) -> Any:
+        if access.name in _LOGGED_CALLS:
+            log(f"{access.detector or access.role}.{access.member}", *access.all_arguments)
         return access.proceed()
 
-    def note_decision(target: Target, bin: str) -> None:
-        note("decided", target, bin)
+    def log_decision(target: Target, bin: str) -> None:
+        log("decided", target, bin)
         cell.decided(target, bin)
 
-    return replace(intercept(cell, note_access, _ROLES), decided=note_decision)
+    return replace(intercept(cell, log_access, _INTERCEPTED_ROLES), decided=log_decision)
 
 
-def short_text(argument: object) -> str:
-    """Return the short text of an argument of a command, or ""."""
+def describe_argument(argument: object) -> str:
+    """Return a short description of an argument of a command, or "" for all other types."""
     if isinstance(argument, str):
         return argument
     if isinstance(argument, Goal):

@@ -1,8 +1,8 @@
-"""Substitutes of skills, which fail, succeed, raise an error or never end as a test requires.
+"""Substitutes of skills for tests: skills that fail, succeed, raise an error or never end.
 
-Each function returns a subclass of the given skill, with its ports, params and reasons, for
-`run_mission(substitutes={"*/Grasp": make_failing(Grasp, "missed", times=2)})`. A substitute counts its starts
-over all nodes and runs: make a new one for each run.
+Each function returns a subclass of a skill, with the same ports, params and reasons, for
+`run_mission(substitutes={"*/Grasp": make_failing(Grasp, "missed", start_count=2)})`. A substitute
+counts its starts over all nodes and runs, so make a new substitute for each run.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from executive.errors import InputError
 from executive.skill import Direction, Skill
 
 RunMethod = Callable[[Skill, Cell], Steps | None]
-"""The method `run` of a skill."""
+"""Type of the method `run` of a skill."""
 
 
 def make_failing(
-    skill: type[Skill], reason: str, *, times: int | None = None, message: str = "injected failure"
+    skill: type[Skill], reason: str, *, start_count: int | None = None, message: str = "injected failure"
 ) -> type[Skill]:
-    """Return a skill that fails in its first `times` starts, and then does its work.
+    """Return a skill that fails in its first `start_count` starts, and later runs as the original.
 
-    With None for `times` the skill always fails.
+    If `start_count` is None, the skill always fails.
 
     Raises:
         InputError: The skill does not declare this reason.
@@ -40,16 +40,16 @@ def make_failing(
         yield from ()
         raise self.failure(reason, message)
 
-    return make_substitute(skill, "Failing", run, _first_starts(times))
+    return make_substitute(skill, "Failing", run, _list_first_starts(start_count))
 
 
 def make_succeeding(
-    skill: type[Skill], outputs: Mapping[str, Any] | None = None, *, after: int = 0
+    skill: type[Skill], outputs: Mapping[str, Any] | None = None, *, delay_steps: int = 0
 ) -> type[Skill]:
-    """Return a skill that does nothing for `after` control steps, and succeeds with these outputs.
+    """Return a skill that does nothing for `delay_steps` control steps, and then succeeds with `outputs`.
 
     Raises:
-        InputError: The names of the outputs are not those of the skill.
+        InputError: The names in `outputs` are not the names of the output ports of the skill.
     """
     values = dict(outputs or {})
     declared = [name for name, port in skill.ports.items() if port.direction is Direction.OUT]
@@ -61,7 +61,7 @@ def make_succeeding(
 
     def run(self: Skill, cell: Cell) -> Steps:
         del cell
-        for _ in range(after):
+        for _ in range(delay_steps):
             yield
         for name, value in values.items():
             setattr(self, name, value)
@@ -70,27 +70,28 @@ def make_succeeding(
 
 
 def make_raising(
-    skill: type[Skill], error: Exception, *, after: int = 0, times: int | None = None
+    skill: type[Skill], error: Exception, *, delay_steps: int = 0, start_count: int | None = None
 ) -> type[Skill]:
-    """Return a skill that raises `error` after `after` control steps, if it still runs then.
+    """Return a skill that raises `error` after `delay_steps` control steps, if it has not ended before.
 
-    Before the error the skill does its work, and its `finally` blocks are executed.
+    Before the error the skill runs as the original; its `finally` blocks are executed. This happens in the
+    first `start_count` starts; None: in all starts.
     """
 
     def run(self: Skill, cell: Cell) -> Steps:
         steps_done = 0
         with closing(_run_original(skill, self, cell)) as steps:
-            for _ in islice(steps, after):
+            for _ in islice(steps, delay_steps):
                 yield
                 steps_done += 1
-            if steps_done == after:
+            if steps_done == delay_steps:
                 raise error
 
-    return make_substitute(skill, "Raising", run, _first_starts(times))
+    return make_substitute(skill, "Raising", run, _list_first_starts(start_count))
 
 
 def make_raising_when_halted(skill: type[Skill], error: Exception) -> type[Skill]:
-    """Return a skill that raises `error` when it is halted, like a bug in its `finally`."""
+    """Return a skill that raises `error` when it is halted, as with a bug in a `finally` block."""
 
     def run(self: Skill, cell: Cell) -> Steps:
         try:
@@ -113,30 +114,30 @@ def make_endless(skill: type[Skill]) -> type[Skill]:
 
 
 def make_substitute(
-    skill: type[Skill], prefix: str, run: RunMethod, starts: Container[int] | None = None
+    skill: type[Skill], prefix: str, run: RunMethod, start_numbers: Container[int] | None = None
 ) -> type[Skill]:
-    """Return a subclass of a skill with another `run`.
+    """Return a subclass of a skill with another method `run`.
 
     Args:
-        skill: The skill.
+        skill: Class of the skill.
         prefix: Prefix of the name of the subclass.
-        run: The other `run`.
-        starts: Numbers of the starts, from 1, in which the other `run` is used; None: all starts.
+        run: The other method.
+        start_numbers: Numbers of the starts, from 1, in which the other method runs; None: all starts.
     """
-    numbers = count(1)
+    start_counter = count(1)
 
     def choose_run(self: Skill, cell: Cell) -> Steps | None:
-        is_replaced = starts is None or next(numbers) in starts
+        is_replaced = start_numbers is None or next(start_counter) in start_numbers
         return run(self, cell) if is_replaced else _run_original(skill, self, cell)
 
     members = {"run": choose_run, "__doc__": skill.__doc__, "__module__": skill.__module__}
     return cast(type[Skill], type(f"{prefix}{skill.__name__}", (skill,), members))
 
 
-def _first_starts(times: int | None) -> Container[int] | None:
-    return None if times is None else range(1, times + 1)
+def _list_first_starts(start_count: int | None) -> Container[int] | None:
+    return None if start_count is None else range(1, start_count + 1)
 
 
 def _run_original(skill: type[Skill], instance: Skill, cell: Cell) -> Generator[None, None, None]:
-    """Run `instance` as `skill` does; also a `run` that is no generator becomes one."""
+    """Execute the method `run` of `skill` on `instance`, as a generator even if the method is none."""
     yield from skill.run(instance, cell) or ()

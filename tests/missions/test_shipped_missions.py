@@ -16,7 +16,7 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import cell_kind, discover
 from executive.record.result import agrees
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 
 MISSIONS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "missions").glob("*.yaml"))}
 REHEARSED = {"kit_fasteners", "recycle", "sort_fruit", "tray_instruments"}
@@ -114,7 +114,7 @@ SIMULATED = [
 
 @pytest.mark.parametrize(("name", "seed"), SIMULATED)
 def test_it_does_its_work_in_the_simulated_world(name: str, seed: int) -> None:
-    assert_done(name, execute(loaded(name), seed, oracle_cell()))
+    assert_done(name, execute(loaded(name), seed, make_oracle_kind()))
 
 
 def test_only_rehearsals_are_left_out_of_the_simulated_world() -> None:

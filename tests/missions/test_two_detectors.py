@@ -61,7 +61,9 @@ def test_a_choice_rests_on_a_look_of_each_detector() -> None:
 def test_a_wrong_class_of_one_detector_is_outvoted(name: str) -> None:
     result = sort(**{name: wrong_at_first})
     assert_all_right(result)
-    assert result.find_reasons("*/SelectTarget")[0] == "doubtful", "two looks that disagree leave doubt"
+    assert result.list_failure_reasons("*/SelectTarget")[0] == "doubtful", (
+        "two looks that disagree leave doubt"
+    )
 
 
 @pytest.mark.parametrize(("name", "other"), [("embedded", "second"), ("second", "embedded")])
@@ -69,7 +71,7 @@ def test_where_one_detector_is_silent_the_other_is_asked(name: str, other: str) 
     result = sort(**{name: silent})
     assert_all_right(result)
     assert set(asked(result)) == {other}
-    assert "unavailable" in result.find_reasons("*/Detect")
+    assert "unavailable" in result.list_failure_reasons("*/Detect")
 
 
 def test_where_both_detectors_are_silent_the_mission_ends_with_the_reason() -> None:

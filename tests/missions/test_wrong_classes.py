@@ -40,7 +40,7 @@ def test_a_class_that_is_always_mistaken_is_in_no_wrong_bin_and_rejected_by_its_
     height = "it was touched 52 mm above the table, and a sphere is 60 mm high"
     assert reasons == [f"could not be picked: {height}"] * 2
     assert height in result.message
-    assert result.find_reasons().count("contradicted") == 6
+    assert result.list_failure_reasons().count("contradicted") == 6
 
 
 def test_labels_that_the_cell_does_not_know_are_reported_and_the_table_is_not_empty() -> None:

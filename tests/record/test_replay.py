@@ -26,7 +26,7 @@ from executive.record.run_directory import find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.testing.faults import during, seal_fails
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import run_mission
 
 ALL = sorted(path.stem for path in (Path(__file__).parents[2] / "missions").glob("*.yaml"))
@@ -56,7 +56,7 @@ def test_the_same_mission_decides_the_same(missions: Path, tmp_path: Path, name:
 
 @pytest.mark.slow
 def test_so_it_does_without_the_simulator(missions: Path, tmp_path: Path) -> None:
-    done = again(recorded(missions, tmp_path, "sort_wrist", kind=oracle_cell()))
+    done = again(recorded(missions, tmp_path, "sort_wrist", kind=make_oracle_kind()))
     assert (done.same, done.edited) == (True, False)
 
 

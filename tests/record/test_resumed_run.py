@@ -35,7 +35,7 @@ from executive.record.resumed_run import resume_run
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
 from executive.testing.faults.world_access import WorldAccess
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 from executive.testing.substitutes import make_raising
 from tests.meanwhile import meanwhile
 
@@ -150,10 +150,10 @@ def test_the_world_of_a_scene_is_rebuilt(missions: Path, tmp_path: Path) -> None
     loaded, scene = load(missions, "sort_overhead"), tmp_path / "scene.yaml"
     scene.write_text("scene: two objects\ntable: {objects: [2, 2]}\nunknown: {count: [1, 1], scale: 0.4}\n")
     with pytest.raises(Cut):
-        run_of(loaded, tmp_path, kind=oracle_cell(), scene=scene, views=[Cutter(600)])
+        run_of(loaded, tmp_path, kind=make_oracle_kind(), scene=scene, views=[Cutter(600)])
     # What happens to the file afterwards is nothing to the run.
     scene.unlink()
-    result = resumed(find_run("latest", tmp_path), kind=oracle_cell())
+    result = resumed(find_run("latest", tmp_path), kind=make_oracle_kind())
     assert (result.status, result.audit.right, result.audit.agrees) == ("SUCCESS", 2, True)
 
 
@@ -221,7 +221,7 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["Detect", "Grasp"])
 def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(missions: Path, tmp_path: Path, name) -> None:
     skills = discover()
-    buggy = {**skills, name: make_raising(skills[name], ZeroDivisionError("a bug"), after=3)}
+    buggy = {**skills, name: make_raising(skills[name], ZeroDivisionError("a bug"), delay_steps=3)}
     first = run_of(load(missions, "sort_overhead"), tmp_path, skills=buggy)
     assert (first.status, "a bug" in first.message) == ("FAULT", True)
     run = Path(first.run)

@@ -23,7 +23,7 @@ from executive.motion.trajectory import Trajectory
 from executive.plugins import discover
 from executive.record.journal import Journal, read_journal
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 
 pytestmark = pytest.mark.slow
 
@@ -62,7 +62,7 @@ def halt(missions: Path, tmp_path_factory: pytest.TempPathFactory, request: pyte
     earliest, file = request.param, tmp_path_factory.mktemp("halt") / "journal.jsonl"
     loaded = load_mission(missions / "sort_overhead.yaml", discover())
     journal = Journal(file)
-    run = assemble(loaded, discover(), RunOptions(2, kind=oracle_cell()), [journal])
+    run = assemble(loaded, discover(), RunOptions(2, kind=make_oracle_kind()), [journal])
     workcell = run.workcell
     assert isinstance(workcell, SimCell)
     client, arm, advance = workcell._world.client, workcell._arm, workcell.advance

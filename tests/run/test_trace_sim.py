@@ -10,13 +10,13 @@ from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.trace import Trace
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 
 
 def trace_of(missions: Path, seed: int) -> str:
     trace = Trace()
     loaded = load_mission(missions / "sort_wrist.yaml", discover())
-    run = assemble(loaded, discover(), RunOptions(seed, kind=oracle_cell()), [trace])
+    run = assemble(loaded, discover(), RunOptions(seed, kind=make_oracle_kind()), [trace])
     try:
         assert run.execute().status == "SUCCESS"
     finally:

@@ -21,7 +21,7 @@ def test_the_nearest_target_comes_first_with_its_bin(fake: FakeCell, look) -> No
     put(fake, cube=(0.6, -0.2), duck=(0.45, 0.2))
     result = select(fake, look())
     assert (result.outputs["item"], result.outputs["bin"]) == ("duck-1", "yellow_bin")
-    assert result.commanded == ["decided duck-1 yellow_bin"]
+    assert result.commands == ["decided duck-1 yellow_bin"]
 
 
 def test_while_the_arm_moves_the_nearest_is_the_one_nearest_to_where_it_will_be(fake: FakeCell, look) -> None:

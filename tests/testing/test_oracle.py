@@ -10,7 +10,7 @@ from executive.cells.fake.cell import ROUTES, SilentOperator
 from executive.events import ignore
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 
 
 @pytest.fixture
@@ -20,7 +20,9 @@ def build(missions, request):
     def build(**oracle):
         path = missions / "cells" / "overhead.yaml"
         options = CellOptions(SilentOperator(), base=path.parent)
-        made = oracle_cell(**oracle)(load_cell(path), seed=3, routes=ROUTES, emit=ignore, options=options)
+        made = make_oracle_kind(**oracle)(
+            load_cell(path), seed=3, routes=ROUTES, emit=ignore, options=options
+        )
         request.addfinalizer(made.close)
         return made
 
@@ -40,7 +42,7 @@ def labels(made, view="table"):
 
 
 def test_without_jitter_every_object_is_located_where_it_lies_as_late_as_by_a_detector(build):
-    made = build(jitter=0.0)
+    made = build(box_std=0.0)
     frame, found = look(made)
     assert made.cell.clock.now == pytest.approx(frame.stamp + 0.05, abs=1e-6)
     assert frame.image.max() == 0
@@ -53,7 +55,7 @@ def test_without_jitter_every_object_is_located_where_it_lies_as_late_as_by_a_de
 
 
 def test_jitter_differs_from_look_to_look_and_repeats_with_the_seed(build):
-    one, other = build(), build(rendered=True)
+    one, other = build(), build(renders_images=True)
     first, second = look(one)[1], look(one)[1]
     frame, again = look(other)
     assert again == first != second
@@ -63,7 +65,7 @@ def test_jitter_differs_from_look_to_look_and_repeats_with_the_seed(build):
 
 
 def test_what_lies_elsewhere_is_in_the_full_view_only_and_what_the_arm_hides_in_none(build):
-    made = build(jitter=0.0)
+    made = build(box_std=0.0)
     body, *_ = made._world.bodies
     everything = list(made._world.bodies.values())
     made._world.place_object(body, Pose.of([0.5, -0.33, 0.03]))
@@ -73,7 +75,7 @@ def test_what_lies_elsewhere_is_in_the_full_view_only_and_what_the_arm_hides_in_
 
 
 def test_what_another_object_lies_on_is_found_when_that_is_gone(build):
-    made = build(jitter=0.0)
+    made = build(box_std=0.0)
     lower, upper, *_ = made._world.bodies
     made._world.place_object(lower, Pose.of([0.5, 0.0, 0.03]))
     made._world.place_object(upper, Pose.of([0.5, 0.0, 0.08]))

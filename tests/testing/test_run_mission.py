@@ -45,7 +45,7 @@ def test_a_shipped_mission_runs_by_its_name_on_the_fake_cell() -> None:
     assert result.items["placed"] == len(result.cell.world.objects) >= 3
     assert (type(result.events[0].event), type(result.events[-1].event)) == (RunStarted, RunEnded)
     assert result.robot_time == result.events[-1].clock > 5.0
-    assert (result.agrees, result.find_faults()) == (True, [])
+    assert (result.agrees, result.list_injected_faults()) == (True, [])
 
 
 def test_a_mission_file_runs_with_other_values(look: Path) -> None:
@@ -66,15 +66,21 @@ def test_the_cell_is_arranged_before_the_run(look: Path) -> None:
 
 def test_what_was_entered_and_what_failed_is_told_in_order() -> None:
     result = run_mission("sort_overhead", faults=[during("*/Grasp", seal_fails(), nth=1)])
-    assert len(result.find_activations("*/Grasp")) == result.items["placed"] + 1
-    assert (result.find_activations("tree/look*")[0], result.find_reasons()[0]) == ("tree/look/try", "missed")
-    assert (result.find_reasons("*/Grasp"), result.find_reasons("*/Approach")) == (["missed"], [])
+    assert len(result.list_activated_nodes("*/Grasp")) == result.items["placed"] + 1
+    assert (result.list_activated_nodes("tree/look*")[0], result.list_failure_reasons()[0]) == (
+        "tree/look/try",
+        "missed",
+    )
+    assert (result.list_failure_reasons("*/Grasp"), result.list_failure_reasons("*/Approach")) == (
+        ["missed"],
+        [],
+    )
 
 
 def test_a_failure_that_only_passes_through_a_control_node_is_none_of_its_own(look: Path) -> None:
     result = run_mission(look, faults=[after(0.0, detector_dead())])
     assert (result.status, result.reason) == ("FAILURE", "Detect.unavailable")
-    assert result.find_reasons() == ["unavailable"]
+    assert result.list_failure_reasons() == ["unavailable"]
 
 
 def test_without_disturbances_a_mission_goes_as_it_always_goes() -> None:
@@ -111,7 +117,7 @@ def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:
         run_mission(look, faults=[during("*/Grasp", seal_fails())])
     with pytest.raises(InputError, match='no node is called "Wait"; there are: tree/Wait, tree/Detect'):
         run_mission(look, substitutes={"Wait": make_endless(Wait)})
-    with pytest.raises(InputError, match="tree/Detect runs Detect, and EndlessWait is not a subclass; give"):
+    with pytest.raises(InputError, match="tree/Detect runs Detect, but EndlessWait is not a subclass; give"):
         run_mission(look, substitutes={"tree/*": make_endless(Wait)})
 
 

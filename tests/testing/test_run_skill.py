@@ -71,7 +71,7 @@ def test_params_and_inputs_are_given_to_the_class_or_to_the_instance(fake: FakeC
     result = run_skill(Worker, fake, inputs={"given": "stone"})
     assert (result.status, result.outputs, result.ticks) == ("SUCCESS", {"made": "made of stone"}, 1)
     assert run_skill(Worker(given="wood"), fake).outputs == {"made": "made of wood"}
-    with pytest.raises(InputError, match="this Worker has its inputs already; pass the class Worker with"):
+    with pytest.raises(InputError, match="an instance of Worker takes no `inputs`; pass the class Worker"):
         run_skill(Worker(given="wood"), fake, inputs={"way": "fail"})
 
 
@@ -115,31 +115,31 @@ def test_what_would_be_refused_or_a_fault_in_a_mission_is_raised(
 
 def test_a_run_without_a_yield_is_done_at_once(fake: FakeCell) -> None:
     result = run_skill(Plain, fake)
-    assert (result.outputs, result.ticks, result.commanded) == ({"made": "at once"}, 0, ["tool.open"])
+    assert (result.outputs, result.ticks, result.commands) == ({"made": "at once"}, 0, ["tool.open"])
 
 
 def test_what_a_look_commands_is_told_in_words(fake: FakeCell, target: Target) -> None:
     look = run_skill(Detect, fake, inputs={"view": "full"})
-    assert look.commanded == ["camera.capture", "embedded.request frame 2 full"]
+    assert look.commands == ["camera.capture", "embedded.request frame 2 full"]
     located = run_skill(Localize, fake, inputs={"detections": look.outputs["detections"]})
-    assert located.commanded == ["ledger.observe 1 found in frame 2"]
+    assert located.commands == ["ledger.observe 1 found in frame 2"]
     chosen = run_skill(SelectTarget, fake, inputs={"targets": located.outputs["targets"]})
-    assert chosen.commanded == ["decided cube-1 red_bin"]
+    assert chosen.commands == ["decided cube-1 red_bin"]
 
 
 def test_what_a_pick_commands_is_told_in_words(fake: FakeCell, target: Target) -> None:
     approach = run_skill(Approach, fake, inputs={"target": target})
-    assert approach.commanded == [
+    assert approach.commands == [
         "arm.plan (0.5, 0.0, 0.035)", "arm.start", "arm.stop", "ledger.record_touch cube-1",
     ]  # fmt: skip
     grasp = run_skill(Grasp, fake, inputs={"target": target})
     slot = fake.cell.bins["red_bin"].slots[0]
     over = f"({slot[0]:g}, {slot[1]:g}, 0.065)"
-    assert grasp.commanded == ["tool.close", "ledger.record_grasp cube-1"]
+    assert grasp.commands == ["tool.close", "ledger.record_grasp cube-1"]
     transit = run_skill(Transit, fake, inputs={"held": "cube-1", "bin": "red_bin"})
-    assert transit.commanded == [f"arm.plan {over}", "arm.start", "arm.stop"]
+    assert transit.commands == [f"arm.plan {over}", "arm.start", "arm.stop"]
     release = run_skill(Release, fake, inputs={"held": "cube-1", "bin": "red_bin"})
-    assert release.commanded == ["tool.open", "ledger.record_placement cube-1 red_bin"]
+    assert release.commands == ["tool.open", "ledger.record_placement cube-1 red_bin"]
 
 
 def test_a_named_pose_and_a_question_to_the_operator_are_told_too(fake: FakeCell) -> None:
@@ -152,29 +152,29 @@ def test_a_named_pose_and_a_question_to_the_operator_are_told_too(fake: FakeCell
             cell.arm.plan(goal="home")
             cell.camera.next_pose()
 
-    assert run_skill(GoHome, fake).commanded == ["arm.plan home", "camera.next_pose"]
-    assert run_skill(AwaitRequest, fake).commanded == ["operator.ask"]
+    assert run_skill(GoHome, fake).commands == ["arm.plan home", "camera.next_pose"]
+    assert run_skill(AwaitRequest, fake).commands == ["operator.ask"]
 
 
 def test_a_halt_brakes_the_arm_and_tells_how_long_that_took(fake: FakeCell, target: Target) -> None:
     result = run_skill(Approach, fake, inputs={"target": target}, halt_at=30)
-    assert (result.status, result.ticks, result.braking) == ("HALTED", 30, 0)
-    assert result.commanded == ["arm.plan (0.5, 0.0, 0.035)", "arm.start", "arm.stop"]
+    assert (result.status, result.ticks, result.braking_steps) == ("HALTED", 30, 0)
+    assert result.commands == ["arm.plan (0.5, 0.0, 0.035)", "arm.start", "arm.stop"]
     assert fake.arm.at_rest
 
 
 def test_a_halt_that_leaves_the_arm_in_motion_shows(fake: FakeCell) -> None:
     result = run_skill(Coaster, fake, halt_at=40)
-    assert "arm.stop" not in result.commanded
-    assert result.braking is not None
-    assert result.braking > 10
+    assert "arm.stop" not in result.commands
+    assert result.braking_steps is not None
+    assert result.braking_steps > 10
     assert fake.arm.at_rest, "the motion was over by then"
 
 
 def test_an_arm_that_never_rests_is_not_waited_for(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(type(fake.arm), "at_rest", False)
     result = run_skill(Coaster, fake, halt_at=5)
-    assert result.braking is None
+    assert result.braking_steps is None
     assert fake.cell.clock.now == pytest.approx(5 / 240 + 2.0, abs=0.01)
 
 

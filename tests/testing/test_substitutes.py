@@ -42,18 +42,18 @@ def test_a_substitute_is_declared_as_the_skill_is_and_named_after_it(name: str) 
 
 def test_it_fails_the_first_times_and_then_does_its_work(fake: FakeCell, target: Target) -> None:
     run_skill(Approach, fake, inputs={"target": target})
-    slippery = make_failing(Grasp, "missed", times=2, message="it slips")
+    slippery = make_failing(Grasp, "missed", start_count=2, message="it slips")
     results = [run_skill(slippery, fake, inputs={"target": target}) for _ in range(3)]
     assert [result.reason for result in results] == ["missed", "missed", ""]
-    assert (results[0].message, results[0].commanded) == ("it slips", [])
+    assert (results[0].message, results[0].commands) == ("it slips", [])
     assert (results[2].outputs, fake.tool.holding) == ({"held": "cube-1"}, True)
 
 
 def test_it_succeeds_with_what_it_was_given_when_it_was_told_to(fake: FakeCell) -> None:
-    quick = make_succeeding(Release, {"placed": "cube-7"}, after=12)
+    quick = make_succeeding(Release, {"placed": "cube-7"}, delay_steps=12)
     result = run_skill(quick, fake, inputs={"held": "cube-7", "bin": "red_bin"})
     assert (result.status, result.outputs, result.ticks) == ("SUCCESS", {"placed": "cube-7"}, 12)
-    assert result.commanded == []
+    assert result.commands == []
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_what_the_skill_does_not_declare_is_refused(make: Callable[[], object], 
 
 
 def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, target: Target) -> None:
-    broken = make_raising(Approach, ZeroDivisionError("in the model"), after=40)
+    broken = make_raising(Approach, ZeroDivisionError("in the model"), delay_steps=40)
     with pytest.raises(ZeroDivisionError, match="in the model"):
         run_skill(broken, fake, inputs={"target": target})
     assert fake.steps >= 40
@@ -78,7 +78,10 @@ def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, targ
 
 
 def test_a_bug_comes_up_in_time_and_as_often_as_it_was_told_to(fake: FakeCell) -> None:
-    late, once = (make_raising(Wait, ValueError("a bug"), **when) for when in ({"after": 1000}, {"times": 1}))
+    late, once = (
+        make_raising(Wait, ValueError("a bug"), **when)
+        for when in ({"delay_steps": 1000}, {"start_count": 1})
+    )
     with pytest.raises(ValueError, match="a bug"):
         run_skill(once, fake, inputs={"seconds": 0.1})
     assert [run_skill(skill, fake, inputs={"seconds": 0.1}).ticks for skill in (late, once)] == [24, 24]

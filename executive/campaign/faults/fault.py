@@ -94,7 +94,7 @@ def make_substitutes(
         if fault.kind == "fails":
             broken = _make_failing(skill, fault.reason)
         elif fault.kind == "raises":
-            broken = make_raising(skill, error, after=fault.after)
+            broken = make_raising(skill, error, delay_steps=fault.after)
         else:
             broken = make_raising_when_halted(skill, error)
         substitutes[fault.node] = make_substitute(skill, "Broken", broken.run, fault.starts or None)

@@ -15,7 +15,7 @@ import yaml
 
 from executive.cell.workcell import CellOptions
 from executive.cells.sim.cell import SimCell
-from executive.testing.oracle import TrueFrame, TruthCamera, oracle_cell
+from executive.testing.oracle import TrueFrame, TruthCamera, make_oracle_kind
 from executive.testing.run_mission import run_mission
 
 
@@ -28,7 +28,9 @@ def displaced(tmp_path: Path) -> Callable[..., Callable[..., SimCell]]:
         path.write_text(yaml.safe_dump({"scene": "moved", "camera": camera}))
 
         def build(*args: Any, options: CellOptions, **others: Any) -> SimCell:
-            return oracle_cell(rendered=True)(*args, options=replace(options, scene=path), **others)
+            return make_oracle_kind(renders_images=True)(
+                *args, options=replace(options, scene=path), **others
+            )
 
         return build
 
@@ -58,7 +60,7 @@ def test_a_moved_camera_ends_a_run_before_anything_is_touched(
 ) -> None:
     result = run_mission(mission, displaced(**camera), seed=1, requests=["cube"])
     assert (result.status, result.reason) == ("FAILURE", "Detect.camera_moved")
-    assert not result.find_activations("*Approach")
+    assert not result.list_activated_nodes("*Approach")
     found = re.search(r"moved by \((\S+), (\S+), (\S+)\) mm", result.message)
     assert found is not None
     if shift is not None:
@@ -77,7 +79,7 @@ def test_a_camera_that_is_moved_during_a_run_ends_it_once_the_tool_is_empty() ->
                 self._true = self._true.model_copy(update=moved)
             return super().capture()
 
-    kind = partial(oracle_cell(), camera=partial(Pushed, rendered=True))
+    kind = partial(make_oracle_kind(), camera=partial(Pushed, renders_images=True))
     result = run_mission("sort_overhead", kind, seed=1)
     assert (result.status, result.reason, result.holds) == ("FAILURE", "Detect.camera_moved", "")
     assert result.agrees and result.items["placed"] > 0
@@ -86,4 +88,4 @@ def test_a_camera_that_is_moved_during_a_run_ends_it_once_the_tool_is_empty() ->
 @pytest.mark.slow
 @pytest.mark.parametrize("mission", ["sort_overhead", "sort_wrist"])
 def test_a_camera_in_its_place_ends_no_run(mission: str) -> None:
-    assert run_mission(mission, oracle_cell(rendered=True), seed=1).status == "SUCCESS"
+    assert run_mission(mission, make_oracle_kind(renders_images=True), seed=1).status == "SUCCESS"

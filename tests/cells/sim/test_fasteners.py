@@ -14,7 +14,7 @@ from executive.cells.sim.cell import SimCell
 from executive.events import ignore
 from executive.mission.parse.cell_file import load_cell
 from executive.skill import Skill
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_skill import SkillResult, run_skill
 from skills.approach import Approach
 from skills.detect import Detect
@@ -36,7 +36,9 @@ def with_one(missions: Path, request: pytest.FixtureRequest) -> Callable[..., Si
         config = load_cell(path, {"cell.table.objects": "[1, 1]"})
         config = config.model_copy(update={"objects": {label: config.objects[label]}})
         options = CellOptions(SilentOperator(), base=path.parent)
-        made = oracle_cell()(config, seed=seed, routes={label: ROUTES[label]}, emit=ignore, options=options)
+        made = make_oracle_kind()(
+            config, seed=seed, routes={label: ROUTES[label]}, emit=ignore, options=options
+        )
         request.addfinalizer(made.close)
         return made
 

@@ -23,7 +23,7 @@ from executive.motion.trajectory import Trajectory
 from executive.plugins import discover
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults.world_access import open_world
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 from tests.meanwhile import meanwhile
 
 SEED = 3
@@ -65,7 +65,7 @@ def mission(missions: Path):
 def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
     """One run, and what it would have left at some of its control steps."""
     folder = tmp_path_factory.mktemp("logs")
-    run = assemble(mission, discover(), RunOptions(SEED, kind=oracle_cell()))
+    run = assemble(mission, discover(), RunOptions(SEED, kind=make_oracle_kind()))
     cell = run.workcell
     assert isinstance(cell, SimCell)
     cell.log_to(folder / "log")
@@ -90,7 +90,9 @@ def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
 
 def rebuilt(mission, log: Path) -> SimCell:
     options = CellOptions(SilentOperator(), base=mission.cell_path.parent, resume=ResumePoint(log))
-    return oracle_cell()(mission.cell_config, seed=SEED, routes=mission.routes, emit=ignore, options=options)
+    return make_oracle_kind()(
+        mission.cell_config, seed=SEED, routes=mission.routes, emit=ignore, options=options
+    )
 
 
 @pytest.fixture
@@ -158,7 +160,7 @@ def test_what_happened_meanwhile_is_there_and_took_none_of_the_runs_time(
         world.move(one, (0.0, 0.3))
         moved.extend([(one.body, one.position + np.array([0.0, 0.3, 0.0])), (other.body, np.zeros(3))])
 
-    meanwhile(log, mission, SEED, act, oracle_cell())
+    meanwhile(log, mission, SEED, act, make_oracle_kind())
     cell = rebuilt(mission, log)
     things = {thing.body: thing.position for thing in open_world(cell).objects}
     assert np.abs(things[moved[0][0]] - moved[0][1]).max() < 0.01

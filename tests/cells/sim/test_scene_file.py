@@ -32,7 +32,7 @@ from executive.events import ignore
 from executive.geometry import Pose
 from executive.mission.findings import MissionError
 from executive.perception.camera_model import compute_calibration, project
-from executive.testing.oracle import TrueFrame, oracle_cell
+from executive.testing.oracle import TrueFrame, make_oracle_kind
 
 Build = Callable[..., World]
 SEED = 3
@@ -56,7 +56,7 @@ def cell(overhead: CellConfig, tmp_path: Path, request: pytest.FixtureRequest) -
         sections["camera"] = {**quiet, **sections.get("camera", {})}
         path.write_text(yaml.safe_dump({"scene": "changed", **sections}))
         options = CellOptions(SilentOperator(), base=tmp_path, scene=path)
-        make = oracle_cell(jitter=0.0, rendered=True)
+        make = make_oracle_kind(box_std=0.0, renders_images=True)
         made = make(config, seed=SEED, routes=ROUTES, emit=ignore, options=options)
         request.addfinalizer(made.close)
         return made
@@ -122,7 +122,7 @@ def test_the_table_gets_a_colour_and_a_texture_and_the_objects_keep_theirs(
     assert striped > 1.5 * wood
     frame = capture(made)
     assert isinstance(frame, TrueFrame)
-    for true in frame.truth:
+    for true in frame.true_detections:
         column, row = (int(value) for value in true.centre)
         assert (frame.image[row, column] == usual[row, column]).all()
 
@@ -176,7 +176,7 @@ def test_unknown_objects_lie_beside_the_others_and_no_detector_knows_them(
             assert apart > model.radius, "neither on nor under an object"
     frame = capture(made)
     assert isinstance(frame, TrueFrame)
-    assert {true.label for true in frame.truth} <= overhead.objects.keys()
+    assert {true.label for true in frame.true_detections} <= overhead.objects.keys()
     green = (frame.image[..., 1] > 90) & (frame.image[..., [0, 2]].max(axis=2) < 60)
     assert cv2.connectedComponents(green.astype(np.uint8), connectivity=8)[0] == 1 + 2
     assert UNKNOWN not in made.cell.classes
@@ -222,13 +222,13 @@ def test_the_image_is_from_the_true_camera_and_the_frame_says_the_declared_one(
     true = np.diag([zoom, zoom, 1.0]) @ matrix
     true[:2, 2] = matrix[:2, 2]
     expected = middles(made, true, moved(X_WC))
-    assert np.array([each.centre for each in frame.truth]) == pytest.approx(expected, abs=1e-6)
+    assert np.array([each.centre for each in frame.true_detections]) == pytest.approx(expected, abs=1e-6)
     assert np.linalg.norm(expected - middles(made, matrix, X_WC), axis=1).max() > 3
     # The rendered image agrees: the objects are where the truth says, and nowhere else.
     plain = capture(cell(camera=error, table={"objects": [0, 0]}))
     seen = (frame.image != plain.image).any(axis=2)
     rows, columns = np.nonzero(seen)
-    boxes = np.array([each.box for each in frame.truth])
+    boxes = np.array([each.box for each in frame.true_detections])
     around = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
     assert around == pytest.approx([*boxes[:, :2].min(axis=0), *boxes[:, 2:].max(axis=0)], abs=1.5)
 

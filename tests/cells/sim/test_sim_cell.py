@@ -17,7 +17,7 @@ from executive.cells.sim.cell import SimCell
 from executive.events import ignore
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
-from executive.testing.oracle import TrueFrame, oracle_cell
+from executive.testing.oracle import TrueFrame, make_oracle_kind
 
 Build = Callable[..., SimCell]
 
@@ -30,7 +30,7 @@ def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
         path = missions / "cells" / f"{name}.yaml"
         config = load_cell(path).model_copy(update=changes)
         options = CellOptions(SilentOperator(), base=path.parent)
-        made = oracle_cell(jitter=0.0)(config, seed=seed, routes=ROUTES, emit=ignore, options=options)
+        made = make_oracle_kind(box_std=0.0)(config, seed=seed, routes=ROUTES, emit=ignore, options=options)
         request.addfinalizer(made.close)
         return made
 
@@ -165,7 +165,9 @@ def test_only_depth_and_ray_find_what_does_not_stand_on_the_table(
     put(made, body, (0.6, 0.15, 0.075))
     frame = made.cell.camera.capture()
     assert isinstance(frame, TrueFrame)
-    found = [made.cell.localizer.locate(true, frame) for true in frame.truth if true.label == "cube"]
+    found = [
+        made.cell.localizer.locate(true, frame) for true in frame.true_detections if true.label == "cube"
+    ]
     error = min(float(np.linalg.norm(place[:2] - (0.6, 0.15))) for place in found)
     assert (error < 0.003) == (way != "plane")
     height = min(found, key=lambda place: float(np.linalg.norm(place[:2] - (0.6, 0.15))))[2]

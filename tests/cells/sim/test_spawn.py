@@ -19,7 +19,7 @@ from executive.cells.sim.spawn import PartSeeds, first_world, spawn
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.events import ignore
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 
 Build = Callable[[CellConfig], World]
 
@@ -112,7 +112,7 @@ def test_a_load_travels_over_stacks_and_starts_from_their_tops(overhead: CellCon
 
 def test_the_first_world_is_the_one_that_a_cell_of_the_same_seed_begins_with(overhead: CellConfig) -> None:
     options = CellOptions(SilentOperator(), base=Path("."))
-    cell = oracle_cell()(overhead, seed=9, routes={}, emit=ignore, options=options)
+    cell = make_oracle_kind()(overhead, seed=9, routes={}, emit=ignore, options=options)
     world = first_world(overhead, 9)
     assert (world.bodies, world.stood) == (cell._world.bodies, {})
     for body in world.bodies:

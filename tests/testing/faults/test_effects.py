@@ -94,9 +94,9 @@ def test_a_mission_deals_with_it_and_its_books_are_right(
     one: ScheduledFault, pattern: str, reasons: list[str], status: str, rejected: int
 ) -> None:
     result = run_mission("sort_overhead", faults=[one])
-    assert result.find_reasons(pattern) == reasons
+    assert result.list_failure_reasons(pattern) == reasons
     assert (result.status, result.items["rejected"], result.agrees) == (status, rejected, True)
-    assert {fault.name for fault in result.find_faults()} == {one.effect.name}
+    assert {fault.name for fault in result.list_injected_faults()} == {one.effect.name}
 
 
 def test_an_operator_wants_something_else_first() -> None:
@@ -105,8 +105,11 @@ def test_an_operator_wants_something_else_first() -> None:
         during("*/AwaitRequest", effects.operator_quits(), nth=3),
     ]
     result = run_mission("pick_on_request", requests=["cube", "cube"], faults=script)
-    assert result.find_reasons("*/AwaitRequest") == ["rescan", "quit"]
-    assert [fault.name for fault in result.find_faults()] == ["operator_asks_rescan", "operator_quits"]
+    assert result.list_failure_reasons("*/AwaitRequest") == ["rescan", "quit"]
+    assert [fault.name for fault in result.list_injected_faults()] == [
+        "operator_asks_rescan",
+        "operator_quits",
+    ]
     assert [one.event.wanted for one in result.events if isinstance(one.event, RequestGiven)] == ["cube"]
 
 

@@ -13,7 +13,7 @@ from executive.geometry import Array
 from executive.testing import faults as effects
 from executive.testing.faults import ScheduledFault, after, during
 from executive.testing.faults.world_access import open_world
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 from executive.testing.run_mission import MissionResult, run_mission
 
 
@@ -37,7 +37,9 @@ class Watched:
         def keep(cell: SimCell) -> None:
             self._cell = cell
 
-        return run_mission("sort_overhead", oracle_cell(), faults=[fault], arrange=keep, observers=[watch])
+        return run_mission(
+            "sort_overhead", make_oracle_kind(), faults=[fault], arrange=keep, observers=[watch]
+        )
 
 
 @pytest.fixture
@@ -57,21 +59,21 @@ def holding(cell: SimCell) -> bool:
 @pytest.mark.slow
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
     result = watched.run(during("*/Transit", effects.seal_breaks(), nth=3), places)
-    (fault,) = result.find_faults()
+    (fault,) = result.list_injected_faults()
     hung = watched.seen["FaultInjected"]
     fallen = watched.seen["SelectTarget.unseen"]
     assert isinstance(hung, dict) and isinstance(fallen, dict)
     (body,) = (body for body, place in hung.items() if np.allclose(place, fault.position, atol=1e-3))
     assert hung[body][2] > 0.1
     assert fallen[body][2] < 0.05
-    assert (result.status, result.find_reasons("*/Transit")) == ("SUCCESS", ["dropped"])
+    assert (result.status, result.list_failure_reasons("*/Transit")) == ("SUCCESS", ["dropped"])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["seal_breaks", "arm_collides", "no_path"])
 def test_what_falls_or_is_put_down_is_not_taken_for_something_else(name: str) -> None:
     script = [during("*/Transit", getattr(effects, name)(), nth=2)]
-    assert run_mission("sort_overhead", oracle_cell(), faults=script).agrees
+    assert run_mission("sort_overhead", make_oracle_kind(), faults=script).agrees
 
 
 def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched) -> None:
@@ -83,7 +85,7 @@ def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched)
 @pytest.mark.slow
 def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
     result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), nth=2), places)
-    (fault,) = result.find_faults()
+    (fault,) = result.list_injected_faults()
     before, felt = watched.seen["FaultInjected"], watched.seen["no_contact"]
     assert isinstance(before, dict) and isinstance(felt, dict)
     (body,) = (body for body, place in before.items() if np.allclose(place, fault.position, atol=1e-3))

@@ -50,7 +50,7 @@ def test_it_happens_in_the_activations_it_is_meant_for(nth: int | Sequence[int],
     result = sorted_with(during("*/Grasp", SLIPS, nth=nth))
     assert slipped(result)[: len(missed)] == missed
     assert len(slipped(result)) == len(missed) or nth == ()
-    assert len(result.find_faults()) == len(slipped(result))
+    assert len(result.list_injected_faults()) == len(slipped(result))
     assert result.agrees
 
 
@@ -112,7 +112,7 @@ def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again(
 
 def test_what_happens_to_a_node_is_told_with_node_item_and_object() -> None:
     result = sorted_with(during("*/Transit", effects.seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
-    (fault,) = result.find_faults()
+    (fault,) = result.list_injected_faults()
     assert (fault.name, fault.node.rpartition("/")[2]) == ("seal_breaks", "Transit")
     assert fault.item.startswith(f"{fault.object}-") and len(fault.position) == 3
 

@@ -11,7 +11,7 @@ from executive.plugins import discover
 from executive.record.recorded_run import record_run
 from executive.record.run_directory import RunDirectory
 from executive.run.assembly import RunOptions
-from executive.testing.oracle import oracle_cell
+from executive.testing.oracle import make_oracle_kind
 from tests.record.conftest import MISSION
 
 
@@ -22,5 +22,5 @@ def filmed_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     (folder / "bring_one.yaml").write_text(MISSION)
     skills = discover()
     loaded = load_mission(folder / "bring_one.yaml", skills)
-    result = record_run(loaded, skills, RunOptions(5, kind=oracle_cell()), folder / "runs")
+    result = record_run(loaded, skills, RunOptions(5, kind=make_oracle_kind()), folder / "runs")
     return RunDirectory(Path(result.run))
