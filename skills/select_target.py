@@ -62,7 +62,7 @@ class SelectTarget(Skill):
             return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
         name = self.same or self.wanted or "object to sort"
         if self.same is None and cell.ledger.is_table_empty(self.wanted):
-            empty = f"no {name} is left on the table but what was rejected"
+            empty = f"no {name} is left on the table, except rejected objects"
             message = "; ".join(filter(None, (empty, describe_unknown(cell.ledger.unknown))))
             return self.failure("no_candidate", message)
-        return self.failure("unseen", f"no {name} is in sight, and the table is not known to be empty")
+        return self.failure("unseen", f"no {name} is in sight, but it is not certain that the table is empty")

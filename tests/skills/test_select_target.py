@@ -61,7 +61,7 @@ def test_only_the_same_item_or_the_wanted_class_will_do(fake: FakeCell, look) ->
     assert select(fake, targets, wanted="cube").outputs["item"] == "cube-1"
     result = select(fake, targets, wanted="sphere")
     assert (result.reason, result.message) == (
-        "unseen", "no sphere is in sight, and the table is not known to be empty",
+        "unseen", "no sphere is in sight, but it is not certain that the table is empty",
     )  # fmt: skip
 
 
@@ -74,7 +74,7 @@ def test_two_empty_looks_at_the_full_frame_alone_are_believed(
     results = [select(fake, look(view)) for _ in reasons]
     assert [result.reason for result in results] == reasons
     if view == "full":
-        assert results[-1].message == "no object to sort is left on the table but what was rejected"
+        assert results[-1].message == "no object to sort is left on the table, except rejected objects"
 
 
 def test_a_class_can_be_gone_while_others_are_left(fake: FakeCell, look) -> None:
