@@ -38,7 +38,7 @@ def command(
     with stdout_kept_clean():
         from executive.cli.progress import bar
         from executive.record.run_directory import RunDirectory, find_run
-        from executive.view.film.film import END_DURATION, film
+        from executive.view.film.film import END_DURATION, write_film
         from executive.view.film.formats import choose_format, prepare_file
         from executive.view.film.source import FilmSource
 
@@ -52,10 +52,11 @@ def command(
                 seconds = source.events[-1].clock / speed + END_DURATION
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)
             with bar("frames", quiet=quiet, print_lines=True) as progress:
-                frames = film(source, partial_file, format, speed=speed, workers=workers, progress=progress)
-        result = {
-            "file": str(file), "frames": frames, "seconds": frames / format.rate, "size": file.stat().st_size
-        }  # fmt: skip
-        click.echo(f"{file}: {result['seconds']:.1f} s, {file.stat().st_size / 1e6:.1f} MB", err=True)
+                frames = write_film(
+                    source, partial_file, format, speed=speed, workers=workers, progress=progress
+                )
+        seconds, size = frames / format.frame_rate, file.stat().st_size
+        result = {"file": str(file), "frames": frames, "seconds": seconds, "size": size}
+        click.echo(f"{file}: {seconds:.1f} s, {size / 1e6:.1f} MB", err=True)
     if as_json:
         print_json(result)

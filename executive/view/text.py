@@ -1,4 +1,4 @@
-"""Text in drawings and pages: estimated length, shortening, and templates with escaping."""
+"""Text in drawings and pages: estimated length, truncation, and templates with escaping."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 _INVALID_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
-# Advance widths [share of the font size] in DejaVu Sans, the widest of the common sans-serif fonts.
+# Advance widths [fraction of the font size] of characters in DejaVu Sans, the widest common sans-serif font.
 _ADVANCES = {
     0.36: "ijlIJ',./:;\\| ",
     0.42: "frt!()-[]",
@@ -24,7 +24,7 @@ _BOLD_FACTOR = 1.12
 
 
 def measure_text(text: str, size: float, *, bold: bool = False) -> float:
-    """Return an upper bound of the length [pixel] of a text in a sans-serif font of this size [pixel]."""
+    """Return an upper bound of the width [pixel] of a text in a sans-serif font of a size [pixel]."""
     advances = sum(
         1.05 if unicodedata.east_asian_width(character) in "WF" else _ADVANCE.get(character, _DEFAULT_ADVANCE)
         for character in text
@@ -32,30 +32,34 @@ def measure_text(text: str, size: float, *, bold: bool = False) -> float:
     return advances * size * (_BOLD_FACTOR if bold else 1.0)
 
 
-def fit_text(text: str, columns: int, lines: int = 1) -> tuple[str, ...]:
-    """Return a text in at most `lines` lines of `columns` characters, preferably broken after a comma.
+def fit_text(text: str, max_length: int, max_lines: int = 1) -> tuple[str, ...]:
+    """Return a text as at most `max_lines` lines of at most `max_length` characters.
 
-    The rest of a longer text is replaced by `…`.
+    Lines are broken after commas if possible; `…` replaces the rest of a longer text.
     """
-    rows: list[str] = []
+    lines: list[str] = []
     for clause in " ".join(text.split()).replace(", ", ",\n").splitlines():
-        if rows and len(rows[-1]) + len(clause) < columns:
-            rows[-1] += f" {clause}"
+        if lines and len(lines[-1]) + len(clause) < max_length:
+            lines[-1] += f" {clause}"
         else:
-            rows += textwrap.wrap(clause, columns, break_on_hyphens=False)
-    if len(rows) > lines:
-        last = rows[lines - 1]
-        rows[lines - 1 :] = [f"{last} …" if len(last) + 2 <= columns else f"{last[: columns - 1]}…"]
-    return tuple(rows)
+            lines += textwrap.wrap(clause, max_length, break_on_hyphens=False)
+    if len(lines) > max_lines:
+        last = lines[max_lines - 1]
+        end = f"{last} …" if len(last) + 2 <= max_length else f"{last[: max_length - 1]}…"
+        lines[max_lines - 1 :] = [end]
+    return tuple(lines)
 
 
-def replace_invalid(text: str) -> str:
-    """Return a text in which `�` replaces the characters that XML does not allow."""
+def replace_invalid_characters(text: str) -> str:
+    """Return a text in which `�` replaces all characters that XML does not allow."""
     return _INVALID_IN_XML.sub("�", text)
 
 
-def render(template: str, **values: object) -> str:
-    """Return a rendered template of this package; texts are escaped, and characters outside XML replaced."""
+def render_template(template: str, **values: object) -> str:
+    """Return a rendered template of this package; `template` is its path relative to the package.
+
+    Texts are escaped, and characters that XML does not allow are replaced.
+    """
     environment = Environment(
         loader=PackageLoader("executive.view", "."),
         autoescape=True,
@@ -63,4 +67,4 @@ def render(template: str, **values: object) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return replace_invalid(environment.get_template(template).render(values))
+    return replace_invalid_characters(environment.get_template(template).render(values))

@@ -30,7 +30,7 @@ from executive.record.resumed_run import resume_run
 from executive.record.run_directory import LATEST, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
-from executive.view.film.film import film
+from executive.view.film.film import write_film
 from executive.view.film.formats import choose_format
 from executive.view.film.source import FilmSource
 from executive.view.report.page import write_report
@@ -197,7 +197,7 @@ def _film_first_picture(path: Path) -> None:
     def stop(done: int, number: int) -> None:
         raise Reached
 
-    film(
+    write_film(
         FilmSource(RunDirectory(path)),
         path / "film.mp4",
         choose_format(None, False),

@@ -24,7 +24,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (path / "journal.jsonl").touch()
     (tmp_path / "runs" / "latest").symlink_to(path)
 
-    def film(source, file, format, *, speed, workers, progress):
+    def write_film(source, file, format, *, speed, workers, progress):
         file.write_text(f"{source.directory.path.name} {format.suffix} {speed:g} {workers}")
         progress(30, 30)
         return 30
@@ -33,7 +33,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "executive.view.film.source.FilmSource",
         lambda directory: SimpleNamespace(directory=directory, events=[SimpleNamespace(clock=4.0)]),
     )
-    monkeypatch.setattr("executive.view.film.film.film", film)
+    monkeypatch.setattr("executive.view.film.film.write_film", write_film)
     return path
 
 
@@ -51,8 +51,8 @@ def test_a_film_is_made_where_it_was_wanted(run: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("-o", "a.mp4", "--gif"), '"a.mp4" is no name for a GIF'),
-        (("-o", "a.webm"), '"a.webm" is no name for a film'),
+        (("-o", "a.mp4", "--gif"), '"a.mp4" cannot be a GIF'),
+        (("-o", "a.webm"), '"a.webm" cannot be a film'),
         (("-o", "/nowhere/a.mp4"), 'cannot write the film "/nowhere/a.mp4": no such file or directory'),
         (("--speed", "0"), "0.1<=x<=100"),
     ],
@@ -68,7 +68,7 @@ def test_a_run_on_a_cell_that_is_not_simulated_is_refused(tmp_path: Path) -> Non
     assert invoke("run", "sort_fruit", "--seed", "4", "--quiet", *runs).exit_code == 0
     refused = invoke("film", "latest", *runs, "-o", str(tmp_path / "a.mp4"))
     assert refused.exit_code == 2
-    assert "its cell has no simulated world to look at; film a run on a cell of `kind: sim`" in refused.stderr
+    assert "its cell has no simulated world; film a run on a cell of `kind: sim`" in refused.stderr
     assert not (tmp_path / "a.mp4").exists()
     assert invoke("film", "nowhere", *runs).exit_code == 2
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.view.text import fit_text, measure_text, replace_invalid
+from executive.view.text import fit_text, measure_text, replace_invalid_characters
 
 
 @pytest.mark.parametrize(
@@ -32,4 +32,4 @@ def test_long_text_gets_a_longer_box():
 
 
 def test_what_xml_cannot_hold_is_replaced():
-    assert replace_invalid("a\x00\x1b\ud800\ufffeb\tc\n€𝄞") == "a����b\tc\n€𝄞"
+    assert replace_invalid_characters("a\x00\x1b\ud800\ufffeb\tc\n€𝄞") == "a����b\tc\n€𝄞"

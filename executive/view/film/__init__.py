@@ -1,1 +1,1 @@
-"""Films of recorded runs: the world, and the decisions of the tree."""
+"""Films of recorded runs: the simulated world, and the decisions of the tree."""

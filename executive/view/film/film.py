@@ -1,4 +1,4 @@
-"""Film of a recorded run: the rebuilt world, and beside it the decisions of the tree."""
+"""Film of a recorded run: the simulated world, and beside it the decisions of the tree."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from PIL import Image
 
 from executive.cells.sim.shots import Shoot, count_steps, take_pictures
 from executive.cells.sim.viewpoint import overview
-from executive.view.film.course import FilmCourse
-from executive.view.film.formats import Format
-from executive.view.film.page import SCENE_SIZE, draw_ending, draw_page
+from executive.view.film.formats import FilmFormat
+from executive.view.film.page import SCENE_SIZE, draw_page, draw_result
+from executive.view.film.run_state import FilmRunState
 from executive.view.film.source import FilmSource
 
-VISIBLE_AREA = (24, 76, 776, 644)
-"""Left, top, right and bottom of the part of the image with arm, workspace and bins [pixel]."""
+CELL_BOX = (24, 76, 776, 644)
+"""Left, top, right and bottom of the box in the image in which arm, workspace and bins appear [pixel]."""
 END_DURATION = 2.0
-"""Time for which the last frame is shown [s]."""
+"""Time for which the film shows the result of the run at its end [s]."""
 
 Progress = Callable[[int, int], None]
-"""Callback with the number of complete frames and of all frames."""
+"""Callback that receives the number of complete frames and the number of all frames."""
 
 
-def film(
-    source: FilmSource, file: Path, format: Format, *, speed: float, workers: int, progress: Progress
+def write_film(
+    source: FilmSource, file: Path, format: FilmFormat, *, speed: float, workers: int, progress: Progress
 ) -> int:
     """Write the film of a run, and return the number of frames.
 
@@ -36,43 +36,45 @@ def film(
         format: Format of the film.
         speed: Seconds on the robot's clock per second of the film.
         workers: Number of rendering processes.
-        progress: Receives the number of complete frames and of all frames.
+        progress: Callback that receives the number of complete frames and the number of all frames.
     """
-    steps_per_frame = speed / format.rate / source.start.step
+    steps_per_frame = speed / format.frame_rate / source.start.step
     steps = select_steps(count_steps(source.directory.world), steps_per_frame)
-    end_frames = round(END_DURATION * format.rate)
+    end_frame_count = round(END_DURATION * format.frame_rate)
 
-    def report_progress() -> Generator[Image.Image, None, None]:
-        for done, page in enumerate(pages, start=1):
-            progress(done, len(steps) + end_frames)
-            yield page
+    def report_frames() -> Generator[Image.Image, None, None]:
+        for done, frame in enumerate(frames, start=1):
+            progress(done, len(steps) + end_frame_count)
+            yield frame
 
-    with closing(_draw_frames(source, steps, end_frames, speed, workers)) as pages:
-        format.write(file, report_progress(), format.rate)
-    return len(steps) + end_frames
+    with closing(_draw_frames(source, steps, end_frame_count, speed, workers)) as frames:
+        format.write(file, report_frames(), format.frame_rate)
+    return len(steps) + end_frame_count
 
 
-def select_steps(steps: int, steps_per_frame: float) -> list[int]:
-    """Return the control steps of the frames: every `steps_per_frame`, from the first to the last."""
-    return [
-        min(round(frame * steps_per_frame), steps) for frame in range(math.ceil(steps / steps_per_frame) + 1)
-    ]
+def select_steps(step_count: int, steps_per_frame: float) -> list[int]:
+    """Return the control steps of the frames: every `steps_per_frame`, from the first step to the last."""
+    frame_count = math.ceil(step_count / steps_per_frame) + 1
+    return [min(round(frame * steps_per_frame), step_count) for frame in range(frame_count)]
 
 
 def _draw_frames(
-    source: FilmSource, steps: Sequence[int], end_frames: int, speed: float, workers: int
+    source: FilmSource, steps: Sequence[int], end_frame_count: int, speed: float, workers: int
 ) -> Generator[Image.Image, None, None]:
-    """Yield the frames of a film: a page per control step, and then `end_frames` pages with the result."""
+    """Yield the frames of a film: one per step in `steps`, then `end_frame_count` with the result."""
     start, directory = source.start, source.directory
-    note = f"seed {start.seed} · cell {source.config.cell}" + (f" · {speed:g}x speed" if speed != 1 else "")
-    length = steps[-1] * start.step
-    course = FilmCourse(source.events, source.nodes, list(directory.frames.glob("*.jpg")))
-    view = overview(source.config, SCENE_SIZE, VISIBLE_AREA)
+    speed_text = f" · {speed:g}x speed" if speed != 1 else ""
+    subtitle = f"seed {start.seed} · cell {source.config.cell}{speed_text}"
+    duration = steps[-1] * start.step
+    state = FilmRunState(source.events, source.nodes, list(directory.frames.glob("*.jpg")))
+    view = overview(source.config, SCENE_SIZE, CELL_BOX)
     shoot = Shoot(source.config, start.seed, directory.world, view, directory.scene)
     with closing(take_pictures(shoot, steps, workers)) as pictures:
         for step, picture in zip(steps, pictures, strict=True):
-            course.go_to(step, step * start.step)
-            yield draw_page(source, picture, course, note, length)
-    last = draw_ending(draw_page(source, picture, course, note, length, caption=False), source.result)
-    for _ in range(end_frames):
-        yield last
+            state.advance_to(step, step * start.step)
+            yield draw_page(source, picture, state, subtitle, duration)
+    last_frame = draw_result(
+        draw_page(source, picture, state, subtitle, duration, has_caption=False), source.result
+    )
+    for _ in range(end_frame_count):
+        yield last_frame

@@ -14,21 +14,26 @@ from PIL import Image, ImageColor
 
 from executive.errors import InputError, explain_os_errors
 from executive.record.atomic_file import atomic_replacement
-from executive.view.film.ink import FAILURE, RUNNING, SUCCESS
+from executive.view.film.style import FAILURE, RUNNING, SUCCESS
 
 GIF_SIZE = (960, 540)
-"""Width and height of a GIF's frames [pixel]; a README shows no larger ones."""
+"""Width and height of the frames of a GIF [pixel]; a README scales larger images down."""
 PALETTE_SIZE = 255
-"""Number of colours in the palette; the 256th marks pixels that are unchanged since the previous frame."""
-SAMPLE_FRAMES = 8
-"""Number of first frames from which the palette is chosen."""
-_DROPPED_BITS, _STATUS_WEIGHT = 3, 60
+"""Number of colours in the palette of a GIF; colour 256 marks pixels that equal those of the last frame."""
+PALETTE_FRAME_COUNT = 8
+"""Number of frames, from the first on, from which the palette of a GIF is computed."""
+_DROPPED_BITS = 3
+"""Number of lower bits of a colour channel that are ignored when similar colours are counted."""
+_STATUS_WEIGHT = 60
+"""Number of samples of each status colour for the palette."""
 
 
-def write_mp4(path: Path, frames: Iterable[Image.Image], rate: float) -> None:
-    """Write frames, `rate` per second, as H.264 for browsers and phones."""
+def write_mp4(path: Path, frames: Iterable[Image.Image], frame_rate: float) -> None:
+    """Write frames as an MP4 file with H.264, `frame_rate` frames per second."""
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
-        stream = container.add_stream("libx264", rate=round(rate), options={"crf": "20", "preset": "medium"})
+        stream = container.add_stream(
+            "libx264", rate=round(frame_rate), options={"crf": "20", "preset": "medium"}
+        )
         stream.pix_fmt = "yuv420p"
         for number, image in enumerate(frames):
             if number == 0:
@@ -37,36 +42,37 @@ def write_mp4(path: Path, frames: Iterable[Image.Image], rate: float) -> None:
         container.mux(stream.encode(None))
 
 
-def write_gif(path: Path, frames: Iterable[Image.Image], rate: float) -> None:
-    """Write frames, `rate` per second, as an endless GIF with one palette."""
-    small = (image.resize(GIF_SIZE, Image.Resampling.LANCZOS) for image in frames)
-    first = list(islice(small, SAMPLE_FRAMES))
-    palette = _choose_palette(first)
-    quantized = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in chain(first, small))
+def write_gif(path: Path, frames: Iterable[Image.Image], frame_rate: float) -> None:
+    """Write frames as an endlessly repeated GIF with one palette, `frame_rate` frames per second."""
+    resized = (image.resize(GIF_SIZE, Image.Resampling.LANCZOS) for image in frames)
+    first = list(islice(resized, PALETTE_FRAME_COUNT))
+    palette = _compute_palette(first)
+    quantized = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in chain(first, resized))
     next(quantized).save(
         path,
         "GIF",
         save_all=True,
         append_images=quantized,
-        duration=round(1000 / rate),
+        duration=round(1000 / frame_rate),
         loop=0,
         optimize=False,
     )
 
 
-def _choose_palette(frames: list[Image.Image]) -> Image.Image:
-    """Return an image whose palette has the colours of these frames and of the status of a run.
+def _compute_palette(frames: list[Image.Image]) -> Image.Image:
+    """Return an image whose palette contains the most important colours of the frames and the status colours.
 
-    Each colour counts by the square root of its number of pixels, so that small objects keep their colours.
+    The weight of a colour is the square root of its number of pixels, so that small objects keep their
+    colours.
     """
     pixels = np.concatenate([np.asarray(frame).reshape(-1, 3) for frame in frames])
     coarse = pixels.astype(np.int32) >> _DROPPED_BITS << _DROPPED_BITS
     codes = coarse @ [1 << 16, 1 << 8, 1]
-    _, places, counts = np.unique(codes, return_index=True, return_counts=True)
+    _, first_indices, counts = np.unique(codes, return_index=True, return_counts=True)
     status_colours = np.array([ImageColor.getrgb(colour) for colour in (RUNNING, SUCCESS, FAILURE)], np.uint8)
     samples = np.concatenate(
         [
-            np.repeat(pixels[places], np.sqrt(counts).astype(int), axis=0),
+            np.repeat(pixels[first_indices], np.sqrt(counts).astype(int), axis=0),
             np.repeat(status_colours, _STATUS_WEIGHT, axis=0),
         ]
     )
@@ -74,35 +80,35 @@ def _choose_palette(frames: list[Image.Image]) -> Image.Image:
 
 
 @dataclass(frozen=True)
-class Format:
+class FilmFormat:
     """File format of a film.
 
     Attributes:
-        suffix: Suffix of the file name.
-        rate: Frames per second.
+        suffix: Suffix of the file name, with the dot.
+        frame_rate: Frames per second.
         speed: Default number of seconds on the robot's clock per second of the film.
-        write: Function that writes frames to a file.
+        write: Function that writes frames to a file, given the file, the frames and the frame rate.
     """
 
     suffix: str
-    rate: float
+    frame_rate: float
     speed: float
     write: Callable[[Path, Iterable[Image.Image], float], None]
 
 
-MP4 = Format(".mp4", 25.0, 1.0, write_mp4)
-"""Video in full resolution."""
-GIF = Format(".gif", 10.0, 2.0, write_gif)
-"""Animated image at lower resolution; the format counts time in hundredths of a second."""
+MP4 = FilmFormat(".mp4", 25.0, 1.0, write_mp4)
+"""Video at full resolution."""
+GIF = FilmFormat(".gif", 10.0, 2.0, write_gif)
+"""Animated image at lower resolution; the duration of a frame is a multiple of 0.01 s in this format."""
 FORMATS = (MP4, GIF)
 
 
-def choose_format(out: Path | None, gif: bool) -> Format:
+def choose_format(out: Path | None, gif: bool) -> FilmFormat:
     """Return the format of a film.
 
     Args:
-        out: File of the film; None if the user gave none.
-        gif: True if the user asked for a GIF.
+        out: File of the film that the user gave, or None.
+        gif: True if the user requested a GIF.
 
     Raises:
         InputError: The suffix of the file is unknown or contradicts `gif`.
@@ -112,16 +118,18 @@ def choose_format(out: Path | None, gif: bool) -> Format:
         return default
     suffix = out.suffix.lower()
     if gif and suffix != GIF.suffix:
-        raise InputError(f'"{out}" is no name for a GIF; end it in .gif, or leave out --gif')
+        raise InputError(f'"{out}" cannot be a GIF; give a file name that ends in .gif, or omit --gif')
     found = next((format for format in FORMATS if format.suffix == suffix), None)
     if found is None:
-        raise InputError(f'"{out}" is no name for a film; end it in {MP4.suffix} or {GIF.suffix}')
+        raise InputError(
+            f'"{out}" cannot be a film; give a file name that ends in {MP4.suffix} or {GIF.suffix}'
+        )
     return found
 
 
 @contextmanager
 def prepare_file(path: Path, *, force: bool) -> Iterator[Path]:
-    """Yield a temporary file for a film; move it to `path` if no exception occurred.
+    """Yield a temporary file for a film, and move it to `path` if no exception occurred.
 
     Raises:
         InputError: The file exists, or cannot be written.

@@ -1,4 +1,4 @@
-"""Right side of a frame: the running branch of the tree, and the items of the run."""
+"""Right side of a frame of a film: the running branches of the tree, and the items of the run."""
 
 from __future__ import annotations
 
@@ -9,120 +9,136 @@ from PIL import Image, ImageDraw
 from executive.cell.frame import Box
 from executive.events import ItemChanged
 from executive.mission.outline import OutlineNode
-from executive.view.film import ink
-from executive.view.film.course import FilmCourse
-from executive.view.film.ink import DIM, FAILURE, FAINT, INK, RULE, RUNNING, STATUS, SUCCESS
-from executive.view.tree.outline import draw_branches, select_open
+from executive.view.film.run_state import FilmRunState
+from executive.view.film.style import (
+    FAILURE,
+    INACTIVE,
+    LINE,
+    MINOR_TEXT,
+    RUNNING,
+    STATUS_COLOURS,
+    SUCCESS,
+    TEXT,
+    draw_mark,
+    load_font,
+    truncate,
+)
+from executive.view.tree.outline import draw_line_prefixes, select_running
 
 TEXT_SIZE, HEADING_SIZE, MARK_SIZE = 14, 12, 11
-"""Sizes of text, of column headings and of status marks [pixel]."""
+"""Font sizes of text and of column headings, and side of a status mark [pixel]."""
 NODE_ROW, ITEM_ROW, INDENT = 18, 20, 17
-"""Heights of the rows of the tree and of the items, and indentation per level of the tree [pixel]."""
+"""Height of a row of the tree, height of a row of the items, and indentation per tree level [pixel]."""
 MAX_ITEM_ROWS = 9
-"""Largest number of rows for items."""
+"""Maximum number of items that are drawn."""
 _CHARACTERS_PER_LEVEL = 3
-"""Number of characters that `draw_branches` returns per level of the tree."""
+"""Number of characters per tree level in a result of `draw_line_prefixes`."""
 _COLUMNS = {"item": 0.0, "class": 0.32, "state": 0.53, "bin": 0.74}
-"""Left ends of the columns [share of the width]."""
-_STATES = {"placed": SUCCESS, "rejected": FAILURE, "lost": FAILURE, "held": RUNNING, "dropped": RUNNING}
+"""Left end of each column [fraction of the width]."""
+_COLOURS = {"placed": SUCCESS, "rejected": FAILURE, "lost": FAILURE, "held": RUNNING, "dropped": RUNNING}
+"""Colour of the name of a state, by state; other states have the colour `MINOR_TEXT`."""
 _FINAL_STATES = ("placed", "rejected", "skipped", "lost", "phantom")
 _SWATCH_SIZE = 9
 
 
-def draw_branch(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], course: FilmCourse) -> None:
-    """Draw the open nodes of a run and their children.
+def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state: FilmRunState) -> None:
+    """Draw the active nodes of a run and their children, one per row.
 
     Args:
         image: Image to draw on.
-        box: Left, top, right and bottom of the free area [pixel].
-        nodes: The whole tree.
-        course: Its open nodes, and what is known of them.
+        box: Left, top, right and bottom of the region to draw in [pixel].
+        nodes: Nodes of the whole tree.
+        state: State of the run, with the active nodes.
     """
     left, top, right, bottom = box
-    shown = select_nodes(nodes, course, int((bottom - top) // NODE_ROW))
-    draw = ImageDraw.Draw(image)
-    for row, (node, branch) in enumerate(zip(shown, draw_branches(shown), strict=True)):
+    shown = select_nodes(nodes, state, int((bottom - top) // NODE_ROW))
+    draw, font = ImageDraw.Draw(image), load_font(TEXT_SIZE)
+    for row, (node, prefix) in enumerate(zip(shown, draw_line_prefixes(shown), strict=True)):
         middle = top + NODE_ROW * (row + 0.5)
-        _draw_lines(draw, branch, left, middle)
-        last = course.timeline.current(node.path)
-        now = last.status if last else ""
-        x = left + INDENT * (len(branch) // _CHARACTERS_PER_LEVEL)
-        ink.put_mark(image, now, (x + MARK_SIZE / 2, middle), MARK_SIZE)
+        _draw_lines(draw, prefix, left, middle)
+        last = state.timeline.current(node.path)
+        status = last.status if last else ""
+        x = left + INDENT * (len(prefix) // _CHARACTERS_PER_LEVEL)
+        draw_mark(image, status, (x + MARK_SIZE / 2, middle), MARK_SIZE)
         x += MARK_SIZE + 8
-        colour = DIM if now in ("SUCCESS", "FAILURE") else FAINT
-        if now == "RUNNING":
-            colour = RUNNING if node.skill else INK
-        name = ink.clip(node.name, TEXT_SIZE, right - x)
-        draw.text((x, middle), name, colour, ink.font(TEXT_SIZE), "lm")
-        x += ink.font(TEXT_SIZE).getlength(name) + 10
-        why = ink.clip(last.note if last else "", TEXT_SIZE, right - x)
-        draw.text((x, middle), why, FAILURE if now == "FAILURE" else DIM, ink.font(TEXT_SIZE), "lm")
+        colour = MINOR_TEXT if status in ("SUCCESS", "FAILURE") else INACTIVE
+        if status == "RUNNING":
+            colour = RUNNING if node.skill else TEXT
+        name = truncate(node.name, TEXT_SIZE, right - x)
+        draw.text((x, middle), name, colour, font, "lm")
+        x += font.getlength(name) + 10
+        note = truncate(last.note if last else "", TEXT_SIZE, right - x)
+        draw.text((x, middle), note, FAILURE if status == "FAILURE" else MINOR_TEXT, font, "lm")
 
 
-def select_nodes(nodes: Sequence[OutlineNode], course: FilmCourse, rows: int) -> list[OutlineNode]:
-    """Return the open nodes and their children, at most `rows` of them.
+def select_nodes(nodes: Sequence[OutlineNode], state: FilmRunState, max_count: int) -> list[OutlineNode]:
+    """Return the active nodes and their children, at most `max_count` nodes.
 
-    Nodes that never ran are left out first, then nodes that do not run; the last of the tree first.
+    Nodes that never ran are omitted first, then inactive nodes; of these, the last nodes of the tree first.
     """
-    open_paths = course.open_paths
-    shown = select_open(nodes, open_paths)
+    active_paths = state.active_paths
+    shown = select_running(nodes, active_paths)
 
     def rank(index: int) -> tuple[bool, bool, int]:
         path = shown[index].path
-        last = course.timeline.current(path)
-        return path in open_paths, last is not None and last.status in STATUS, -index
+        last = state.timeline.current(path)
+        return path in active_paths, last is not None and last.status in STATUS_COLOURS, -index
 
-    kept_indices = sorted(sorted(range(len(shown)), key=rank, reverse=True)[:rows])
+    kept_indices = sorted(sorted(range(len(shown)), key=rank, reverse=True)[:max_count])
     return [shown[index] for index in kept_indices]
 
 
-def height(items: int) -> int:
-    """Return the height of a list of `items` items [pixel]."""
-    return ITEM_ROW * (min(items, MAX_ITEM_ROWS) + 1)
+def compute_height(item_count: int) -> int:
+    """Return the height of the drawing of `item_count` items [pixel]."""
+    return ITEM_ROW * (min(item_count, MAX_ITEM_ROWS) + 1)
 
 
-def draw_items(image: Image.Image, box: Box, rows: Sequence[ItemChanged], bins: Mapping[str, str]) -> None:
-    """Draw at most `MAX_ITEM_ROWS` items; items in a final state are left out first.
+def draw_items(
+    image: Image.Image, box: Box, items: Sequence[ItemChanged], bin_colours: Mapping[str, str]
+) -> None:
+    """Draw at most `MAX_ITEM_ROWS` items, one per row; items in a final state are omitted first.
 
     Args:
         image: Image to draw on.
-        box: Left, top, right and bottom of the free area [pixel].
-        rows: The items.
-        bins: Colour of each bin, by name.
+        box: Left, top, right and bottom of the region to draw in [pixel].
+        items: Last change of each item.
+        bin_colours: Colour of each bin, by the name of the bin.
     """
     left, top, right, _ = box
     draw = ImageDraw.Draw(image)
-    starts = [left + share * (right - left) for share in _COLUMNS.values()]
+    starts = [left + fraction * (right - left) for fraction in _COLUMNS.values()]
     ends = [start - 8 for start in starts[1:]] + [right]
     for title, start in zip(_COLUMNS, starts, strict=True):
-        draw.text((start, top + ITEM_ROW / 2), title, FAINT, ink.font(HEADING_SIZE), "lm")
-    for number, row in enumerate(select_items(rows), start=1):
+        draw.text((start, top + ITEM_ROW / 2), title, INACTIVE, load_font(HEADING_SIZE), "lm")
+    for number, item in enumerate(select_items(items), start=1):
         middle = top + ITEM_ROW * (number + 0.5)
-        cells = (row.item, row.label, row.state, row.bin)
-        colours = (DIM if row.state in _FINAL_STATES else INK, DIM, _STATES.get(row.state, DIM), DIM)
-        shifts = (0, 0, 0, _SWATCH_SIZE + 6)
-        for cell, colour, shift, start, end in zip(cells, colours, shifts, starts, ends, strict=True):
-            text = ink.clip(cell, TEXT_SIZE, end - start - shift)
-            draw.text((start + shift, middle), text, colour, ink.font(TEXT_SIZE), "lm")
-        if row.bin:
+        cells = (item.item, item.label, item.state, item.bin)
+        name_colour = MINOR_TEXT if item.state in _FINAL_STATES else TEXT
+        colours = (name_colour, MINOR_TEXT, _COLOURS.get(item.state, MINOR_TEXT), MINOR_TEXT)
+        offsets = (0, 0, 0, _SWATCH_SIZE + 6)
+        for cell, colour, offset, start, end in zip(cells, colours, offsets, starts, ends, strict=True):
+            text = truncate(cell, TEXT_SIZE, end - start - offset)
+            draw.text((start + offset, middle), text, colour, load_font(TEXT_SIZE), "lm")
+        if item.bin:
             x, y = starts[-1], round(middle) - _SWATCH_SIZE // 2
-            draw.rectangle((x, y, x + _SWATCH_SIZE - 1, y + _SWATCH_SIZE - 1), bins.get(row.bin, DIM))
+            box = (x, y, x + _SWATCH_SIZE - 1, y + _SWATCH_SIZE - 1)
+            draw.rectangle(box, bin_colours.get(item.bin, MINOR_TEXT))
 
 
-def select_items(rows: Sequence[ItemChanged]) -> list[ItemChanged]:
-    """Return at most `MAX_ITEM_ROWS` items in their order; the first in a final state are left out first."""
-    order = sorted(range(len(rows)), key=lambda index: (rows[index].state not in _FINAL_STATES, index))
-    left_out = set(order[: max(len(rows) - MAX_ITEM_ROWS, 0)])
-    return [row for index, row in enumerate(rows) if index not in left_out]
+def select_items(items: Sequence[ItemChanged]) -> list[ItemChanged]:
+    """Return at most `MAX_ITEM_ROWS` items in their order; items in a final state are omitted first."""
+    order = sorted(range(len(items)), key=lambda index: (items[index].state not in _FINAL_STATES, index))
+    omitted = set(order[: max(len(items) - MAX_ITEM_ROWS, 0)])
+    return [item for index, item in enumerate(items) if index not in omitted]
 
 
-def _draw_lines(draw: ImageDraw.ImageDraw, branch: str, left: float, middle: float) -> None:
-    """Draw the lines that join a row to the rows above and below."""
-    for level in range(0, len(branch), _CHARACTERS_PER_LEVEL):
-        joint = branch[level]
+def _draw_lines(draw: ImageDraw.ImageDraw, prefix: str, left: float, middle: float) -> None:
+    """Draw the lines that connect a row with the rows of its parent and siblings, as in `prefix`."""
+    for level in range(0, len(prefix), _CHARACTERS_PER_LEVEL):
+        joint = prefix[level]
         x = left + INDENT * (level // _CHARACTERS_PER_LEVEL) + MARK_SIZE // 2
         if joint != " ":
             bottom = middle if joint == "└" else middle + NODE_ROW / 2
-            draw.line((x, middle - NODE_ROW / 2, x, bottom), RULE, 1)
+            draw.line((x, middle - NODE_ROW / 2, x, bottom), LINE, 1)
         if joint in "├└":
-            draw.line((x, middle, x + INDENT - MARK_SIZE // 2 - 3, middle), RULE, 1)
+            draw.line((x, middle, x + INDENT - MARK_SIZE // 2 - 3, middle), LINE, 1)

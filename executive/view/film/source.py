@@ -1,4 +1,4 @@
-"""Record of a run on a simulated cell, for a film."""
+"""Record of a run in a simulated cell, from which a film is made."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from executive.replay.input_log import InputLog
 
 
 class FilmSource:
-    """Record of a run.
+    """Record of a run in a simulated cell.
 
     Args:
         directory: The run directory.
 
     Attributes:
         directory: The run directory.
-        events: Events of the journal that no resumption made void.
-        start: Start of the run.
-        nodes: Its tree.
-        config: Its cell.
-        bins: Colour of each bin, by name.
-        items: Number of items in the run.
-        result: Result, else the last event of the run in the journal; None if the run was interrupted.
+        events: Events of the journal in order, without those that a later resumption voided.
+        start: Event of the start of the run.
+        nodes: Nodes of the tree.
+        config: Configuration of the cell.
+        bin_colours: Colour of each bin as `#rrggbb`, by the name of the bin.
+        item_count: Number of items in the run.
+        result: Content of result.json; without it, the event of the end of the run; None if neither exists.
 
     Raises:
         InputError: The record lacks the journal, the tree, the cell or the log of the world.
@@ -40,29 +40,29 @@ class FilmSource:
         self.events = InputLog.from_events(events).events
         self.nodes = read_tree(directory.tree)
         self.config = read_cell(directory.path)
-        self.bins = {
-            name: "#" + "".join(f"{round(255 * share):02x}" for share in bin.colour)
+        self.bin_colours = {
+            name: "#" + "".join(f"{round(255 * channel):02x}" for channel in bin.colour)
             for name, bin in self.config.bins.items()
         }
         changes = (one.event for one in self.events if isinstance(one.event, ItemChanged))
-        self.items = len({change.item for change in changes})
+        self.item_count = len({change.item for change in changes})
         self.result = read_result(directory, events) or find_end(events)
 
 
 def _require_log(directory: RunDirectory) -> None:
-    """Check that the record holds the log of a simulated world.
+    """Check that the record contains the log of a simulated world.
 
     Raises:
-        InputError: The record holds no log of a simulated world.
+        InputError: The record does not contain the log.
     """
     if not directory.world.exists():
         raise InputError(
             f'the run in "{directory.path}" cannot be filmed: it has no world.log, from which its world is '
-            "rebuilt; sweeps keep none. Run the mission once more with `executive run` and the same seed, "
-            "and film that run"
+            "simulated again; sweeps do not keep this file. Run the mission again with `executive run` and "
+            "the same seed, and film that run"
         )
     if not is_log(directory.world):
         raise InputError(
-            f'the run in "{directory.path}" cannot be filmed: its cell has no simulated world to look at; '
+            f'the run in "{directory.path}" cannot be filmed: its cell has no simulated world; '
             "film a run on a cell of `kind: sim`"
         )

@@ -33,7 +33,7 @@ from executive.view.live.messages import (
     SceneChange,
     encode_poses,
 )
-from executive.view.tree.svg import Note, draw_svg
+from executive.view.tree.svg import NodeNote, draw_svg
 
 LOOPBACK = "127.0.0.1"
 POSE_PERIOD = 1 / 10
@@ -108,7 +108,7 @@ class LivePage:
         with self._errors_noted():
             self._visuals = run.workcell.visuals()
         # Every node has a line for its counts.
-        blank = {node.path: Note("", ("",)) for node in nodes}
+        blank = {node.path: NodeNote("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(SceneChange(shapes=shapes))
         self._enqueue(Change(tree=draw_svg(nodes, mission, blank)))

@@ -9,7 +9,7 @@ from math import ceil
 from executive.mission.outline import OutlineNode
 from executive.record.timeline.activation import Activation, count_ends, find_last_failure, group_by_node
 from executive.record.timeline.timeline import Timeline
-from executive.view.text import fit_text, measure_text, render
+from executive.view.text import fit_text, measure_text, render_template
 
 MIN_LENGTH, MAX_LENGTH = 900.0, 6000.0
 """Shortest and longest time axis [pixel]."""
@@ -70,7 +70,9 @@ def draw_lanes(timeline: Timeline, nodes: Sequence[OutlineNode]) -> str:
         bars = [_make_bar(node, group) for group in groups[node.path]]
         lanes.append(Lane(node, names[node.path], round(_INDENT * node.depth), bars))
     ticks = _choose_ticks(end, scale)
-    return render("report/timeline.svg", left=left, length=length, scale=scale, ticks=ticks, lanes=lanes)
+    return render_template(
+        "report/timeline.svg", left=left, length=length, scale=scale, ticks=ticks, lanes=lanes
+    )
 
 
 def _choose_ticks(end: float, scale: float) -> list[float]:

@@ -22,8 +22,8 @@ from executive.view.report.facts import ReportFacts
 from executive.view.report.lanes import draw_lanes
 from executive.view.report.shares import LOOK, RETRY, WAITING
 from executive.view.terminal.summary import place_on_table
-from executive.view.text import render
-from executive.view.tree.svg import Note, draw_svg
+from executive.view.text import render_template
+from executive.view.tree.svg import NodeNote, draw_svg
 
 COLOURS = {LOOK: "#56B4E9", RETRY: "#D55E00", WAITING: "#9aa5b4"}
 """Colours of activities without a skill; skills have the other colours of the palette, in order."""
@@ -66,7 +66,7 @@ def render_report(facts: ReportFacts) -> str:
     items = [item.item for item in facts.objects]
     params = facts.start.params
     rows = facts.shares.rows
-    return render(
+    return render_template(
         "report/report.html",
         facts=facts,
         result=result,
@@ -125,9 +125,9 @@ def _choose_colours(activities: Sequence[str]) -> dict[str, str]:
     return {activity: COLOURS.get(activity) or next(free_colours) for activity in activities}
 
 
-def _make_notes(facts: ReportFacts) -> dict[str, Note]:
+def _make_notes(facts: ReportFacts) -> dict[str, NodeNote]:
     """Return the note of each node in the drawing of the tree."""
     return {
-        path: Note(runs[-1].status, tuple(filter(None, (count_ends(runs), find_last_failure(runs)))))
+        path: NodeNote(runs[-1].status, tuple(filter(None, (count_ends(runs), find_last_failure(runs)))))
         for path, runs in group_by_node(facts.timeline.activations).items()
     }

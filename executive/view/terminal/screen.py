@@ -17,7 +17,7 @@ from executive.record.timeline.timeline import Timeline
 from executive.run.run import Run
 from executive.run.run_control import RunControl
 from executive.view.terminal.keys import HELP, HELP_PAUSED, Keys
-from executive.view.tree.outline import draw_branches, select_open
+from executive.view.tree.outline import draw_line_prefixes, select_running
 
 REDRAWS_PER_SECOND = 10
 """Frequency of drawing [1/s]."""
@@ -103,9 +103,9 @@ class Terminal:
 
     def _render_tree(self) -> RenderableType:
         """Return the running nodes and their neighbours: a whole tree is taller than a terminal."""
-        shown = select_open(self._outline, {running.node for running in self.timeline.find_running()})
+        shown = select_running(self._outline, {running.node for running in self.timeline.find_running()})
         lines = Text()
-        for node, branch in zip(shown, draw_branches(shown), strict=True):
+        for node, branch in zip(shown, draw_line_prefixes(shown), strict=True):
             last = self.timeline.nodes.get(node.path)
             mark, style = _MARKS.get(last.status if last else "", ("·", "dim"))
             note = escape_control_characters(last.note) if last else ""

@@ -1,1 +1,1 @@
-"""Views of a tree: text, picture and Graphviz text."""
+"""Drawings of a behaviour tree: text for a terminal, SVG picture, and Graphviz text."""

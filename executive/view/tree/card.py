@@ -1,4 +1,4 @@
-"""Texts of a node in a picture of a tree."""
+"""Texts that a picture of a tree shows for a node."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from executive.tree.node import ControlNode
 from executive.view.text import fit_text
 from executive.view.tree.outline import describe_reads, describe_reasons, describe_writes
 
-COLUMNS = 28
-"""Largest length of a line in a node [characters]."""
+MAX_LINE_LENGTH = 28
+"""Maximum length of a line of text in the box of a node [characters]."""
 
 
 @dataclass(frozen=True)
 class Card:
-    """Texts of a node in a picture.
+    """Texts that a picture of a tree shows for a node.
 
     Attributes:
         symbol: Symbol before the title of a control node; "" for a skill.
-        title: Name of the node, shortened.
-        lines: Condition and params from the mission, shortened.
+        title: Name of the node, truncated.
+        lines: Failures after which the node runs, and params from the mission, truncated.
         tooltip: All facts about the node, one per line.
     """
 
@@ -31,15 +31,17 @@ class Card:
 
 
 def make_card(node: OutlineNode) -> Card:
-    """Return the texts of a node."""
+    """Return the texts that a picture shows for a node."""
     symbol = "" if node.kind == "skill" else node.symbol or ControlNode.symbol
-    title = "".join(fit_text(node.title, COLUMNS))
-    lines = fit_text(node.when, COLUMNS, 2) + fit_text(node.detail, COLUMNS, 3 if symbol else 2)
+    title = "".join(fit_text(node.title, MAX_LINE_LENGTH))
+    lines = fit_text(node.when, MAX_LINE_LENGTH, 2) + fit_text(
+        node.detail, MAX_LINE_LENGTH, 3 if symbol else 2
+    )
     return Card(symbol, title, lines, "\n".join(_list_facts(node)))
 
 
 def _list_facts(node: OutlineNode) -> list[str]:
-    """Return all facts about a node, the most important first."""
+    """Return texts with all facts about a node, the most important first."""
     type_name = node.skill or node.kind
     facts = (
         node.title if node.title == type_name else f"{node.title}: {type_name}",

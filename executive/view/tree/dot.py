@@ -1,4 +1,4 @@
-"""Graphviz text of a tree."""
+"""Drawing of a tree as a Graphviz text."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 from executive.mission.outline import OutlineNode, children
 from executive.tree.node import ControlNode
-from executive.view.text import replace_invalid
+from executive.view.text import replace_invalid_characters
 from executive.view.tree.card import make_card
 
 
 def draw_dot(nodes: Sequence[OutlineNode], name: str) -> str:
-    """Return a tree as a Graphviz digraph, in which each subtree is a cluster with its name."""
+    """Return a tree as the text of a Graphviz digraph with the name `name`; each subtree is a cluster."""
     child_lists = children(nodes)
     lines = [
         f"digraph {_quote(name)} {{",
@@ -24,31 +24,31 @@ def draw_dot(nodes: Sequence[OutlineNode], name: str) -> str:
 
 
 def _list_lines(index: int, nodes: Sequence[OutlineNode], child_lists: Sequence[Sequence[int]]) -> list[str]:
-    """Return the lines of a node and its descendants."""
+    """Return the Graphviz lines of the node with an index and of its descendants."""
     node = nodes[index]
     lines = [_describe_node(node)]
     for child in child_lists[index]:
-        slot = f" [label={_quote(nodes[child].slot)}]" if nodes[child].slot else ""
-        edge = f"{_quote(node.path)} -> {_quote(nodes[child].path)}{slot};"
+        label = f" [label={_quote(nodes[child].slot)}]" if nodes[child].slot else ""
+        edge = f"{_quote(node.path)} -> {_quote(nodes[child].path)}{label};"
         lines += [*_list_lines(child, nodes, child_lists), edge]
     if node.subtrees:
-        head = f"subgraph {_quote(f'cluster {node.path}')} {{"
-        lines = [head, f"label={_quote(node.subtree)}; style=dashed; color=gray;", *lines, "}"]
+        header = f"subgraph {_quote(f'cluster {node.path}')} {{"
+        lines = [header, f"label={_quote(node.subtree)}; style=dashed; color=gray;", *lines, "}"]
     return lines
 
 
 def _describe_node(node: OutlineNode) -> str:
-    shown = make_card(node)
-    label = "\n".join([f"{shown.symbol} {shown.title}".strip(), *shown.lines])
+    card = make_card(node)
+    label = "\n".join([f"{card.symbol} {card.title}".strip(), *card.lines])
     shape = "box" if node.kind == "skill" else node.shape or ControlNode.shape
     style = ', style="rounded"' if node.kind == "skill" else ""
-    tooltip = _quote(shown.tooltip)
+    tooltip = _quote(card.tooltip)
     return f"{_quote(node.path)} [label={_quote(label)}, shape={shape}{style}, tooltip={tooltip}];"
 
 
 def _quote(text: str) -> str:
-    """Return a text as a quoted string, with escapes for backslashes and HTML entities."""
-    text = replace_invalid(text).replace("&", "&amp;")
-    for plain, escaped in (("\\", "\\\\"), ('"', '\\"'), ("\n", "\\n")):
-        text = text.replace(plain, escaped)
+    """Return a text as a quoted Graphviz string, with escapes for special characters and HTML entities."""
+    text = replace_invalid_characters(text).replace("&", "&amp;")
+    for character, escaped in (("\\", "\\\\"), ('"', '\\"'), ("\n", "\\n")):
+        text = text.replace(character, escaped)
     return f'"{text}"'

@@ -1,8 +1,8 @@
 """Layout of a picture of a tree that grows from left to right.
 
-Each depth is a column as wide as its widest node. Each node has a horizontal band for itself and its
-descendants, so nodes cannot overlap; the band of a subtree includes its frame. The middle of a node is level
-with the middle of its first child.
+The nodes of one depth form a column, which is as wide as its widest node. Each node has a horizontal band for
+its box and the bands of its children, so that boxes cannot overlap. A frame encloses each subtree; the band
+of its first node includes the frame. The middle of a node has the same y as the middle of its first child.
 """
 
 from __future__ import annotations
@@ -12,36 +12,38 @@ from dataclasses import dataclass
 
 MARGIN = 16.0
 """Margin of the picture [pixel]."""
-GAP = 10.0
-"""Vertical gap between nodes [pixel]."""
-STEM = 16.0
-"""Length of each horizontal part of a connecting line [pixel]."""
-FRAME, FRAME_HEAD = 9.0, 20.0
-"""Distance of a frame from its nodes, and height of the name in a frame [pixel]."""
+NODE_GAP = 10.0
+"""Vertical distance between the boxes of nodes [pixel]."""
+EDGE_STEM = 16.0
+"""Length of each horizontal part of the line between a node and its child [pixel]."""
+FRAME_PADDING = 9.0
+"""Distance between a frame and the boxes in it [pixel]."""
+FRAME_HEADER = 20.0
+"""Height of the part of a frame that contains the name of the subtree [pixel]."""
 
 ChildLists = Sequence[Sequence[int]]
-"""Indices of the children of each node."""
+"""Indices of the children of each node, by the index of the node."""
 
 
 @dataclass(frozen=True)
-class Size:
+class NodeSize:
     """Sizes of the parts of a node [pixel].
 
     Attributes:
         width, height: Size of the box.
-        slot: Length of the text on the line to the node, or 0.
-        name: Length of the name of the subtree that starts with the node, or 0.
+        label_width: Width of the label of the line to the node; 0 for no label.
+        name_width: Width of the name of the subtree whose first node this is; 0 for other nodes.
     """
 
     width: float
     height: float
-    slot: float = 0.0
-    name: float = 0.0
+    label_width: float = 0.0
+    name_width: float = 0.0
 
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A rectangle in the picture [pixel]; y points down."""
+    """A rectangle in the picture: its left top corner and its size [pixel]; y points down."""
 
     x: float
     y: float
@@ -50,12 +52,12 @@ class Rectangle:
 
     @property
     def right(self) -> float:
-        """X of the right side."""
+        """The x of the right side [pixel]."""
         return self.x + self.width
 
     @property
     def middle(self) -> float:
-        """Y of the middle."""
+        """The y of the middle [pixel]."""
         return self.y + self.height / 2
 
 
@@ -65,8 +67,8 @@ class Layout:
 
     Attributes:
         boxes: Box of each node.
-        trunks: x of the vertical part of the lines to the nodes of each depth.
-        frames: Frame of each subtree, by the index of its first node.
+        trunks: The x of the vertical parts of the lines to the nodes of each depth.
+        frames: Frame of each subtree, by the index of the first node of the subtree.
         width, height: Size of the picture with margins.
     """
 
@@ -77,8 +79,14 @@ class Layout:
     height: float
 
 
-def compute_layout(depths: Sequence[int], children: ChildLists, sizes: Sequence[Size]) -> Layout:
-    """Return the layout of nodes in an order with parents before children."""
+def compute_layout(depths: Sequence[int], children: ChildLists, sizes: Sequence[NodeSize]) -> Layout:
+    """Return the layout of the nodes of a tree, in an order in which parents precede their children.
+
+    Args:
+        depths: Depth of each node; 0 for the root.
+        children: Indices of the children of each node.
+        sizes: Sizes of the parts of each node.
+    """
     columns, trunks = _place_columns(depths, sizes)
     bands, middles = _compute_bands(children, sizes)
     tops = _place_bands(children, bands, middles)
@@ -89,45 +97,50 @@ def compute_layout(depths: Sequence[int], children: ChildLists, sizes: Sequence[
     right_ends = _find_right_ends(children, sizes, boxes)
     frames = {
         index: Rectangle(
-            box.x - FRAME, tops[index] + GAP / 2, right_ends[index] - box.x + FRAME, bands[index] - GAP
+            box.x - FRAME_PADDING,
+            tops[index] + NODE_GAP / 2,
+            right_ends[index] - box.x + FRAME_PADDING,
+            bands[index] - NODE_GAP,
         )
         for index, box in enumerate(boxes)
-        if sizes[index].name
+        if sizes[index].name_width
     }
-    return Layout(boxes, trunks, frames, max(right_ends) + MARGIN, tops[0] + bands[0] + MARGIN - GAP / 2)
+    return Layout(boxes, trunks, frames, max(right_ends) + MARGIN, tops[0] + bands[0] + MARGIN - NODE_GAP / 2)
 
 
-def _place_columns(depths: Sequence[int], sizes: Sequence[Size]) -> tuple[list[float], tuple[float, ...]]:
-    """Return x of the boxes of each depth, and x at which the lines to these boxes branch."""
+def _place_columns(depths: Sequence[int], sizes: Sequence[NodeSize]) -> tuple[list[float], tuple[float, ...]]:
+    """Return the x of the boxes of each depth, and the x of the vertical parts of the lines to them."""
     columns: list[float] = []
     trunks: list[float] = []
     right = 0.0
     for depth in range(max(depths) + 1):
         column = [size for size, node_depth in zip(sizes, depths, strict=True) if node_depth == depth]
-        frame = FRAME if any(size.name for size in column) else 0.0
-        trunks.append(right + STEM if depth else MARGIN)
-        columns.append(trunks[-1] + (STEM + max(size.slot for size in column) if depth else 0.0) + frame)
+        frame = FRAME_PADDING if any(size.name_width for size in column) else 0.0
+        trunks.append(right + EDGE_STEM if depth else MARGIN)
+        columns.append(
+            trunks[-1] + (EDGE_STEM + max(size.label_width for size in column) if depth else 0.0) + frame
+        )
         right = columns[-1] + max(size.width for size in column)
     return columns, tuple(trunks)
 
 
-def _compute_bands(children: ChildLists, sizes: Sequence[Size]) -> tuple[list[float], list[float]]:
-    """Return the height of the band of each node, and y of the node's middle in its band."""
+def _compute_bands(children: ChildLists, sizes: Sequence[NodeSize]) -> tuple[list[float], list[float]]:
+    """Return the height of the band of each node, and the y of the middle of the node in the band."""
     bands, middles = [0.0] * len(sizes), [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
         size, node_children = sizes[index], children[index]
-        head, foot = (FRAME_HEAD, FRAME) if size.name else (0.0, 0.0)
-        half = (size.height + GAP) / 2
+        header, footer = (FRAME_HEADER, FRAME_PADDING) if size.name_width else (0.0, 0.0)
+        half_height = (size.height + NODE_GAP) / 2
         first_middle = middles[node_children[0]] if node_children else 0.0
-        middles[index] = head + max(half, first_middle)
+        middles[index] = header + max(half_height, first_middle)
         end = middles[index] - first_middle + sum(bands[child] for child in node_children)
-        bands[index] = max(middles[index] + half, end) + foot
+        bands[index] = max(middles[index] + half_height, end) + footer
     return bands, middles
 
 
 def _place_bands(children: ChildLists, bands: Sequence[float], middles: Sequence[float]) -> list[float]:
-    """Return y of the top of each band."""
-    tops = [MARGIN - GAP / 2] * len(bands)
+    """Return the y of the top of each band, given the heights of the bands and the middles in them."""
+    tops = [MARGIN - NODE_GAP / 2] * len(bands)
     for index, node_children in enumerate(children):
         top = tops[index] + middles[index] - (middles[node_children[0]] if node_children else 0.0)
         for child in node_children:
@@ -136,11 +149,13 @@ def _place_bands(children: ChildLists, bands: Sequence[float], middles: Sequence
     return tops
 
 
-def _find_right_ends(children: ChildLists, sizes: Sequence[Size], boxes: Sequence[Rectangle]) -> list[float]:
-    """Return x of the right end of each node with its descendants and frames."""
+def _find_right_ends(
+    children: ChildLists, sizes: Sequence[NodeSize], boxes: Sequence[Rectangle]
+) -> list[float]:
+    """Return the x of the right end of each node including its descendants and their frames."""
     right_ends = [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
         size, box = sizes[index], boxes[index]
         right = max([box.right, *(right_ends[child] for child in children[index])])
-        right_ends[index] = max(right + FRAME, box.x + size.name) if size.name else right
+        right_ends[index] = max(right + FRAME_PADDING, box.x + size.name_width) if size.name_width else right
     return right_ends

@@ -1,4 +1,4 @@
-"""A tree as text for a terminal."""
+"""Drawing of a tree as a text for a terminal, one line per node."""
 
 from __future__ import annotations
 
@@ -8,114 +8,115 @@ from collections.abc import Collection, Iterator, Sequence
 from executive.mission.model.grammar import USE
 from executive.mission.outline import Connection, OutlineNode, children
 
-WIDTH = 100
-"""Largest length of a line [characters]."""
+MAX_LINE_LENGTH = 100
+"""Maximum length of a line [characters]."""
 
-_MIN_TEXT_WIDTH = 40
+_MIN_TEXT_LENGTH = 40
+"""Minimum length of the text of a line after its prefix [characters]."""
 
 
 def draw_outline(nodes: Sequence[OutlineNode], *, ports: bool = False, reasons: bool = False) -> str:
-    """Return an outline as text, with one line per node unless it is too long.
+    """Return the drawing of a tree as a text, with one line per node unless the line is too long.
 
     Args:
-        nodes: The outline.
-        ports: Write the variables that a skill reads and writes below the skill.
-        reasons: Write the failure reasons of a skill and of a catch below the node.
+        nodes: Nodes of the tree.
+        ports: True to write the variables of a skill below the skill.
+        reasons: True to write the failure reasons of a skill and of a handler below the node.
     """
     lines = []
-    for node, branch, below in zip(nodes, draw_branches(nodes), children(nodes), strict=True):
-        margin = branch.replace("├─", "│ ").replace("└─", "  ") + ("│  " if below else "   ")
+    for node, prefix, node_children in zip(nodes, draw_line_prefixes(nodes), children(nodes), strict=True):
+        margin = prefix.replace("├─", "│ ").replace("└─", "  ") + ("│  " if node_children else "   ")
         detail = f"  ({node.detail})" if node.detail else ""
-        lines += _wrap_line(f"{node.name}{detail}", branch, margin)
-        for sentence in _describe_below(node, ports, reasons):
-            lines += _wrap_line(sentence, margin, margin)
+        lines += _wrap_line(f"{node.name}{detail}", prefix, margin)
+        for text in _describe_node(node, ports, reasons):
+            lines += _wrap_line(text, margin, margin)
     return "\n".join(lines)
 
 
 def describe_reads(node: OutlineNode) -> str:
-    """Return the variables that a skill reads, with `?` for one that may be unset; "" if none."""
+    """Return a text with the variables that a skill reads; `?` marks optional variables; "" for none."""
     return _describe_connections("reads", node.reads, "<-")
 
 
 def describe_writes(node: OutlineNode) -> str:
-    """Return the variables that a skill writes; "" if none."""
+    """Return a text with the variables that a skill writes; "" for none."""
     return _describe_connections("writes", node.writes, "->")
 
 
 def describe_reasons(node: OutlineNode) -> str:
-    """Return the failure reasons of a skill; "" if none."""
+    """Return a text with the failure reasons of a skill; "" for none."""
     return f"may fail: {', '.join(node.reasons)}" if node.reasons else ""
 
 
-def draw_branches(nodes: Sequence[OutlineNode]) -> list[str]:
-    """Return the lines from the root to each node, as text before the node."""
-    joints = []
+def draw_line_prefixes(nodes: Sequence[OutlineNode]) -> list[str]:
+    """Return a prefix for the line of each node: box-drawing characters, three per depth."""
+    prefixes = []
     # Depths at which a later node has the same parent; the nodes are visited from the last to the first.
-    more_follow: set[int] = set()
+    open_depths: set[int] = set()
     for node in reversed(nodes):
-        more_follow = {depth for depth in more_follow if depth <= node.depth}
-        stem = "".join("│  " if depth in more_follow else "   " for depth in range(1, node.depth))
-        joint = "" if node.depth == 0 else "├─ " if node.depth in more_follow else "└─ "
-        joints.append(stem + joint)
-        more_follow.add(node.depth)
-    return joints[::-1]
+        open_depths = {depth for depth in open_depths if depth <= node.depth}
+        stem = "".join("│  " if depth in open_depths else "   " for depth in range(1, node.depth))
+        joint = "" if node.depth == 0 else "├─ " if node.depth in open_depths else "└─ "
+        prefixes.append(stem + joint)
+        open_depths.add(node.depth)
+    return prefixes[::-1]
 
 
 def find_skill_names(nodes: Sequence[OutlineNode]) -> dict[str, str]:
-    """Return the names of the skills by path, without their role (`recover` in `recover: Grasp`)."""
+    """Return the names of the skills by path, each without the key of its parent (`recover: Grasp`)."""
     leaves = (node for node, below in zip(nodes, children(nodes), strict=True) if not below)
     return {node.path: node.name.rpartition(": ")[2] for node in leaves}
 
 
 def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
-    """Return an outline with the first use of each subtree, and a node with its name for each other use."""
-    shown: list[OutlineNode] = []
-    first: dict[str, list[tuple[int, str, str]]] = {}
+    """Return the nodes of a tree, in which one node with the name of a subtree replaces its later uses."""
+    folded: list[OutlineNode] = []
+    first_uses: dict[str, list[tuple[int, str, str]]] = {}
     index = 0
     while index < len(nodes):
         node = nodes[index]
         later = range(index + 1, len(nodes))
         end = next((other for other in later if nodes[other].depth <= node.depth), len(nodes))
         branch = nodes[index:end]
-        known = next((subtree for subtree in node.subtrees if subtree in first), None)
+        known = next((subtree for subtree in node.subtrees if subtree in first_uses), None)
         if known is None:
-            first |= {subtree: _list_content(branch) for subtree in node.subtrees}
-            shown.append(node)
+            first_uses |= {subtree: _list_content(branch) for subtree in node.subtrees}
+            folded.append(node)
             index += 1
         else:
-            same = first[known] == _list_content(branch)
-            shown.append(_make_use(node, known, "as above" if same else "as above, other params"))
+            is_equal = first_uses[known] == _list_content(branch)
+            folded.append(_make_use(node, known, "as above" if is_equal else "as above, other params"))
             index = end
-    return shown
+    return folded
 
 
-def select_open(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[OutlineNode]:
-    """Return the root and the children of running nodes."""
-    shown = []
-    # Whether the last node at each depth is running.
-    ancestors_running: list[bool] = []
+def select_running(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[OutlineNode]:
+    """Return the root and all children of running nodes; `running` contains the paths of running nodes."""
+    selected = []
+    # True for each ancestor of the current node that is running, by depth.
+    are_ancestors_running: list[bool] = []
     for node in nodes:
-        del ancestors_running[node.depth :]
-        if all(ancestors_running):
-            shown.append(node)
-        ancestors_running.append(node.path in running)
-    return shown
+        del are_ancestors_running[node.depth :]
+        if all(are_ancestors_running):
+            selected.append(node)
+        are_ancestors_running.append(node.path in running)
+    return selected
 
 
-def _wrap_line(text: str, first: str, other: str) -> list[str]:
-    """Return a text in lines of limited length, with a prefix for the first line and for the others."""
+def _wrap_line(text: str, prefix: str, margin: str) -> list[str]:
+    """Return a text as lines of limited length; the first begins with `prefix`, the others with `margin`."""
     return textwrap.wrap(
-        text, max(WIDTH, len(other) + _MIN_TEXT_WIDTH), initial_indent=first, subsequent_indent=f"{other}  ",
-        break_long_words=False, break_on_hyphens=False,
+        text, max(MAX_LINE_LENGTH, len(margin) + _MIN_TEXT_LENGTH), initial_indent=prefix,
+        subsequent_indent=f"{margin}  ", break_long_words=False, break_on_hyphens=False,
     )  # fmt: skip
 
 
-def _describe_below(node: OutlineNode, ports: bool, reasons: bool) -> Iterator[str]:
-    """Yield the sentences below a node."""
+def _describe_node(node: OutlineNode, ports: bool, reasons: bool) -> Iterator[str]:
+    """Yield the texts that are written below a node."""
     if reasons and node.when:
         yield node.when
-    if ports and (flow := "; ".join(filter(None, (describe_reads(node), describe_writes(node))))):
-        yield flow
+    if ports and (variables := "; ".join(filter(None, (describe_reads(node), describe_writes(node))))):
+        yield variables
     if reasons and node.reasons:
         yield describe_reasons(node)
 
@@ -130,12 +131,12 @@ def _describe_connections(verb: str, connections: Sequence[Connection], arrow: s
 
 
 def _list_content(branch: Sequence[OutlineNode]) -> list[tuple[int, str, str]]:
-    """Return depths, titles and details of a branch, in which two uses of a subtree may differ."""
+    """Return depth, title and detail of each node of a branch; two uses of a subtree may differ in them."""
     return [(node.depth - branch[0].depth, node.title, node.detail) for node in branch]
 
 
 def _make_use(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
-    """Return a node that replaces a subtree by its name, and keeps the names of the subtrees around it."""
+    """Return a node with the name of a subtree, which replaces the subtree whose first node is `node`."""
     outer = node.subtrees[: node.subtrees.index(subtree)]
     return OutlineNode(
         node.path, node.name, node.depth, detail, USE, subtree, node.slot, node.when, outer, symbol="…",

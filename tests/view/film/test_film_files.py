@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw
 
 from executive.errors import InputError
 from executive.view.film.formats import GIF, GIF_SIZE, MP4, choose_format, prepare_file, write_gif, write_mp4
-from executive.view.film.ink import BACK, SUCCESS
+from executive.view.film.style import BACKGROUND, SUCCESS
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def frames() -> list[Image.Image]:
     """Twelve frames on which something moves, and that end in another colour."""
     made = []
     for number in range(12):
-        frame = Image.new("RGB", (1280, 720), BACK)
+        frame = Image.new("RGB", (1280, 720), BACKGROUND)
         ImageDraw.Draw(frame).rectangle((40 * number, 300, 40 * number + 60, 360), "#c02020")
         made.append(frame)
     ImageDraw.Draw(made[-1]).rectangle((900, 100, 1200, 500), SUCCESS)
@@ -52,8 +52,8 @@ def test_a_gif_goes_round_and_keeps_its_colours_to_the_end(frames: list[Image.Im
 @pytest.mark.parametrize(
     ("out", "gif", "found"),
     [(None, False, MP4), (None, True, GIF), ("a.mp4", False, MP4), ("a.GIF", False, GIF),
-     ("a.mp4", True, '"a.mp4" is no name for a GIF; end it in .gif, or leave out --gif'),
-     ("a.avi", False, '"a.avi" is no name for a film; end it in .mp4 or .gif')],
+     ("a.mp4", True, '"a.mp4" cannot be a GIF; give a file name that ends in .gif, or omit --gif'),
+     ("a.avi", False, '"a.avi" cannot be a film; give a file name that ends in .mp4 or .gif')],
 )  # fmt: skip
 def test_the_name_says_what_a_film_is_and_another_is_refused(out: str | None, gif: bool, found) -> None:
     try:

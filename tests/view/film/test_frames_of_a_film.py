@@ -12,34 +12,44 @@ from PIL import Image, ImageColor
 from small_tree import NODES, ended, node, started
 
 from executive.record.result import ItemCounts, Result
-from executive.view.film.course import FilmCourse
 from executive.view.film.film import select_steps
-from executive.view.film.ink import BACK, FAILURE, FAINT, RUNNING, SUCCESS, clip, font, put_mark, wrap
-from executive.view.film.page import describe_result, draw_ending, draw_page
+from executive.view.film.page import describe_result, draw_page, draw_result
 from executive.view.film.panel import (
     MAX_ITEM_ROWS,
-    draw_branch,
+    compute_height,
     draw_items,
-    height,
+    draw_tree,
     select_items,
     select_nodes,
 )
+from executive.view.film.run_state import FilmRunState
+from executive.view.film.style import (
+    BACKGROUND,
+    FAILURE,
+    INACTIVE,
+    RUNNING,
+    SUCCESS,
+    draw_mark,
+    load_font,
+    truncate,
+    wrap,
+)
 
 
-def course_of(*entries) -> FilmCourse:
-    course = FilmCourse(entries, NODES, [])
-    course.go_to(1000, 0.0)
-    return course
+def state_after(*entries) -> FilmRunState:
+    state = FilmRunState(entries, NODES, [])
+    state.advance_to(1000, 0.0)
+    return state
 
 
 def test_what_never_ran_gives_way_first_then_what_rests() -> None:
     nodes = [
         node("t", 0, "try"), node("t/A", 1), node("t/do", 1, "sequence"), node("t/do/B", 2), node("t/C", 1)
     ]  # fmt: skip
-    course = course_of(
+    state = state_after(
         started(0, "t"), started(0, "t/A"), ended(0, "t/A"), started(1, "t/do"), started(1, "t/do/B"),
     )  # fmt: skip
-    names = [[one.path for one in select_nodes(nodes, course, rows)] for rows in (9, 4, 3)]
+    names = [[one.path for one in select_nodes(nodes, state, rows)] for rows in (9, 4, 3)]
     assert names == [
         ["t", "t/A", "t/do", "t/do/B", "t/C"], ["t", "t/A", "t/do", "t/do/B"], ["t", "t/do", "t/do/B"]
     ]  # fmt: skip
@@ -47,14 +57,14 @@ def test_what_never_ran_gives_way_first_then_what_rests() -> None:
 
 def test_nothing_is_drawn_outside_of_its_box() -> None:
     deep = [node("/".join("abcdefghijklmnop"[: n + 1]) + "long" * n, n, "sequence") for n in range(16)]
-    course = course_of(*(started(0, one.path, "x" * 200) for one in deep))
-    page = Image.new("RGB", (400, 300), BACK)
-    draw_branch(page, (20, 20, 300, 220), deep, course)
+    state = state_after(*(started(0, one.path, "x" * 200) for one in deep))
+    page = Image.new("RGB", (400, 300), BACKGROUND)
+    draw_tree(page, (20, 20, 300, 220), deep, state)
     rows = [item_changed("item-" + "9" * 60, "placed", label="class" * 9, bin="bin" * 30)] * 30
     draw_items(page, (20, 225, 300, 300), rows[:2], {})
-    drawn = np.argwhere((np.asarray(page) != np.asarray(Image.new("RGB", (1, 1), BACK))).any(axis=2))
+    drawn = np.argwhere((np.asarray(page) != np.asarray(Image.new("RGB", (1, 1), BACKGROUND))).any(axis=2))
     (top, left), (bottom, right) = drawn.min(axis=0), drawn.max(axis=0)
-    assert min(top, left) >= 20 and right <= 300 and bottom < 225 + height(2)
+    assert min(top, left) >= 20 and right <= 300 and bottom < 225 + compute_height(2)
 
 
 def test_settled_items_give_way_to_those_still_to_do() -> None:
@@ -64,28 +74,37 @@ def test_settled_items_give_way_to_those_still_to_do() -> None:
     assert not {"cube-1", "cube-3", "cube-5"} & set(names)
     assert names == sorted(names, key=lambda name: int(name[5:]))
     assert select_items(rows[:3]) == rows[:3]
-    assert (height(3), height(MAX_ITEM_ROWS), height(MAX_ITEM_ROWS + 20)) == (80, 200, 200)
+    assert (
+        compute_height(3),
+        compute_height(MAX_ITEM_ROWS),
+        compute_height(MAX_ITEM_ROWS + 20),
+    ) == (80, 200, 200)
 
 
 def test_lines_are_as_wide_as_they_may_be() -> None:
-    cut = clip("a word and then another one", 14, 100)
-    assert (clip("short", 14, 100), cut[-1], clip("anything", 14, 3)) == ("short", "…", "")
-    assert font(14).getlength(cut) <= 100
+    cut = truncate("a word and then another one", 14, 100)
+    assert (truncate("short", 14, 100), cut[-1], truncate("anything", 14, 3)) == ("short", "…", "")
+    assert load_font(14).getlength(cut) <= 100
     text = "no seal on sphere-1 0.10 s after contact, and neither the second nor the third went any better"
     assert " ".join(wrap(text, 14, 300, 9)) == text
     first, second = wrap(text, 14, 300, 2)
-    assert max(map(font(14).getlength, (first, second))) <= 300
+    assert max(map(load_font(14).getlength, (first, second))) <= 300
     assert second.endswith("…")
     assert wrap("", 14, 300, 2) == []
 
 
 @pytest.mark.parametrize(
     ("status", "colour", "covered"),
-    [("RUNNING", RUNNING, 38.8), ("SUCCESS", SUCCESS, 25.6), ("FAILURE", FAILURE, 40.9), ("", FAINT, 10.9)],
+    [
+        ("RUNNING", RUNNING, 38.8),
+        ("SUCCESS", SUCCESS, 25.6),
+        ("FAILURE", FAILURE, 40.9),
+        ("", INACTIVE, 10.9),
+    ],
 )
 def test_a_mark_has_the_colour_of_its_status_and_covers_so_much(status, colour, covered) -> None:
     image = Image.new("RGB", (21, 21), "black")
-    put_mark(image, status, (10.5, 10.5), 11)
+    draw_mark(image, status, (10.5, 10.5), 11)
     full = np.array(ImageColor.getrgb(colour), float)
     share = np.asarray(image).astype(float) @ full / (full @ full)
     assert share.sum() == pytest.approx(covered, abs=0.1)
@@ -108,7 +127,7 @@ STORY = SimpleNamespace(verdict="Grasp failed: no seal")
             ("FAILURE", "Grasp failed: no seal", "6 seen, 5 placed, 1 rejected; 15.5 s"),
         ),
         (run_ended("HALTED", message="by the user"), ("HALTED", "by the user", "")),
-        (None, ("CUT OFF", "the record ends here; nothing says how the run would have ended", "")),
+        (None, ("CUT OFF", "the record ends here; the result of the run is unknown", "")),
     ],
 )
 def test_an_end_is_told_by_the_story_else_the_message_and_the_items(result, ending) -> None:
@@ -118,14 +137,14 @@ def test_an_end_is_told_by_the_story_else_the_message_and_the_items(result, endi
 def test_the_end_stands_on_the_picture_and_leaves_the_page_as_it_was() -> None:
     page = Image.new("RGB", (1280, 720), "#808080")
     message = "a long sentence about what went wrong " * 12
-    shown = draw_ending(page, replace(RESULT, status="FAILURE", message=message))
+    shown = draw_result(page, replace(RESULT, status="FAILURE", message=message))
     assert page.getcolors() == [(1280 * 720, (128, 128, 128))]
     (top, left), (bottom, right) = (
         each(np.argwhere((np.asarray(shown) != 128).any(axis=2)), axis=0) for each in (np.min, np.max)
     )
     assert (bottom, right) == (700, 780)
     assert (top, left) == (472, 168)
-    assert shown.getpixel((700, 690)) == ImageColor.getrgb(BACK)
+    assert shown.getpixel((700, 690)) == ImageColor.getrgb(BACKGROUND)
 
 
 @pytest.mark.parametrize(
@@ -139,11 +158,11 @@ def test_steps_are_shown_at_even_times_up_to_the_last(steps, each, shown) -> Non
 def test_a_page_shows_picture_camera_caption_and_how_far_the_run_is(tmp_path) -> None:
     Image.new("RGB", (640, 556), "white").save(tmp_path / "000000_cube-1.jpg")
     entries = [started(0, "tree"), started(1, "tree/Grasp", "cube-1")]
-    course = FilmCourse(entries, NODES, [tmp_path / "000000_cube-1.jpg"])
-    course.go_to(240, 1.0)
-    source = SimpleNamespace(start=run_started(mission="sort"), items=0, bins={}, nodes=NODES)
+    state = FilmRunState(entries, NODES, [tmp_path / "000000_cube-1.jpg"])
+    state.advance_to(240, 1.0)
+    source = SimpleNamespace(start=run_started(mission="sort"), item_count=0, bin_colours={}, nodes=NODES)
     picture = np.full((720, 800, 3), 128, np.uint8)
-    page = np.asarray(draw_page(source, picture, course, "seed 5", 4.0))
+    page = np.asarray(draw_page(source, picture, state, "seed 5", 4.0))
     for part, ends in ((np.s_[:360, :800], (20, 20, 205, 251)), (np.s_[360:, :800], (303, 20, 340, 155))):
         changed = np.argwhere((page[part] != 128).any(axis=2))
         assert (*changed.min(axis=0), *changed.max(axis=0)) == ends

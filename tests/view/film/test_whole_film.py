@@ -18,9 +18,9 @@ from executive.cells.sim.tool import SuctionTool
 from executive.errors import InputError
 from executive.events import NodeEnded, ToolCommanded
 from executive.record.run_directory import RunDirectory
-from executive.view.film.course import FilmCourse
-from executive.view.film.film import film
+from executive.view.film.film import write_film
 from executive.view.film.formats import MP4
+from executive.view.film.run_state import FilmRunState
 from executive.view.film.source import FilmSource
 
 pytestmark = pytest.mark.slow
@@ -37,7 +37,7 @@ def copy(filmed_run: RunDirectory, tmp_path: Path) -> RunDirectory:
 def test_a_run_becomes_a_film(filmed_run: RunDirectory, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     source = FilmSource(filmed_run)
-    frames = film(
+    frames = write_film(
         source, tmp_path / "film", MP4, speed=12.0, workers=1, progress=lambda *done: told.append(done)
     )
     with av.open(str(tmp_path / "film")) as container:
@@ -70,11 +70,11 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
         if command.kind == STEP:
             holds.append(tool.holding)
     world.close()
-    course = FilmCourse(events, source.nodes, [])
-    course.go_to(grasped, 0.0)
-    grasp = course.timeline.nodes["tree/Grasp"]
+    state = FilmRunState(events, source.nodes, [])
+    state.advance_to(grasped, 0.0)
+    grasp = state.timeline.nodes["tree/Grasp"]
     assert grasp.status == "SUCCESS"
-    assert course.timeline.items.by_name[grasp.item].now.state == "held"
+    assert state.timeline.items.by_name[grasp.item].now.state == "held"
     assert holds[grasped]
     assert not any(holds[: closed + 1])
     # The last thing that the journal tells of happened after the last step.
@@ -85,7 +85,7 @@ def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None
     source = FilmSource(copy)
     assert (source.start.mission, source.start.seed) == ("bring_one", 5)
     assert (source.config.cell, source.nodes[0].path) == ("overhead", "tree")
-    assert (source.result.status, source.items) == ("SUCCESS", 6)
+    assert (source.result.status, source.item_count) == ("SUCCESS", 6)
     lines = copy.journal.read_text().splitlines(keepends=True)
     copy.journal.write_text("".join(lines[:-1]))
     copy.result.write_text("{")
@@ -99,9 +99,9 @@ def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None
         ("cell.yaml", None, "holds no cell that can be read"),
         ("journal.jsonl", "", "had not begun when it was cut off; there is nothing to film"),
         ("world.log", "{}",
-         "its cell has no simulated world to look at; film a run on a cell of `kind: sim`"),
+         "its cell has no simulated world; film a run on a cell of `kind: sim`"),
         ("world.log", None,
-         "it has no world.log, from which its world is rebuilt; sweeps keep none. Run the"),
+         "it has no world.log, from which its world is simulated again; sweeps do not keep this file."),
     ],
 )  # fmt: skip
 def test_a_record_that_lacks_a_part_is_refused(copy, file: str, content: str | None, sentence: str) -> None:

@@ -20,7 +20,7 @@ from executive.run.run_control import RunControl
 from executive.view.terminal.lines import Lines
 from executive.view.terminal.screen import Terminal
 from executive.view.terminal.summary import repeat_command, summary
-from executive.view.tree.outline import find_skill_names, select_open
+from executive.view.tree.outline import find_skill_names, select_running
 
 GRASP = "tree/sort/repeat/Grasp"
 
@@ -53,10 +53,14 @@ def test_skills_are_the_leaves_and_what_rests_is_folded():
     nodes = outline(TREE)
     leaves = {"tree/sort/repeat/Detect": "Detect", GRASP: "Grasp", "tree/sort/Release": "Release"}
     assert find_skill_names(nodes) == leaves
-    assert [node.path for node in select_open(nodes, set())] == ["tree/sort"]
-    assert [node.name for node in select_open(nodes, {"tree/sort"})] == ["sort", "repeat", "Release"]
-    assert select_open(nodes, {"tree/sort", "tree/sort/repeat"}) == nodes
-    assert [node.name for node in select_open(nodes, {"tree/sort/repeat"})] == ["sort"]
+    assert [node.path for node in select_running(nodes, set())] == ["tree/sort"]
+    assert [node.name for node in select_running(nodes, {"tree/sort"})] == [
+        "sort",
+        "repeat",
+        "Release",
+    ]
+    assert select_running(nodes, {"tree/sort", "tree/sort/repeat"}) == nodes
+    assert [node.name for node in select_running(nodes, {"tree/sort/repeat"})] == ["sort"]
 
 
 MISSED = {"item": "cube-1", "reason": "missed", "message": "no seal 0.1 s after contact"}

@@ -7,25 +7,25 @@ import random
 
 import pytest
 
-from executive.view.tree.layout import Rectangle, Size, compute_layout
+from executive.view.tree.layout import NodeSize, Rectangle, compute_layout
 
 
-def drawn_by_chance(seed: int) -> tuple[list[int], list[Size]]:
+def drawn_by_chance(seed: int) -> tuple[list[int], list[NodeSize]]:
     """Return the depths of the nodes of a tree, parents before children, and their sizes."""
     chance = random.Random(seed)
     depths = [0]
     for _ in range(chance.randrange(40)):
         depths.append(chance.randint(1, depths[-1] + 1))
 
-    def size() -> Size:
+    def size() -> NodeSize:
         slot, name = (chance.choice([0.0, chance.uniform(10, 200)]) for _ in range(2))
-        return Size(chance.uniform(10, 200), chance.uniform(20, 70), slot, name)
+        return NodeSize(chance.uniform(10, 200), chance.uniform(20, 70), slot, name)
 
     return depths, [size() for _ in depths]
 
 
 @pytest.fixture(params=range(8))
-def tree(request: pytest.FixtureRequest) -> tuple[list[int], list[Size]]:
+def tree(request: pytest.FixtureRequest) -> tuple[list[int], list[NodeSize]]:
     return drawn_by_chance(request.param)
 
 
@@ -63,8 +63,8 @@ def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_fir
         assert middles == sorted(middles)
         for child in among:
             trunk = plan.trunks[depths[child]]
-            assert plan.boxes[parent].right < trunk < plan.boxes[child].x - nodes[child].slot
-        if among and not nodes[parent].name:
+            assert plan.boxes[parent].right < trunk < plan.boxes[child].x - nodes[child].label_width
+        if among and not nodes[parent].name_width:
             assert abs(plan.boxes[parent].middle - middles[0]) < 1e-6
     whole = Rectangle(0, 0, plan.width, plan.height)
     assert all(contains(whole, part) for part in (*plan.boxes, *plan.frames.values()))
@@ -73,10 +73,10 @@ def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_fir
 def test_a_frame_holds_its_subtree_and_nothing_else(tree):
     depths, nodes = tree
     plan = compute_layout(depths, below(depths), nodes)
-    assert set(plan.frames) == {index for index, size in enumerate(nodes) if size.name}
+    assert set(plan.frames) == {index for index, size in enumerate(nodes) if size.name_width}
     for index, frame in plan.frames.items():
         within = inside(index, depths)
-        assert frame.width >= nodes[index].name
+        assert frame.width >= nodes[index].name_width
         for other, box in enumerate(plan.boxes):
             assert contains(frame, box) if other in within else not overlap(frame, box)
         for other, another in plan.frames.items():
@@ -84,7 +84,12 @@ def test_a_frame_holds_its_subtree_and_nothing_else(tree):
 
 
 def test_a_small_tree_stands_exactly_there():
-    sizes = [Size(60, 28), Size(50, 28, slot=20), Size(40, 42, name=90), Size(30, 28)]
+    sizes = [
+        NodeSize(60, 28),
+        NodeSize(50, 28, label_width=20),
+        NodeSize(40, 42, name_width=90),
+        NodeSize(30, 28),
+    ]
     plan = compute_layout([0, 1, 1, 2], [[1, 2], [], [3], []], sizes)
     assert plan.boxes == (
         Rectangle(16, 16, 60, 28), Rectangle(137, 16, 50, 28), Rectangle(137, 74, 40, 42),

@@ -16,7 +16,7 @@ from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 from executive.tree.try_catch import Catch, TryCatch
-from executive.view.tree.outline import WIDTH, draw_outline, fold_subtrees
+from executive.view.tree.outline import MAX_LINE_LENGTH, draw_outline, fold_subtrees
 
 CELL: Any = SimpleNamespace()
 MISSED = (Reason("Pick", "missed"),)
@@ -119,7 +119,7 @@ def test_long_lines_are_wrapped_under_their_node():
     on = [Reason("Pick", reason) for reason in ("missed", "blocked", "unreachable", "dropped", "slipped")]
     root = Retry(make_site("tree/retry"), attempts=3, on=on, do=body)
     lines = draw_outline(outline(root), ports=True).splitlines()
-    assert max(map(len, lines)) <= WIDTH
+    assert max(map(len, lines)) <= MAX_LINE_LENGTH
     assert lines[1] == "│    Pick.slipped)"
     assert lines[-1].startswith("        ") and lines[-1].endswith("b")
 
