@@ -161,7 +161,7 @@ class _Comparison:
         if recorded == decision:
             self.same += 1
             return
-        self._is_over, self.unanswered = True, self.run.replayed_cell.unanswered
+        self._is_over, self.unanswered = True, self.run.replayed_cell.missing_input_message
         # After the last recorded control step, the replay only halts.
         self.is_complete = decision.tick > self._log.last_tick
         if self._has_ended or self._counts(decision) or (recorded is not None and self._counts(recorded)):
@@ -175,7 +175,7 @@ class _Comparison:
         self.is_complete = False
         if self._counts(self._recorded[self.same]):
             self.difference = (self._recorded[self.same], None)
-            self.unanswered = self.run.replayed_cell.unanswered
+            self.unanswered = self.run.replayed_cell.missing_input_message
 
     def _counts(self, decision: TimedEvent) -> bool:
         """Return True if the control step of a decision is complete in the record."""

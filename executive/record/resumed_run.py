@@ -126,11 +126,11 @@ def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
 
 def _describe_gap(replayed: ReplayedCell) -> str:
     """Return a warning if the journal lacks actions of the tool, else ""."""
-    last = replayed.last
+    last = replayed.last_interruption
     if last is None or last.last_action != UNKNOWN_ACTION:
         return ""
-    steps = last.resumed_at - last.complete_steps
+    steps = last.resume_tick - last.complete_step_count
     return (
-        f"the journal ends {steps} control steps ({steps * replayed.log.step:.2f} s) before the log of the "
+        f"the journal ends {steps} control steps ({steps * replayed.log.control_period:.2f} s) before the log of the "
         "world, so actions of the tool are unknown; the whole scene is observed before the run continues"
     )

@@ -1,4 +1,4 @@
-"""Codecs between the answers of a cell and plain values, without images and paths of motions."""
+"""Codecs of recorded inputs: conversions between values that a cell returns and JSON values."""
 
 from __future__ import annotations
 
@@ -18,60 +18,60 @@ from executive.cell.frame import Frame
 from executive.geometry import Array, Pose
 
 MAX_PIXELS = 10**8
-"""Maximum number of pixels of an image."""
+"""Maximum number of pixels of a recorded image."""
 
 
 class Codec(NamedTuple):
-    """Conversions between an answer of a cell and its plain form.
+    """Conversions between a value that a cell returns and a JSON value.
 
     Attributes:
-        write: Converts an answer to plain values.
-        read: Converts plain values to an answer.
+        encode: Converts the value of the cell to a JSON value.
+        decode: Converts the JSON value to the value of the cell.
     """
 
-    write: Callable[[Any], Any]
-    read: Callable[[Any], Any]
+    encode: Callable[[Any], Any]
+    decode: Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """Recorded part of a planned motion: its duration [s]; implements `cell.arm.Motion`."""
+    """Planned motion of which only the duration [s] was recorded; implements `cell.arm.Motion`."""
 
     duration: float
 
 
-def read_array(value: Any) -> Array:
-    """Return an array from lists of floats."""
+def decode_array(value: Any) -> Array:
+    """Return the array of nested lists of floats."""
     return np.array(value, dtype=np.float64)
 
 
-def write_pose(pose: Pose) -> list[Any]:
-    """Return rotation and position of a pose as lists."""
+def encode_pose(pose: Pose) -> list[Any]:
+    """Return the rotation matrix and the position of a pose as lists."""
     return [pose.rotation.tolist(), pose.position.tolist()]
 
 
-def read_pose(value: Any) -> Pose:
-    """Return the pose of `write_pose`."""
+def decode_pose(value: Any) -> Pose:
+    """Return the pose that `encode_pose` encoded."""
     rotation, position = value
-    return Pose(read_array(rotation), read_array(position))
+    return Pose(decode_array(rotation), decode_array(position))
 
 
-def write_frame(frame: Frame) -> dict[str, Any]:
-    """Return a frame without image and depth."""
+def encode_frame(frame: Frame) -> dict[str, Any]:
+    """Return the attributes of a frame, except image and depth, as a mapping."""
     return {
         "id": frame.id,
         "camera": frame.camera,
         "matrix": frame.matrix.tolist(),
-        "X_WC": write_pose(frame.X_WC),
+        "X_WC": encode_pose(frame.X_WC),
         "stamp": frame.stamp,
         "epoch": frame.epoch,
-        "visible": _pack(frame.visible),
+        "visible": _encode_mask(frame.visible),
         "size": list(frame.visible.shape),
     }
 
 
-def read_frame(value: Any) -> Frame:
-    """Return the frame of `write_frame`, with a black image and without depth."""
+def decode_frame(value: Any) -> Frame:
+    """Return the frame that `encode_frame` encoded, with a black image and without depth."""
     height, width = value["size"]
     if not 0 < height * width <= MAX_PIXELS:
         raise ValueError(f"an image of {height} x {width} pixels")
@@ -80,69 +80,69 @@ def read_frame(value: Any) -> Frame:
         camera=value["camera"],
         image=np.zeros((height, width, 3), np.uint8),
         depth=None,
-        matrix=read_array(value["matrix"]),
-        X_WC=read_pose(value["X_WC"]),
+        matrix=decode_array(value["matrix"]),
+        X_WC=decode_pose(value["X_WC"]),
         stamp=value["stamp"],
-        visible=_unpack(value["visible"], (height, width)),
+        visible=_decode_mask(value["visible"], (height, width)),
         epoch=value["epoch"],
     )
 
 
-def write_detection(detection: Detection) -> list[Any]:
-    """Return label, confidence, box and confidence of the second class of a detection."""
+def encode_detection(detection: Detection) -> list[Any]:
+    """Return class, confidence, box and confidence of the second most likely class as a list."""
     box = [float(edge) for edge in detection.box]
     return [detection.label, float(detection.confidence), box, float(detection.rival)]
 
 
-def read_detection(value: Any) -> Detection:
-    """Return the detection of `write_detection`."""
+def decode_detection(value: Any) -> Detection:
+    """Return the detection that `encode_detection` encoded."""
     label, confidence, box, rival = value
     return Detection(label, confidence, tuple(box), rival)
 
 
-def write_answer(answer: Answer) -> dict[str, Any]:
+def encode_answer(answer: Answer) -> dict[str, Any]:
     """Return the answer of a detector as a mapping."""
     return {
         "detector": answer.detector,
-        "found": list(map(write_detection, answer.found)),
+        "found": list(map(encode_detection, answer.found)),
         "reliability": list(astuple(answer.error_rates)),
-        "doubtful": list(map(write_detection, answer.doubtful)),
-        "unknown": list(map(write_detection, answer.unknown)),
+        "doubtful": list(map(encode_detection, answer.doubtful)),
+        "unknown": list(map(encode_detection, answer.unknown)),
     }
 
 
-def read_answer(value: Any) -> Answer:
-    """Return the answer of `write_answer`."""
+def decode_answer(value: Any) -> Answer:
+    """Return the answer that `encode_answer` encoded."""
     found, doubtful, unknown = (
-        tuple(map(read_detection, value[key])) for key in ("found", "doubtful", "unknown")
+        tuple(map(decode_detection, value[key])) for key in ("found", "doubtful", "unknown")
     )
     return Answer(value["detector"], found, ErrorRates(*value["reliability"]), doubtful, unknown)
 
 
-def write_observations(observations: Sequence[Observation]) -> list[Any]:
-    """Return the observations of one frame as lists."""
+def encode_observations(observations: Sequence[Observation]) -> list[Any]:
+    """Return observations as lists."""
     return [
-        [write_detection(new.detection), new.position.tolist(), new.std, new.confident, new.contradiction]
-        for new in observations
+        [encode_detection(one.detection), one.position.tolist(), one.std, one.confident, one.contradiction]
+        for one in observations
     ]
 
 
-def read_observations(value: Any) -> list[Observation]:
-    """Return the observations of `write_observations`."""
+def decode_observations(value: Any) -> list[Observation]:
+    """Return the observations that `encode_observations` encoded."""
     return [
-        Observation(read_detection(detection), read_array(position), *others)
+        Observation(decode_detection(detection), decode_array(position), *others)
         for detection, position, *others in value
     ]
 
 
-def _pack(mask: NDArray[np.bool_]) -> str:
-    """Return a mask as text; "" for a mask without False."""
+def _encode_mask(mask: NDArray[np.bool_]) -> str:
+    """Return a compressed mask as base64, or "" for a mask without False."""
     if mask.all():
         return ""
     return base64.b64encode(zlib.compress(np.packbits(mask).tobytes())).decode("ascii")
 
 
-def _unpack(text: str, size: tuple[int, int]) -> NDArray[np.bool_]:
+def _decode_mask(text: str, size: tuple[int, int]) -> NDArray[np.bool_]:
     if not text:
         return np.ones(size, np.bool_)
     bits = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
@@ -153,13 +153,13 @@ def _identity(value: Any) -> Any:
     return value
 
 
-PLAIN = Codec(_identity, _identity)
-NOTHING = Codec(lambda _: None, lambda _: None)
-TEXTS = Codec(list, _identity)
-BOX = Codec(list, tuple)
-ARRAY = Codec(np.ndarray.tolist, read_array)
-POSE = Codec(write_pose, read_pose)
-FRAME = Codec(write_frame, read_frame)
-ANSWER = Codec(write_answer, read_answer)
-OBSERVATIONS = Codec(write_observations, read_observations)
-MOTION = Codec(attrgetter("duration"), RecordedMotion)
+PLAIN_CODEC = Codec(_identity, _identity)
+NOTHING_CODEC = Codec(lambda _: None, lambda _: None)
+TEXTS_CODEC = Codec(list, _identity)
+BOX_CODEC = Codec(list, tuple)
+ARRAY_CODEC = Codec(np.ndarray.tolist, decode_array)
+POSE_CODEC = Codec(encode_pose, decode_pose)
+FRAME_CODEC = Codec(encode_frame, decode_frame)
+ANSWER_CODEC = Codec(encode_answer, decode_answer)
+OBSERVATIONS_CODEC = Codec(encode_observations, decode_observations)
+MOTION_CODEC = Codec(attrgetter("duration"), RecordedMotion)

@@ -1,4 +1,4 @@
-"""Recorded inputs and interruptions of a run, from its journal."""
+"""Recorded inputs and interruptions of a run, read from its journal."""
 
 from __future__ import annotations
 
@@ -20,43 +20,48 @@ from executive.events import (
 )
 
 UNKNOWN_ACTION = "unknown"
-"""Last action of the tool before an interruption, if the journal lacks it."""
-_COMMANDS = (ToolCommanded, MotionPlanned)
-"""Events that precede commands to tool and arm."""
+"""Value of `Interruption.last_action` if the journal may lack the last action."""
+_COMMAND_EVENTS = (ToolCommanded, MotionPlanned)
+"""Kinds of events of which one precedes each command to tool and arm."""
 
 
 class RecordedInput(NamedTuple):
-    """A recorded answer of a cell.
+    """A value that a run read from its cell.
 
     Attributes:
-        tick: Control step in which the answer was read.
-        answer: Event of the answer.
+        tick: Control step in which the value was read.
+        reading: Event with the value.
     """
 
     tick: int
-    answer: InputRead
+    reading: InputRead
 
 
 @dataclass(frozen=True)
 class Interruption:
-    """Time between the end of a process that executed a run, and the resumption of the run.
+    """Interruption of a run between the end of one process and the resumption in another process.
 
     Attributes:
-        complete_steps: Number of control steps before the interruption that remain valid.
+        complete_step_count: Number of control steps before the interruption that remain valid.
         last_action: Last action of the tool before the interruption, `open` or `close`; "" if there was none;
-            `UNKNOWN_ACTION` if arm or tool did more than the journal knows.
-        restarts_tree: True if the run had ended as INCOMPLETE, so that the tree starts again.
-        resumed_at: Control step at which the run was resumed.
+            `UNKNOWN_ACTION` if the journal may lack commands to arm or tool.
+        restarts_tree: True if the run had ended as INCOMPLETE, so that the resumption restarts the tree.
+        resume_tick: First control step after the resumption.
     """
 
-    complete_steps: int
+    complete_step_count: int
     last_action: str
     restarts_tree: bool
-    resumed_at: int
+    resume_tick: int
 
 
 class Halt(NamedTuple):
-    """Halt of a run: its control step, and True if the tree was ticked in this step."""
+    """Halt of a run.
+
+    Attributes:
+        tick: Control step of the halt.
+        is_tree_ticked: True if the tree was ticked in this step.
+    """
 
     tick: int
     is_tree_ticked: bool
@@ -64,12 +69,12 @@ class Halt(NamedTuple):
 
 @dataclass(frozen=True)
 class InputLog:
-    """Inputs and interruptions of a run so far.
+    """Recorded inputs and interruptions of a run.
 
     Attributes:
-        events: Events of the journal that no resumption made void, in order.
-        inputs: Recorded answers by name of the input, in order, without repeated answers.
-        interruptions: Interruptions by `Interruption.complete_steps`.
+        events: Events of the journal in order, without the events that a later resumption voided.
+        inputs: Recorded values by name of the input, in order; equal consecutive values are recorded once.
+        interruptions: Earlier interruptions by `Interruption.complete_step_count`.
         halt: The last halt, or None.
     """
 
@@ -82,7 +87,7 @@ class InputLog:
     def from_events(events: Iterable[TimedEvent]) -> InputLog:
         """Return the log of the events of a journal.
 
-        A resumption voids all earlier events from the first incomplete control step on.
+        A resumption voids the earlier events from the first control step that was not complete.
         """
         valid: list[TimedEvent] = []
         for timed in events:
@@ -96,8 +101,8 @@ class InputLog:
         for timed in valid:
             tick, event = timed.tick, timed.event
             match event:
-                case RunResumed(steps, action):
-                    interruptions[steps] = Interruption(steps, action, steps - 1 in incomplete_ends, tick)
+                case RunResumed(count, action):
+                    interruptions[count] = Interruption(count, action, count - 1 in incomplete_ends, tick)
                 case InputRead(name):
                     inputs[name].append(RecordedInput(tick, event))
                 case RunHalted(is_tree_ticked):
@@ -106,18 +111,18 @@ class InputLog:
 
     @property
     def start(self) -> RunStarted | None:
-        """Start of the run, or None if the run had not started."""
+        """Event of the start of the run, or None if the run had not started."""
         return next((timed.event for timed in self.events if isinstance(timed.event, RunStarted)), None)
 
     @property
-    def step(self) -> float:
-        """Length of a control step [s]."""
-        assert self.start is not None, "a run that is replayed has started"
+    def control_period(self) -> float:
+        """Duration of a control step [s]."""
+        assert self.start is not None, "the journal of a replayed run contains its start"
         return self.start.step
 
     @property
     def last_tick(self) -> int:
-        """Last control step with an event."""
+        """Number of the last control step with an event."""
         return max((timed.tick for timed in self.events), default=0)
 
     @property
@@ -127,51 +132,51 @@ class InputLog:
         return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
     def find_interruption(
-        self, steps: int, last_command: int = 0, *, is_complete: bool = True
+        self, step_count: int, last_command_tick: int = 0, *, is_complete: bool = True
     ) -> Interruption:
         """Return the interruption at the end of the log.
 
-        The steps after a halt and those of an interrupted resumption are not complete, because the arm only
-        braked. All steps of a run that ended as INCOMPLETE are complete.
+        Control steps in which the arm only brakes, after a halt or during an interrupted resumption, do not
+        count as complete. All steps of a run that ended as INCOMPLETE are complete.
 
         Args:
-            steps: Number of control steps that the world of the cell has made.
-            last_command: Control step of the last command to arm or tool by the log of the world.
+            step_count: Number of control steps that the cell has executed.
+            last_command_tick: Control step of the last command to arm or tool according to the cell.
             is_complete: True if the log holds all events of its last control step.
         """
         incomplete_ends = _find_incomplete_ends(self.events)
         if self.last_tick in incomplete_ends:
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
         end = self.last_tick + is_complete if self.halt is None else self.halt.tick
-        complete = min(steps, end)
-        is_cut = steps > self.last_tick and not is_complete
-        lacks_actions = self._lacks_command(last_command, is_cut)
+        complete = min(step_count, end)
+        is_truncated = step_count > self.last_tick and not is_complete
+        lacks_commands = self._may_lack_command(last_command_tick, is_truncated)
         for earlier in reversed(list(self.interruptions.values())):
-            if earlier.resumed_at >= complete:
-                complete = min(complete, earlier.complete_steps)
-                lacks_actions |= earlier.last_action == UNKNOWN_ACTION
-        action = UNKNOWN_ACTION if lacks_actions else self.last_action
-        return Interruption(complete, action, complete - 1 in incomplete_ends, steps)
+            if earlier.resume_tick >= complete:
+                complete = min(complete, earlier.complete_step_count)
+                lacks_commands |= earlier.last_action == UNKNOWN_ACTION
+        action = UNKNOWN_ACTION if lacks_commands else self.last_action
+        return Interruption(complete, action, complete - 1 in incomplete_ends, step_count)
 
-    def _lacks_command(self, last_command: int, is_cut: bool) -> bool:
-        """Return True if the last command to arm or tool may be missing in the log.
+    def _may_lack_command(self, last_command_tick: int, is_truncated: bool) -> bool:
+        """Return True if the log may lack the last command to arm or tool.
 
-        All commands before the last control step are in the log, because the log is written in order. In the
-        last step, an event precedes each command. A kill may leave this step incomplete; if the world got
-        beyond the step nevertheless, the log was cut, and `is_cut` is True.
+        The log contains all commands before its last control step, because it is written in order. In the
+        last step, an event precedes each command. If the process was killed, this step may be incomplete.
+        `is_truncated` is True if the cell executed later steps than an incomplete last step of the log.
         """
-        if last_command != self.last_tick:
-            return last_command > self.last_tick
-        precedes = (one.tick == last_command for one in self.events if isinstance(one.event, _COMMANDS))
-        return is_cut or not any(precedes)
+        if last_command_tick != self.last_tick:
+            return last_command_tick > self.last_tick
+        ticks = (timed.tick for timed in self.events if isinstance(timed.event, _COMMAND_EVENTS))
+        return is_truncated or last_command_tick not in ticks
 
-    def is_over(self, tick: int) -> bool:
+    def has_ended_before_tick(self, tick: int) -> bool:
         """Return True if the recorded run ended before its tree was ticked in this control step."""
         if self.halt is None:
             return tick > self.last_tick
         return self.halt == (tick, False)
 
-    def is_halted_after_tick(self, tick: int) -> bool:
+    def is_halted_after(self, tick: int) -> bool:
         """Return True if the recorded run was halted after its tree was ticked in this control step."""
         return self.halt == (tick, True)
 
@@ -183,12 +188,13 @@ class InputLog:
         """Return the number of events of a kind."""
         return sum(isinstance(timed.event, kind) for timed in self.events)
 
-    def count_answers(self, name: str) -> int:
-        """Return the number of recorded answers of an input."""
+    def count_readings(self, name: str) -> int:
+        """Return the number of recorded values of an input."""
         return len(self.inputs.get(name, ()))
 
 
 def _select_before(events: Iterable[TimedEvent], tick: int) -> list[TimedEvent]:
+    """Return all events before a control step, and the start of the run."""
     return [timed for timed in events if timed.tick < tick or isinstance(timed.event, RunStarted)]
 
 

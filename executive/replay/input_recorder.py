@@ -1,6 +1,6 @@
-"""Recorder of the inputs of a run: the answers of its cell.
+"""Recorder of the inputs of a run: the values that the run reads from its cell.
 
-Each answer that differs from the last answer to the same query becomes an event. A replay of these answers
+Each value that differs from the last value of the same input becomes an event. A replay of these values
 repeats all decisions of the tree, its skills and the ledger, without the cell.
 """
 
@@ -12,13 +12,13 @@ from typing import TypeVar
 
 from executive.errors import Stopped
 from executive.events import Emit, InputRead
-from executive.replay.codec import PLAIN, Codec
+from executive.replay.codec import PLAIN_CODEC, Codec
 
-Answer = TypeVar("Answer")
+Value = TypeVar("Value")
 
 
 class InputRecorder:
-    """Emits each new answer of a cell as an event; used in the thread of the control loop only.
+    """Emits an event for each changed value of an input; used only in the thread of the tick loop.
 
     Args:
         emit: Emits an event.
@@ -30,29 +30,29 @@ class InputRecorder:
         self._last_values: dict[str, object] = {}
 
     def begin_step(self) -> None:
-        """Begin a control step, in which the counts of reads start from 0."""
+        """Begin a control step: set the number of reads of each input to 0."""
         self._read_counts.clear()
 
-    def read(self, name: str, query: Callable[[], Answer], codec: Codec = PLAIN) -> Answer:
-        """Return the answer of the cell, and record a new answer.
+    def read(self, name: str, query: Callable[[], Value], codec: Codec = PLAIN_CODEC) -> Value:
+        """Return the value that the query returns, and record the value if it changed.
 
         Args:
             name: Name of the input; equal queries have the same name.
-            query: Queries the cell.
-            codec: Converts the answer to plain values.
+            query: Reads the value from the cell.
+            codec: Codec of the value.
 
         Raises:
             Exception: The cell raised an exception, which is also recorded.
         """
         self._read_counts[name] += 1
-        read_number = self._read_counts[name]
+        read_count = self._read_counts[name]
         try:
-            answer = query()
+            value = query()
         except (Exception, Stopped) as error:
-            self._emit(InputRead(name, read_number, str(error), type(error).__name__))
+            self._emit(InputRead(name, read_count, str(error), type(error).__name__))
             raise
-        value = codec.write(answer)
-        if name not in self._last_values or value != self._last_values[name]:
-            self._last_values[name] = value
-            self._emit(InputRead(name, read_number, value))
-        return answer
+        encoded = codec.encode(value)
+        if name not in self._last_values or encoded != self._last_values[name]:
+            self._last_values[name] = encoded
+            self._emit(InputRead(name, read_count, encoded))
+        return value

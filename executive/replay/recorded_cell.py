@@ -1,4 +1,4 @@
-"""Cell whose answers are recorded, and the names and codecs of the recorded inputs."""
+"""Cell whose inputs to a run are recorded, and the names and codecs of these inputs."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.events import Emit, ToolCommanded
 from executive.replay.codec import (
-    ANSWER,
-    ARRAY,
-    BOX,
-    FRAME,
-    MOTION,
-    NOTHING,
-    OBSERVATIONS,
-    PLAIN,
-    POSE,
-    TEXTS,
+    ANSWER_CODEC,
+    ARRAY_CODEC,
+    BOX_CODEC,
+    FRAME_CODEC,
+    MOTION_CODEC,
+    NOTHING_CODEC,
+    OBSERVATIONS_CODEC,
+    PLAIN_CODEC,
+    POSE_CODEC,
+    TEXTS_CODEC,
     Codec,
 )
 from executive.replay.input_recorder import InputRecorder
@@ -34,19 +34,19 @@ class InputFormat(NamedTuple):
     """Name and codec of one kind of recorded input.
 
     Attributes:
-        name: Name of the input in the record; `{detector}` stands for the name of the detector, `{0}` for
-            the first argument.
+        name: Name of the input in the journal; `{detector}` stands for the name of the detector, `{0}` for
+            the first argument of the access.
         codec: Codec of the value.
     """
 
     name: str
-    codec: Codec = PLAIN
+    codec: Codec = PLAIN_CODEC
 
     @staticmethod
     def find(access: Access) -> InputFormat:
-        """Return the format of the answer to an access; all commands have the same format."""
+        """Return the format of the result of an access to the cell; all commands have the same format."""
         if access.name in COMMANDS:
-            return _COMMAND
+            return _COMMAND_FORMAT
         name, codec = INPUT_FORMATS[access.name]
         if "{" in name:
             name = name.format(*access.all_arguments, detector=access.detector)
@@ -54,31 +54,31 @@ class InputFormat(NamedTuple):
 
 
 INPUT_FORMATS: Mapping[str, InputFormat] = {
-    "arm.q": InputFormat("arm.q", ARRAY),
-    "arm.tool_pose": InputFormat("arm.tool_pose", POSE),
-    "arm.tool_velocity": InputFormat("arm.tool_velocity", ARRAY),
-    "arm.destination": InputFormat("arm.destination", ARRAY),
+    "arm.q": InputFormat("arm.q", ARRAY_CODEC),
+    "arm.tool_pose": InputFormat("arm.tool_pose", POSE_CODEC),
+    "arm.tool_velocity": InputFormat("arm.tool_velocity", ARRAY_CODEC),
+    "arm.destination": InputFormat("arm.destination", ARRAY_CODEC),
     "arm.at_rest": InputFormat("arm.at_rest"),
     "arm.met": InputFormat("arm.met"),
     "plan.ready": InputFormat("plan.ready"),
-    "plan.result": InputFormat("plan", MOTION),
+    "plan.result": InputFormat("plan", MOTION_CODEC),
     "tool.touching": InputFormat("tool.touching"),
     "tool.holding": InputFormat("tool.holding"),
     "tool.bears": InputFormat("tool.bears"),
     "camera.name": InputFormat("camera.name"),
-    "camera.scan_poses": InputFormat("camera.scan_poses", TEXTS),
+    "camera.scan_poses": InputFormat("camera.scan_poses", TEXTS_CODEC),
     "camera.next_pose": InputFormat("camera.next_pose"),
-    "camera.area": InputFormat("camera.area.{0}", BOX),
+    "camera.area": InputFormat("camera.area.{0}", BOX_CODEC),
     "camera.sees_table": InputFormat("camera.sees_table"),
-    "camera.capture": InputFormat("camera.frame", FRAME),
+    "camera.capture": InputFormat("camera.frame", FRAME_CODEC),
     "camera.displacement": InputFormat("camera.displacement"),
     "request.ready": InputFormat("detector.{detector}.ready"),
-    "request.result": InputFormat("detector.{detector}", ANSWER),
+    "request.result": InputFormat("detector.{detector}", ANSWER_CODEC),
     "operator.ask": InputFormat("operator"),
-    "localizer.locate": InputFormat("localizer", ARRAY),
-    "localizer.localize": InputFormat("observations", OBSERVATIONS),
+    "localizer.locate": InputFormat("localizer", ARRAY_CODEC),
+    "localizer.localize": InputFormat("observations", OBSERVATIONS_CODEC),
 }
-"""Name and codec of the recorded input of each access that is not a command, by `Access.name`."""
+"""Format of the recorded input of each access that is not a command, by `Access.name`."""
 
 COMMANDS = frozenset(
     {"arm.plan", "arm.plan_ahead", "arm.start", "arm.stop", "tool.close", "tool.open", "detector.request"}
@@ -86,43 +86,46 @@ COMMANDS = frozenset(
 """Accesses that command the cell; a replay skips them."""
 
 RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
-"""Roles with recorded answers. A replay builds its own ledger; the cell file defines the other roles."""
+"""Parts of a cell with recorded inputs; a replay has its own ledger, and the cell file defines the rest."""
 
-_COMMAND = InputFormat("command", NOTHING)
-"""Format of the answer to a command: None, unless the cell raises an exception."""
+_COMMAND_FORMAT = InputFormat("command", NOTHING_CODEC)
+"""Format of the result of a command: None, unless the cell raises an exception."""
 
 
-_PATTERNS = [
-    (re.compile(re.sub(r"\\{.*?\\}", ".+", re.escape(form.name))), form.codec)
-    for form in sorted(INPUT_FORMATS.values(), key=lambda form: -len(form.name))
+_PATTERN_CODECS = [
+    (re.compile(re.sub(r"\\{.*?\\}", ".+", re.escape(each.name))), each.codec)
+    for each in sorted(INPUT_FORMATS.values(), key=lambda each: -len(each.name))
 ]
-"""Pattern of the input names of each format, and codec of the format; the most specific patterns first."""
+"""Pattern of the input names and codec of each format, by descending length of the name.
+
+The longest names are first, because the pattern of a shorter name may match a longer name, too.
+"""
 
 
 def check_input(name: str, value: JsonValue) -> None:
-    """Raise an error if a recorded answer cannot be replayed.
+    """Check that a recorded value of an input can be replayed.
 
     Raises:
-        ValueError: The answer does not have the format of the input.
+        ValueError: The value does not have the format of the input.
     """
-    codec = next((codec for pattern, codec in _PATTERNS if pattern.fullmatch(name)), PLAIN)
+    codec = next((codec for pattern, codec in _PATTERN_CODECS if pattern.fullmatch(name)), PLAIN_CODEC)
     try:
-        codec.read(value)
+        codec.decode(value)
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, zlib.error) as error:
         problem = f"{type(error).__name__}: {error}"
-        raise ValueError(f'"value" is no answer of the input "{name}" ({problem})') from error
+        raise ValueError(f'"value" is no value of the input "{name}" ({problem})') from error
 
 
-def record_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
-    """Return a copy of the cell with the clock `clock` and with recorded answers.
+def make_recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
+    """Return a copy of the cell that has the clock `clock` and whose inputs are recorded.
 
-    Each action of the tool is emitted as an event before the action.
+    The copy emits an event before each action of the tool.
     """
 
-    def answer(access: Access) -> Any:
+    def read_and_record(access: Access) -> Any:
         if access.role == "tool" and access.name in COMMANDS:
             emit(ToolCommanded(access.member))
         name, codec = InputFormat.find(access)
         return recorder.read(name, access.proceed, codec)
 
-    return replace(intercept(cell, answer, RECORDED_ROLES), clock=clock)
+    return replace(intercept(cell, read_and_record, RECORDED_ROLES), clock=clock)

@@ -1,4 +1,4 @@
-"""Work cell that replays recorded inputs, and may continue on the real cell."""
+"""Work cell that replays recorded inputs, and then may continue on the real cell."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ from executive.replay.recorded_cell import RECORDED_ROLES, InputFormat
 
 
 class ReplayedCell(CellWrapper):
-    """Answers queries with the recorded answers; the inner cell is used only for its ledger.
+    """Work cell that returns recorded inputs and ignores commands; uses only the ledger of the inner cell.
 
-    With a `last` interruption, all queries and commands after this interruption go to the inner cell.
+    After the last interruption, all reads and commands go to the inner cell.
 
     Args:
-        inner: The inner cell.
+        inner: Cell with the ledger of the run, and on which the run may continue.
         log: The recorded inputs.
-        last: Interruption at the end of the log, or None to replay only.
+        last: Interruption at the end of the log, or None if the run is only replayed.
 
     Attributes:
-        log: The recorded inputs that are replayed: those before the last interruption.
-        last: Interruption at the end of the log, or None.
-        interruption: Interruption before this control step, until the run is resumed; else None.
-        is_live: True if all queries and commands go to the inner cell.
+        log: The recorded inputs before the last interruption.
+        last_interruption: Interruption at the end of the log, or None if the run is only replayed.
+        pending_interruption: Interruption before this control step until the run is resumed, else None.
+        is_live: True if all reads and commands go to the inner cell.
     """
 
     def __init__(self, inner: Workcell, log: InputLog, last: Interruption | None = None) -> None:
         super().__init__(inner)
-        self.log = log if last is None else log.select_before(last.complete_steps)
-        self.last = last
+        self.log = log if last is None else log.select_before(last.complete_step_count)
+        self.last_interruption = last
         self._replayer = InputReplayer(self.log)
         self._is_halted = False
         self.is_live = False
-        clock = StepClock(self._now, self.log.step)
-        self._cell = replace(intercept(inner.cell, self._answer, RECORDED_ROLES), clock=clock)
+        clock = StepClock(self._read_clock, self.log.control_period)
+        self._cell = replace(intercept(inner.cell, self._handle_access, RECORDED_ROLES), clock=clock)
         self._begin_step(0)
-        self.interruption = self._find_interruption(0)
+        self.pending_interruption = self._find_interruption(0)
 
     @property
     def cell(self) -> Cell:
@@ -58,38 +58,38 @@ class ReplayedCell(CellWrapper):
         return self.inner.steps if self.is_live else self._steps
 
     @property
-    def unanswered(self) -> str:
-        """Message of the first query without a recorded answer, or ""."""
-        return self._replayer.unanswered
+    def missing_input_message(self) -> str:
+        """Message about the first input without a recorded value, or ""."""
+        return self._replayer.missing_input_message
 
     @property
-    def is_over(self) -> bool:
-        """True if the recorded run ended before its tree was ticked in this control step."""
-        return self.last is None and self.log.is_over(self._steps)
+    def has_ended(self) -> bool:
+        """True if the run is only replayed and ended before its tree was ticked in this control step."""
+        return self.last_interruption is None and self.log.has_ended_before_tick(self._steps)
 
     @property
     def is_tree_restarted(self) -> bool:
-        """True if the recorded run ended in this control step as INCOMPLETE and was resumed."""
+        """True if the recorded run ended as INCOMPLETE in this control step and was resumed."""
         next_interruption = None if self.is_live else self._find_interruption(self._steps + 1)
         return next_interruption is not None and next_interruption.restarts_tree
 
     def resume(self) -> None:
-        """Continue after the interruption; after the last interruption, on the inner cell.
+        """Continue after the pending interruption; after the last interruption, continue on the inner cell.
 
-        The inner cell first makes the control steps that it lacks.
+        The inner cell first executes the complete control steps that it has not executed.
         """
-        interruption, self.interruption = self.interruption, None
+        interruption, self.pending_interruption = self.pending_interruption, None
         assert interruption is not None, "only an interrupted run can be resumed"
-        if interruption is not self.last:
-            self._begin_step(interruption.resumed_at)
+        if interruption is not self.last_interruption:
+            self._begin_step(interruption.resume_tick)
             return
-        while self.inner.steps < interruption.complete_steps:
+        while self.inner.steps < interruption.complete_step_count:
             self.inner.advance()
         self.is_live = True
 
     @contextmanager
     def suppress_commands(self) -> Iterator[None]:
-        """Answer with the last recorded answers in the `with` block; commands have no effect there."""
+        """Return the last recorded inputs and ignore commands in the `with` block."""
         is_live, self.is_live = self.is_live, False
         try:
             yield
@@ -97,36 +97,36 @@ class ReplayedCell(CellWrapper):
             self.is_live = is_live
 
     def advance(self) -> None:
-        """Make one control step.
+        """Execute one control step.
 
         Raises:
-            Stopped: The recorded run was halted in this step; raised once.
+            Stopped: The recorded run was halted in this control step; raised only once.
         """
         if self.is_live:
             self.inner.advance()
             return
-        if self.last is None and not self._is_halted and self.log.is_halted_after_tick(self._steps):
+        if self.last_interruption is None and not self._is_halted and self.log.is_halted_after(self._steps):
             self._is_halted = True
-            raise Stopped("the recorded run was halted here")
+            raise Stopped("the recorded run was halted in this control step")
         self._begin_step(self._steps + 1)
-        self.interruption = self._find_interruption(self._steps)
+        self.pending_interruption = self._find_interruption(self._steps)
 
     def _begin_step(self, steps: int) -> None:
         self._steps = steps
         self._replayer.begin_step(steps)
 
     def _find_interruption(self, steps: int) -> Interruption | None:
-        if self.last is not None and steps == self.last.complete_steps:
-            return self.last
+        if self.last_interruption is not None and steps == self.last_interruption.complete_step_count:
+            return self.last_interruption
         return self.log.interruptions.get(steps)
 
-    def _now(self) -> float:
+    def _read_clock(self) -> float:
         if self.is_live:
             return self.inner.cell.clock.now
         offset: float = self._replayer.read("clock")
-        return self._steps * self.log.step + offset
+        return self._steps * self.log.control_period + offset
 
-    def _answer(self, access: Access) -> Any:
+    def _handle_access(self, access: Access) -> Any:
         if self.is_live:
             return access.proceed()
         name, codec = InputFormat.find(access)

@@ -113,7 +113,7 @@ def assemble_resumed(
         InputError: The kind of the cell is not installed, or the world of the cell cannot be rebuilt.
     """
     builder = _RunBuilder(loaded, skills, options)
-    frames, pose_changes = (log.count_answers(f"camera.{name}") for name in ("frame", "next_pose"))
+    frames, pose_changes = (log.count_readings(f"camera.{name}") for name in ("frame", "next_pose"))
     inner = builder.build_cell(ResumePoint(world_log, frames, pose_changes), log.count_events(RequestGiven))
     last = log.find_interruption(inner.steps, inner.last_command, is_complete=is_complete)
     return builder.build_resumed_run(inner, log, None if has_ended else last)

@@ -77,9 +77,9 @@ class ResumedRun(Run):
     def _follow_record(self) -> None:
         """Stop or resume the run in the same control step as the recorded run; called between two ticks."""
         replayed = self.replayed_cell
-        while not replayed.is_live and not replayed.is_over and replayed.interruption is not None:
-            self._resume(replayed.interruption)
-        if not replayed.is_live and replayed.is_over:
+        while not replayed.is_live and not replayed.has_ended and replayed.pending_interruption is not None:
+            self._resume(replayed.pending_interruption)
+        if not replayed.is_live and replayed.has_ended:
             self.control.stop()
 
     def _resume(self, interruption: Interruption) -> None:
@@ -99,7 +99,7 @@ class ResumedRun(Run):
         context.begin_step(replayed.steps)
         if replayed.is_live:
             self._wall_start = time.monotonic() - context.now
-            step_count, action = interruption.complete_steps, interruption.last_action
+            step_count, action = interruption.complete_step_count, interruption.last_action
             context.emit(RunResumed(step_count, action, dict(list_versions())))
         self._is_scene_known &= interruption.last_action != UNKNOWN_ACTION
         if self._is_scene_known:
@@ -120,8 +120,8 @@ class ResumedRun(Run):
         """Observe the scene; the scene stays unknown if an interruption or a stop ends the recovery early."""
         for _ in recover_scene(self._context.cell):
             self._context.advance()
-            replayed = self.replayed_cell
-            is_over = not replayed.is_live and (replayed.is_over or replayed.interruption is not None)
+            cell = self.replayed_cell
+            is_over = not cell.is_live and (cell.has_ended or cell.pending_interruption is not None)
             if self.control.is_stopped or is_over:
                 return
         self._is_scene_known = True

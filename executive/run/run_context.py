@@ -9,7 +9,7 @@ from executive.cell.protocols import Cell
 from executive.cell.workcell import Workcell
 from executive.events import Event, Observer, TimedEvent
 from executive.replay.input_recorder import InputRecorder
-from executive.replay.recorded_cell import record_cell
+from executive.replay.recorded_cell import make_recorded_cell
 from executive.run.lookahead_planner import LookaheadPlanner
 
 MAX_BRAKING_TIME = 2.0
@@ -54,7 +54,7 @@ class RunContext:
             self.add_observer(planner.on_event)
         self._control_period = workcell.cell.clock.step
         clock = StepClock(lambda: self.now, self._control_period)
-        self.cell = record_cell(workcell.cell, self._recorder, clock, self.emit)
+        self.cell = make_recorded_cell(workcell.cell, self._recorder, clock, self.emit)
 
     def add_observer(self, observer: Observer, *, first: bool = False) -> None:
         """Call `observer` with every event from now on; if `first` is True, before all other observers."""

@@ -15,13 +15,13 @@ from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.geometry import Pose, about_z
 from executive.replay.codec import (
-    ANSWER,
-    ARRAY,
-    BOX,
-    FRAME,
-    MOTION,
-    OBSERVATIONS,
-    POSE,
+    ANSWER_CODEC,
+    ARRAY_CODEC,
+    BOX_CODEC,
+    FRAME_CODEC,
+    MOTION_CODEC,
+    OBSERVATIONS_CODEC,
+    POSE_CODEC,
     Codec,
     RecordedMotion,
 )
@@ -32,18 +32,18 @@ few = settings(max_examples=25)
 
 def back(codec: Codec, answer: Any) -> Any:
     """Return an answer after its way through JSON."""
-    return codec.read(json.loads(json.dumps(codec.write(answer))))
+    return codec.decode(json.loads(json.dumps(codec.encode(answer))))
 
 
 @few
 @given(arrays(np.float64, (3, 2), elements=finite), st.floats(-4, 4))
 def test_numbers_come_back_bit_by_bit(array: np.ndarray, angle: float) -> None:
-    assert np.array_equal(back(ARRAY, array), array)
+    assert np.array_equal(back(ARRAY_CODEC, array), array)
     pose = Pose(about_z(angle), array[:, 0])
-    assert np.array_equal(back(POSE, pose).rotation, pose.rotation)
-    assert np.array_equal(back(POSE, pose).position, pose.position)
-    assert back(MOTION, RecordedMotion(angle)) == RecordedMotion(angle)
-    assert back(BOX, (1, 2, 3.5, angle)) == (1, 2, 3.5, angle)
+    assert np.array_equal(back(POSE_CODEC, pose).rotation, pose.rotation)
+    assert np.array_equal(back(POSE_CODEC, pose).position, pose.position)
+    assert back(MOTION_CODEC, RecordedMotion(angle)) == RecordedMotion(angle)
+    assert back(BOX_CODEC, (1, 2, 3.5, angle)) == (1, 2, 3.5, angle)
 
 
 @few
@@ -54,7 +54,7 @@ def test_a_frame_comes_back_without_its_image(visible: np.ndarray, epoch: int) -
         7, "overhead", np.full((*size, 3), 9, np.uint8), np.ones(size), np.eye(3) / 3, Pose.identity(), 1 / 3,
         visible, epoch,
     )  # fmt: skip
-    read = back(FRAME, frame)
+    read = back(FRAME_CODEC, frame)
     assert (read.id, read.camera, read.stamp, read.epoch) == (7, "overhead", 1 / 3, epoch)
     assert np.array_equal(read.visible, visible)
     assert np.array_equal(read.matrix, frame.matrix)
@@ -71,7 +71,7 @@ some = st.lists(detections, max_size=4).map(tuple)
 @given(some, some, some, finite)
 def test_an_answer_comes_back(found: tuple, doubtful: tuple, unknown: tuple, misses: float) -> None:
     answer = Answer("eye", found, ErrorRates(0.5, misses, 0.1, 0.2, 0.7), doubtful, unknown)
-    assert back(ANSWER, answer) == answer
+    assert back(ANSWER_CODEC, answer) == answer
 
 
 @few
@@ -79,7 +79,7 @@ def test_an_answer_comes_back(found: tuple, doubtful: tuple, unknown: tuple, mis
 def test_observations_come_back(
     detection: Detection, position: np.ndarray, std: float, confident: bool, contradiction: str
 ) -> None:
-    (read,) = back(OBSERVATIONS, [Observation(detection, position, std, confident, contradiction)])
+    (read,) = back(OBSERVATIONS_CODEC, [Observation(detection, position, std, confident, contradiction)])
     assert np.array_equal(read.position, position)
     others = (read.detection, read.std, read.confident, read.contradiction)
     assert others == (detection, std, confident, contradiction)

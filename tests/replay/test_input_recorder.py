@@ -14,7 +14,7 @@ from executive.errors import Fault, Unreachable
 from executive.events import Event, TimedEvent
 from executive.replay.input_log import InputLog
 from executive.replay.input_recorder import InputRecorder
-from executive.replay.input_replayer import InputReplayer, Unrecorded
+from executive.replay.input_replayer import InputNotRecorded, InputReplayer
 
 
 class Recording:
@@ -71,11 +71,11 @@ def test_an_exception_of_the_cell_is_raised_again() -> None:
 def test_a_question_that_was_never_asked_has_no_answer() -> None:
     replayer, message = (
         Recording().replayer(),
-        "the record holds no answer to what is asked here first: arm.q",
+        "the journal contains no earlier value of the input arm.q, which is read here",
     )
-    with pytest.raises(Unrecorded, match=message):
+    with pytest.raises(InputNotRecorded, match=message):
         replayer.read("arm.q")
-    assert replayer.unanswered == message
+    assert replayer.missing_input_message == message
 
 
 def test_only_answers_unlike_the_one_before_are_recorded() -> None:

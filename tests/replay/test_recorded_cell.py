@@ -8,11 +8,11 @@ from executive.cell.proxy import IS_METHOD
 from executive.cells.fake.cell import FakeCell
 from executive.events import Emit, Event, ToolCommanded, ignore
 from executive.replay.input_recorder import InputRecorder
-from executive.replay.recorded_cell import COMMANDS, INPUT_FORMATS, RECORDED_ROLES, record_cell
+from executive.replay.recorded_cell import COMMANDS, INPUT_FORMATS, RECORDED_ROLES, make_recorded_cell
 
 
 def recorded(fake: FakeCell, emit: Emit = ignore) -> Cell:
-    return record_cell(fake.cell, InputRecorder(emit), StepClock(lambda: 0.0), emit)
+    return make_recorded_cell(fake.cell, InputRecorder(emit), StepClock(lambda: 0.0), emit)
 
 
 def test_every_member_of_a_part_is_a_question_or_a_command() -> None:

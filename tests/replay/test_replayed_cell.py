@@ -49,11 +49,15 @@ def test_after_the_last_interruption_the_cell_inside_takes_over() -> None:
     fake = FakeCell()
     last = Interruption(1, "", False, 0)
     replayed = ReplayedCell(fake, log(sense(0, "tool.holding", True), sense(1, "tool.holding", False)), last)
-    assert replayed.interruption is None
+    assert replayed.pending_interruption is None
     replayed.advance()
-    assert (replayed.interruption, replayed.cell.tool.holding) == (last, True)
+    assert (replayed.pending_interruption, replayed.cell.tool.holding) == (last, True)
     replayed.resume()
-    assert (replayed.is_live, replayed.interruption, replayed.cell.tool.holding) == (True, None, False)
+    assert (replayed.is_live, replayed.pending_interruption, replayed.cell.tool.holding) == (
+        True,
+        None,
+        False,
+    )
     replayed.advance()
     assert replayed.steps == fake.steps == 2
 
@@ -61,7 +65,7 @@ def test_after_the_last_interruption_the_cell_inside_takes_over() -> None:
 def test_a_recorded_interruption_leaves_out_the_steps_in_which_nothing_was_decided() -> None:
     replayed = ReplayedCell(FakeCell(), log(at(5, RunResumed(1, "open", {})), sense(5, "arm.at_rest", True)))
     replayed.advance()
-    assert replayed.interruption == Interruption(1, "open", False, 5)
+    assert replayed.pending_interruption == Interruption(1, "open", False, 5)
     replayed.resume()
     assert (replayed.steps, replayed.is_live, replayed.cell.arm.at_rest) == (5, False, True)
 
@@ -69,9 +73,9 @@ def test_a_recorded_interruption_leaves_out_the_steps_in_which_nothing_was_decid
 @pytest.mark.parametrize("ticked", [False, True])
 def test_it_ends_where_the_recorded_run_was_halted(ticked: bool) -> None:
     replayed = ReplayedCell(FakeCell(), log(at(1, RunHalted(ticked))))
-    assert not replayed.is_over
+    assert not replayed.has_ended
     replayed.advance()
-    assert replayed.is_over is not ticked
+    assert replayed.has_ended is not ticked
     if ticked:
         with pytest.raises(Stopped):
             replayed.advance()
@@ -82,6 +86,6 @@ def test_it_ends_where_the_recorded_run_was_halted(ticked: bool) -> None:
 def test_it_ends_where_the_record_ends() -> None:
     replayed = ReplayedCell(FakeCell(), log(sense(1, "tool.holding", True)))
     replayed.advance()
-    assert not replayed.is_over
+    assert not replayed.has_ended
     replayed.advance()
-    assert replayed.is_over
+    assert replayed.has_ended
