@@ -69,7 +69,7 @@ def run_job(job: Job) -> Result:
     skills = discover()
     loaded = load_mission(job.mission, skills, job.overrides)
     options = RunOptions(job.seed, scene=job.scene)
-    result = record_run(loaded, skills, options, job.runs, RecordOptions(frames=job.frames))
+    result = record_run(loaded, skills, options, job.runs, RecordOptions(saves_pictures=job.frames))
     # A failure to write the report does not change the result.
     leave_report(result.run)
     return result

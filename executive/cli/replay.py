@@ -28,17 +28,17 @@ def command(ctx: click.Context, run: str, edited: Path | None, runs: Path, as_js
     with stdout_kept_clean():
         from executive.plugins import discover
         from executive.record.journal import read_journal
-        from executive.record.replay import replay
+        from executive.record.replay import replay_run
         from executive.record.run_directory import find_run
 
         path = find_run(run, runs)
-        result = replay(path, read_journal(path / "journal.jsonl"), discover(), edited)
-        if result.same:
+        result = replay_run(path, read_journal(path / "journal.jsonl"), discover(), edited)
+        if result.is_equal:
             click.echo(f"{result.decisions} decisions, all as recorded ({path})", err=True)
         else:
             click.echo(
                 f"{result.decisions} decisions as recorded, then {result.difference} ({path})", err=True
             )
     if as_json:
-        print_json({"run": str(path), "same": result.same, **result.as_json()})
-    ctx.exit(0 if result.same else 1)
+        print_json({"run": str(path), "same": result.is_equal, **result.as_json()})
+    ctx.exit(0 if result.is_equal else 1)

@@ -1,4 +1,4 @@
-"""Execution of a run with its record and its views."""
+"""Execution of a run that is recorded in a run directory and shown by views."""
 
 from __future__ import annotations
 
@@ -18,7 +18,14 @@ from executive.mission.text.files import read_source
 from executive.record.diagnosis.diagnose import diagnose
 from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder
-from executive.record.result import ENDED, ItemCounts, Result, list_requests, make_audit, write_result
+from executive.record.result import (
+    FINAL_STATUSES,
+    ItemCounts,
+    Result,
+    list_requests,
+    make_audit,
+    write_result,
+)
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
 
@@ -30,50 +37,50 @@ if TYPE_CHECKING:
 
 
 class View(Protocol):
-    """Display of a run for a person: an observer that is opened before the run and closed after it."""
+    """Display of a run for a person: an observer that is opened before the run and closed after the run."""
 
     def open(self, run: Run) -> None:
-        """Begin to show a run, whose `control` stops, pauses and steps it."""
+        """Begin to show a run; the view may stop, pause and step the run by its `control`."""
 
     def __call__(self, timed: TimedEvent) -> None:
-        """Take an event and return at once."""
+        """Accept an event and return at once."""
 
     def close(self) -> None:
-        """Stop showing the run; called after each end of the run, also after an exception."""
+        """Stop showing the run; called after the end of the run, also after an exception."""
 
     def note(self, sentence: str) -> None:
-        """Show a sentence about the record."""
+        """Show a message about the record of the run."""
 
 
 @dataclass(frozen=True)
 class RecordOptions:
-    """Options of the record of a run, and its views.
+    """Options of the record and of the display of a run.
 
     Attributes:
         views: Views of the run.
-        paused: True to pause the run before its first step.
-        frames: True to save pictures, and to keep the log of the world after the end of the run.
+        paused: True to pause the run before its first control step.
+        saves_pictures: True to save pictures, and to keep the log of the world after the end of the run.
     """
 
     views: Sequence[View] = ()
     paused: bool = False
-    frames: bool = True
+    saves_pictures: bool = True
 
 
 def record_run(
     loaded: LoadedMission,
     skills: Mapping[str, type[Skill]],
     options: RunOptions,
-    runs: Path,
+    runs_folder: Path,
     record: RecordOptions = RecordOptions(),
 ) -> Result:
-    """Run a mission, record the run in a new directory below `runs`, and return the result.
+    """Run a mission, record the run in a new directory below `runs_folder`, and return the result.
 
     Args:
         loaded: The mission and its cell.
         skills: Installed skills by name.
         options: Options of the run; the run directory gets a copy of the scene file.
-        runs: Folder of the run directories.
+        runs_folder: Folder of the run directories.
         record: Options of the record.
 
     Raises:
@@ -82,23 +89,23 @@ def record_run(
     """
     from executive.run.assembly import assemble
 
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     run = assemble(loaded, skills, options)
     with closing(run):
         if record.paused:
             run.control.pause()
-        directory = make_run_directory(run, loaded, options, runs)
-        recorder = Recorder(directory, frames=record.frames)
+        directory = make_run_directory(run, loaded, options, runs_folder)
+        recorder = Recorder(directory, saves_pictures=record.saves_pictures)
         recording = Recording(run, loaded, skills, directory, recorder, record.views)
-        result = recording.execute(options.seed, began)
-    if not record.frames and result.status in ENDED:
-        # The log of the world is needed only for the resumption and for a film.
-        directory.world.unlink(missing_ok=True)
+        result = recording.execute(options.seed, start_time)
+    if not record.saves_pictures and result.status in FINAL_STATUSES:
+        # The log of the world is needed only for a resumption and for a film.
+        directory.world_log.unlink(missing_ok=True)
     return result
 
 
 def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, runs: Path) -> RunDirectory:
-    """Make the directory of a run below `runs`, write the inputs of the run into it, and return it.
+    """Make the directory of a run below `runs`, with its mission, cell and scene; return the directory.
 
     Raises:
         InputError: The directory cannot be made, or a file cannot be written.
@@ -115,7 +122,7 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, run
         libraries=loaded.libraries,
         scene=scene,
     )
-    run.workcell.log_to(directory.world)
+    run.workcell.log_to(directory.world_log)
     return directory
 
 
@@ -130,8 +137,8 @@ class Recording:
         directory: The run directory.
         recorder: Recorder of the run.
         views: Views of the run.
-        past: Events that the observers get before the run.
-        remark: Sentence that the views show at the start of the run, or "".
+        earlier_events: Events that the observers get before the run.
+        start_message: Message that the views show at the start of the run, or "".
     """
 
     run: Run
@@ -140,22 +147,22 @@ class Recording:
     directory: RunDirectory
     recorder: Recorder
     views: Sequence[View]
-    past: Iterable[TimedEvent] = ()
-    remark: str = ""
+    earlier_events: Iterable[TimedEvent] = ()
+    start_message: str = ""
 
     def __post_init__(self) -> None:
         self._timeline = Timeline(history=False)
 
-    def execute(self, seed: int, began: float) -> Result:
-        """Execute the run, write its result into the run directory, and return it.
+    def execute(self, seed: int, start_time: float) -> Result:
+        """Execute the run, write its result into the run directory, and return the result.
 
-        `began` is the time at which the work on the run began, by `time.perf_counter` [s].
+        `start_time` is the time of `time.perf_counter` at which the assembly of the run began [s].
 
         Raises:
             ExecutiveError: The result cannot be written.
         """
-        outcome, audit = self._execute_observed()
-        result = self._make_result(seed, outcome, audit, time.perf_counter() - began)
+        outcome, audit = self._execute_with_observers()
+        result = self._make_result(seed, outcome, audit, time.perf_counter() - start_time)
         problems = [self.recorder.problem]
         try:
             write_result(self.directory.result, result)
@@ -200,27 +207,27 @@ class Recording:
             ),
         )
 
-    def _execute_observed(self) -> tuple[RunEnded, Mapping[str, int] | None]:
-        """Execute the run with all observers attached, and close them afterwards."""
+    def _execute_with_observers(self) -> tuple[RunEnded, Mapping[str, int] | None]:
+        """Execute the run with all observers, close the observers, and return the end and the true counts."""
         run, completed = self.run, False
         observers: list[Observer] = [self._timeline, *self.views]
         try:
             for view in self.views:
                 view.open(run)
-                if self.remark:
-                    view.note(self.remark)
+                if self.start_message:
+                    view.note(self.start_message)
             for observer in observers:
                 run.add_observer(observer)
-            for event in self.past:
+            for timed in self.earlier_events:
                 for observer in observers:
-                    observer(event)
+                    observer(timed)
             run.add_recorder(self.recorder)
-            ended = run.execute(), run.count_ground_truth()
+            outcome = run.execute(), run.count_ground_truth()
             completed = True
         finally:
             with contextlib.ExitStack() as closing:
-                # After an exception, do not wait for the images.
+                # After an exception, do not wait for the pictures.
                 closing.callback(self.recorder.close, wait=completed)
                 for view in self.views:
                     closing.callback(view.close)
-        return ended
+        return outcome

@@ -6,18 +6,18 @@ from collections.abc import Callable, Iterable
 
 from executive.errors import Fault
 from executive.events import TimedEvent
-from executive.record.frames import PictureRecorder
 from executive.record.journal import Journal
+from executive.record.picture_recorder import PictureRecorder
 from executive.record.run_directory import RunDirectory
 from executive.record.trace import Trace
 
 
 class Recorder:
-    """Observer that passes events to the journal, the trace and the pictures of a run.
+    """Observer that passes events to the journal, the trace and the recorder of pictures.
 
     Args:
         directory: The run directory.
-        frames: True to save pictures.
+        saves_pictures: True to save pictures.
         resume: True to append to the journal of an interrupted run.
         journal: Class of the journal.
 
@@ -29,50 +29,50 @@ class Recorder:
         self,
         directory: RunDirectory,
         *,
-        frames: bool = True,
+        saves_pictures: bool = True,
         resume: bool = False,
         journal: Callable[..., Journal] = Journal,
     ) -> None:
         self._trace = Trace()
         self._journal = journal(directory.journal, resume=resume)
-        self._frames = PictureRecorder(directory.frames) if frames else None
+        self._pictures = PictureRecorder(directory.pictures) if saves_pictures else None
         self._problem = ""
 
     def __call__(self, timed: TimedEvent) -> None:
-        """Record an event; the trace, which cannot fail, gets the event first."""
+        """Record an event, in the trace first, because the trace cannot raise an exception."""
         self._trace(timed)
         self._journal(timed)
-        if self._frames is not None:
+        if self._pictures is not None:
             try:
-                self._frames(timed)
+                self._pictures(timed)
             except Exception as error:
-                # A run without pictures can still be explained.
+                # The run continues, because a record without pictures still explains the run.
                 self._problem = f"not every picture was drawn: {type(error).__name__}: {error}"
 
-    def remember(self, past: Iterable[TimedEvent]) -> None:
-        """Add the events of a resumed run, which the journal contains already, to the trace."""
-        for timed in past:
+    def add_to_trace(self, events: Iterable[TimedEvent]) -> None:
+        """Add the earlier events of a resumed run, which the journal contains already, to the trace."""
+        for timed in events:
             self._trace(timed)
 
     def close(self, *, wait: bool = True) -> None:
-        """Sync the journal and, if `wait` is True, finish the pictures; further calls have no effect.
+        """Sync the journal to the disk and, if `wait` is True, draw all queued pictures; may be called again.
 
-        Afterwards `problem` names the missing parts of the record.
+        Afterwards `problem` describes the missing parts of the record.
         """
         try:
             self._journal.close()
         except Fault as fault:
             self._problem = str(fault)
-        if self._frames is not None:
-            self._frames.close(wait=wait)
+        if self._pictures is not None:
+            self._pictures.close(wait=wait)
 
     @property
     def trace(self) -> str:
-        """Hash of all decisions so far."""
+        """Hash of all decisions up to now."""
         return self._trace.hexdigest()
 
     @property
     def problem(self) -> str:
-        """Missing parts of the record, in a sentence, or ""."""
-        pictures = "" if self._frames is None else self._frames.problem
+        """Message about the missing parts of the record, or ""."""
+        pictures = "" if self._pictures is None else self._pictures.problem
         return "; ".join(filter(None, (self._problem, pictures)))

@@ -1,4 +1,4 @@
-"""Replay of a recorded run from its recorded inputs, and comparison of the decisions."""
+"""ReplayResult of a recorded run from its recorded inputs, and comparison of the decisions."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from executive.skill import Skill
 
 
 @dataclass(frozen=True)
-class Replay:
+class ReplayResult:
     """Result of a replay.
 
     Attributes:
         decisions: Number of equal decisions.
         ticks: Number of control steps of the replay.
-        recorded: First recorded decision that the replay did not repeat, without messages, or None.
+        recorded: First recorded decision that the replay did not repeat, without its message, or None.
         replayed: First decision of the replay that differs from the record, or None.
-        edited: True if the mission is not the recorded one.
-        unanswered: Message of the question without a recorded answer that ended the replay, or "".
-        is_complete: True if the replay repeated the last control step of the record, too.
+        edited: True if the replayed mission differs from the recorded mission.
+        unanswered: Message about the input without a recorded value that ended the replay, or "".
+        is_complete: True if the replay repeated all recorded control steps.
     """
 
     decisions: int
@@ -51,90 +51,84 @@ class Replay:
     is_complete: bool = True
 
     @property
-    def same(self) -> bool:
+    def is_equal(self) -> bool:
         """True if all decisions are equal."""
         return self.recorded is None and self.replayed is None
 
     @property
     def difference(self) -> str:
-        """The first difference in words, or ""."""
-        if self.same:
+        """Message about the first difference, or ""."""
+        if self.is_equal:
             return ""
-        both = f"the record says {_describe(self.recorded)}, and now it is {_describe(self.replayed)}"
+        both = f"recorded: {_describe_decision(self.recorded)}; replayed: {_describe_decision(self.replayed)}"
         if not self.unanswered:
             return both
         return f"{both}: {self.unanswered}; only a run can show the consequences"
 
     def as_json(self) -> dict[str, JsonValue]:
-        """Return the attributes as JSON; a decision has its tick, clock, kind and the fields that are set."""
+        """Return the attributes as JSON; a decision has its tick, clock, kind and non-empty fields."""
         decisions = {"recorded": _as_json(self.recorded), "replayed": _as_json(self.replayed)}
         return {**vars(self), **decisions}
 
 
-def replay(
+def replay_run(
     path: Path, events: Iterable[TimedEvent], skills: Mapping[str, type[Skill]], mission: Path | None = None
-) -> Replay:
-    """Replay a recorded run and return the first decision that differs.
+) -> ReplayResult:
+    """Replay a recorded run with the installed skills, and compare its decisions with the journal.
 
-    Skills, tree and ledger are the present ones; the answers of arm, tool, camera, detectors and operator
-    come from the journal. The replay ends at the first difference.
+    The inputs from arm, tool, camera, detectors and operator come from the journal. The replay ends at the
+    first difference.
 
     Args:
         path: The run directory.
         events: Events of the journal.
         skills: Installed skills by name.
-        mission: Another mission file to replay, or None for the recorded mission. For another mission only
-            the decisions of skills and the states of items are compared.
+        mission: Mission file that replaces the recorded mission, or None. If the file differs, only the
+            decisions of skills and the states of items are compared.
 
     Raises:
-        InputError: The directory holds no run that can be replayed.
+        InputError: The directory contains no run that can be replayed.
     """
     log = InputLog.from_events(events)
     run = log.start
     if run is None or not log.inputs:
         raise InputError(
-            f'"{path}" holds no run that can be replayed: its journal holds no answers of a cell'
+            f'"{path}" contains no run that can be replayed: its journal contains no inputs of a run'
         )
     loaded = read_mission_of_run(path, run, skills, mission)
     edited = mission is not None and loaded.text != (path / "mission.yaml").read_text(encoding="utf-8")
-    return compare(loaded, skills, log, run.seed, edited=edited)
+    return compare_replay(loaded, skills, log, run.seed, edited=edited)
 
 
-def compare(
+def compare_replay(
     loaded: LoadedMission,
     skills: Mapping[str, type[Skill]],
     log: InputLog,
     seed: int,
     *,
     edited: bool = False,
-) -> Replay:
-    """Replay a log with a mission and return the first decision that differs."""
+) -> ReplayResult:
+    """Replay a log with a mission, and compare the decisions with the log."""
     comparison = _Comparison(log, edited)
     run = assemble_replay(loaded, skills, log, seed, observers=[comparison])
     comparison.run = run
     run.execute()
-    comparison.end()
-    recorded, replayed = comparison.difference
-    return Replay(
-        comparison.same,
-        run.tick,
-        recorded,
-        replayed,
-        edited,
-        comparison.unanswered,
-        comparison.is_complete,
-    )
+    comparison.compare_end()
+    return ReplayResult(
+        comparison.equal_count, run.tick, *comparison.difference, edited,
+        comparison.unanswered, comparison.is_complete,
+    )  # fmt: skip
 
 
 class _Comparison:
-    """Observer that compares decisions with the recorded ones.
+    """Observer that compares the decisions of a replay with the recorded decisions.
 
     Attributes:
-        same: Number of equal decisions.
-        difference: The first recorded decision that differs, and the new one; None if there is none.
-        unanswered: Message of a question without a recorded answer before the first difference, or "".
-        is_complete: True if the replay repeated all recorded decisions and had no others in these steps.
-        run: The replay; it is stopped at the first difference.
+        equal_count: Number of equal decisions.
+        difference: First recorded decision and first replayed decision that differ; None where none differs.
+        unanswered: Message about an input without a recorded value before the first difference, or "".
+        is_complete: True if the replay made the recorded decisions, and no others in these control steps.
+        run: Run of the replay, which is stopped at the first difference.
     """
 
     run: ResumedRun
@@ -142,11 +136,11 @@ class _Comparison:
     def __init__(self, log: InputLog, edited: bool) -> None:
         self._log = log
         self._edited = edited
-        self._recorded = [d for timed in log.events if (d := _decision(timed, edited))]
+        self._recorded = [found for timed in log.events if (found := _to_decision(timed, edited))]
         # The last control step of an interrupted run may be incomplete.
         self._has_ended = any(isinstance(timed.event, RunEnded) for timed in log.events)
         self._is_over = False
-        self.same = 0
+        self.equal_count = 0
         self.difference: tuple[TimedEvent | None, TimedEvent | None] = (None, None)
         self.unanswered = ""
         self.is_complete = True
@@ -154,38 +148,40 @@ class _Comparison:
     def __call__(self, timed: TimedEvent) -> None:
         if self._is_over:
             return
-        decision = _decision(timed, self._edited)
+        decision = _to_decision(timed, self._edited)
         if decision is None:
             return
-        recorded = self._recorded[self.same] if self.same < len(self._recorded) else None
+        recorded = self._recorded[self.equal_count] if self.equal_count < len(self._recorded) else None
         if recorded == decision:
-            self.same += 1
+            self.equal_count += 1
             return
         self._is_over, self.unanswered = True, self.run.replayed_cell.missing_input_message
         # After the last recorded control step, the replay only halts.
         self.is_complete = decision.tick > self._log.last_tick
-        if self._has_ended or self._counts(decision) or (recorded is not None and self._counts(recorded)):
+        if self._has_ended or any(map(self._is_complete, filter(None, (recorded, decision)))):
             self.difference = (recorded, decision)
         self.run.control.stop()
 
-    def end(self) -> None:
-        """Compare the end of the replay with the end of the record."""
-        if self._is_over or self.same == len(self._recorded):
+    def compare_end(self) -> None:
+        """Compare the end of the replay with the end of the record; called after the replay."""
+        if self._is_over or self.equal_count == len(self._recorded):
             return
         self.is_complete = False
-        if self._counts(self._recorded[self.same]):
-            self.difference = (self._recorded[self.same], None)
+        next_decision = self._recorded[self.equal_count]
+        if self._is_complete(next_decision):
+            self.difference = (next_decision, None)
             self.unanswered = self.run.replayed_cell.missing_input_message
 
-    def _counts(self, decision: TimedEvent) -> bool:
-        """Return True if the control step of a decision is complete in the record."""
+    def _is_complete(self, decision: TimedEvent) -> bool:
+        """Return True if the record contains all events of the control step of a decision."""
         return decision.tick < self._log.last_tick
 
 
-def _decision(timed: TimedEvent, edited: bool) -> TimedEvent | None:
-    """Return an event without the fields that are not compared, or None if it is no decision.
+def _to_decision(timed: TimedEvent, edited: bool) -> TimedEvent | None:
+    """Return an event without the fields that are not compared, or None if the event is no decision.
 
-    Messages are not compared, because their wording may change.
+    In an edited mission, control nodes make no decisions. Messages are not compared, because their wording
+    may change.
     """
     event = timed.event
     match event:
@@ -217,10 +213,10 @@ def _as_json(decision: TimedEvent | None) -> dict[str, JsonValue] | None:
     }  # fmt: skip
 
 
-def _describe(decision: TimedEvent | None) -> str:
-    """Return a decision in words."""
+def _describe_decision(decision: TimedEvent | None) -> str:
+    """Return kind, time and fields of a decision as text."""
     if decision is None:
-        return "nothing more"
+        return "no further decision"
     event = decision.event
     shown = {key: value for key, value in vars(event).items() if value and key not in ("outputs", "skill")}
     values = ", ".join(f"{key} {value}" for key, value in shown.items())

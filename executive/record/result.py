@@ -35,7 +35,7 @@ MISTAKES = {
 EXIT_CODES = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "INCOMPLETE": 4, "HALTED": 130}
 """Exit code by the status of the run, unless the audit disagrees (`exit_code`)."""
 
-ENDED = ("SUCCESS", "FAILURE")
+FINAL_STATUSES = ("SUCCESS", "FAILURE")
 """Status of a run that cannot be resumed: its tree has ended, and nothing was rejected."""
 
 

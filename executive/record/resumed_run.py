@@ -15,8 +15,8 @@ from executive.record.journal import find_end, find_start, read_journal
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import Recording, RecordOptions
 from executive.record.recorder import Recorder
-from executive.record.replay import compare
-from executive.record.result import ENDED, Result, read_result
+from executive.record.replay import compare_replay
+from executive.record.result import FINAL_STATUSES, Result, read_result
 from executive.record.run_directory import RunDirectory
 from executive.replay.input_log import UNKNOWN_ACTION, InputLog
 from executive.replay.replayed_cell import ReplayedCell
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from executive.run.assembly import RunOptions
     from executive.skill import Skill
 
-NOT_REPEATED = (RunStarted, MotionPlanned, RequestGiven)
+UNREPEATED_EVENTS = (RunStarted, MotionPlanned, RequestGiven)
 """Kinds of events that a replay does not repeat."""
 
 
@@ -35,18 +35,16 @@ def resume_run(
     options: RunOptions,
     record: RecordOptions,
 ) -> Result:
-    """Resume the run in a directory, and return the result object.
+    """Resume the run in a directory, and return its result.
 
-    First, the journal is replayed up to the interruption, which restores the tree, the variables and the
-    ledger; a simulated world is rebuilt from its log, with the arm braking. After the interruption, the
-    sensor of the tool decides whether the tool holds its item, all positions on the table are invalid until
-    the next look, and each interrupted skill is restarted.
+    The replay of the journal up to the interruption restores the tree, the variables and the ledger; a
+    simulated world is rebuilt from its log, with the arm braking. Then the sensor of the tool determines
+    whether the tool holds its item, the positions of all items on the table are invalid until the next look
+    (image with its detections), and each interrupted skill is restarted.
 
-    For a run that ended as INCOMPLETE, the tree is restarted, and rejected and skipped items are searched
-    everywhere; placed items stay placed and counted. For a run that ended as SUCCESS or FAILURE without a
-    result file, the result is written.
-
-    If the journal lacks actions of the world, the scene is observed before the run continues.
+    If the run ended as INCOMPLETE, the tree is restarted, and rejected and skipped items are searched again;
+    placed items stay placed. If the run ended as SUCCESS or FAILURE without a result file, the result is
+    written. If the journal lacks commands to arm or tool, the scene is observed before the run continues.
 
     Args:
         path: The run directory.
@@ -55,39 +53,34 @@ def resume_run(
         record: Options of the record.
 
     Raises:
-        InputError: The run is being executed, has a result of SUCCESS or FAILURE, or has an incomplete
-            record, or the installed skills decide differently.
+        InputError: Another process executes the run, the run has a result of SUCCESS or FAILURE, the record
+            is incomplete, or the replay differs from the record.
         ExecutiveError: The result cannot be written.
     """
     from executive.run.assembly import assemble_resumed
 
-    began = time.perf_counter()
+    start_time = time.perf_counter()
     directory = RunDirectory(path)
     # The recorder locks the journal, so that no other process writes to the directory.
-    recorder = Recorder(directory, frames=record.frames, resume=True)
+    recorder = Recorder(directory, saves_pictures=record.saves_pictures, resume=True)
     try:
         events = read_journal(directory.journal)
         log, start = InputLog.from_events(events), find_start(events, path, "run the mission again")
         has_ended, seed = _has_ended(directory, events), start.seed
         loaded = read_mission_of_run(path, start, skills)
         # The control step of a halt or fault is not compared, so that a corrected skill can repeat the step.
-        certain = log if log.halt is None else log.select_before(log.halt.tick)
-        replay = compare(loaded, skills, certain, seed)
-        if not replay.same:
+        comparable = log if log.halt is None else log.select_before(log.halt.tick)
+        replay = compare_replay(loaded, skills, comparable, seed)
+        if not replay.is_equal:
             raise InputError(
                 f'the run in "{path}" cannot be resumed: {replay.difference}. The executive or a '
-                "skill has been changed since; go back to what it was run with, or run the mission again"
+                "skill has changed since the run; install the earlier version, or run the mission again"
             )
         options = replace(options, seed=seed, requests=start.requests, scene=directory.scene)
         run = assemble_resumed(
-            loaded,
-            skills,
-            options,
-            log,
-            directory.world,
-            is_complete=replay.is_complete,
-            has_ended=has_ended,
-        )
+            loaded, skills, options, log, directory.world_log,
+            is_complete=replay.is_complete, has_ended=has_ended,
+        )  # fmt: skip
     except BaseException:
         recorder.close(wait=False)
         raise
@@ -95,19 +88,19 @@ def resume_run(
         if record.paused:
             run.control.pause()
         replayed = run.replayed_cell.log
-        recorder.remember(replayed.events)
-        past = [timed for timed in replayed.events if isinstance(timed.event, NOT_REPEATED)]
+        recorder.add_to_trace(replayed.events)
+        earlier = [timed for timed in replayed.events if isinstance(timed.event, UNREPEATED_EVENTS)]
         recording = Recording(
-            run, loaded, skills, directory, recorder, record.views, past, _describe_gap(run.replayed_cell)
+            run, loaded, skills, directory, recorder, record.views, earlier, _describe_gap(run.replayed_cell)
         )
-        return recording.execute(seed, began)
+        return recording.execute(seed, start_time)
 
 
 def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
-    """Return True if a run has ended as SUCCESS or FAILURE without a result file.
+    """Return True if a run ended as SUCCESS or FAILURE without a result file.
 
     Raises:
-        InputError: The run cannot be resumed.
+        InputError: The end of the run prevents a resumption.
     """
     end = find_end(events)
     if end is None:
@@ -115,22 +108,20 @@ def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
     if end.status == "INCOMPLETE" and end.holds:
         raise InputError(
             f'the run in "{directory.path}" ended with {end.holds} in the tool and cannot be '
-            "resumed; take it out and run the mission again"
+            "resumed; take it out of the tool and run the mission again"
         )
-    if end.status in ENDED and read_result(directory, events) is not None:
-        raise InputError(
-            f'the run in "{directory.path}" came to its end: {end.status}; there is nothing to resume'
-        )
-    return end.status in ENDED
+    if end.status in FINAL_STATUSES and read_result(directory, events) is not None:
+        raise InputError(f'the run in "{directory.path}" ended as {end.status}; there is nothing to resume')
+    return end.status in FINAL_STATUSES
 
 
 def _describe_gap(replayed: ReplayedCell) -> str:
-    """Return a warning if the journal lacks actions of the tool, else ""."""
+    """Return a warning if the journal may lack commands to arm or tool, else ""."""
     last = replayed.last_interruption
     if last is None or last.last_action != UNKNOWN_ACTION:
         return ""
-    steps = last.resume_tick - last.complete_step_count
+    count = last.resume_tick - last.complete_step_count
     return (
-        f"the journal ends {steps} control steps ({steps * replayed.log.control_period:.2f} s) before the log of the "
-        "world, so actions of the tool are unknown; the whole scene is observed before the run continues"
+        f"the journal ends {count} control steps ({count * replayed.log.control_period:.2f} s) before the "
+        "log of the world and may lack commands to the tool; the scene is observed before the run continues"
     )

@@ -30,21 +30,21 @@ class RunDirectory:
     Attributes:
         path: `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_<mission>_s<seed>`.
         journal: File with the recorded events, one JSON object per line.
-        world: File from which the last state of a simulated world can be rebuilt.
+        world_log: File from which the last state of a simulated world can be rebuilt.
         tree: File with the outline of the built tree.
         report: HTML page that explains the run.
         result: File with the output of `executive run --json`.
-        frames: Folder with pictures of selections and failures.
+        pictures: Folder with pictures of selections and failures.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.journal = path / "journal.jsonl"
-        self.world = path / "world.log"
+        self.world_log = path / "world.log"
         self.tree = path / "tree.json"
         self.report = path / "report.html"
         self.result = path / "result.json"
-        self.frames = path / "frames"
+        self.pictures = path / "frames"
 
     @property
     def scene(self) -> Path | None:
@@ -95,7 +95,7 @@ class RunDirectory:
             # Libraries are written first and must not replace files of the record.
             for reference, text in (libraries or {}).items():
                 library = self.path / reference
-                if library not in (self.journal, self.result) and self.frames not in library.parents:
+                if library not in (self.journal, self.result) and self.pictures not in library.parents:
                     library.parent.mkdir(parents=True, exist_ok=True)
                     write_atomically(library, text)
             write_atomically(self.path / "mission.yaml", mission)

@@ -24,7 +24,7 @@ from executive.errors import ExecutiveError, InputError
 from executive.events import NodeEnded, RunResumed, TimedEvent
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replay import compare, replay
+from executive.record.replay import compare_replay, replay_run
 from executive.record.result import Result, disagreement
 from executive.record.resumed_run import resume_run
 from executive.record.run_directory import LATEST, RunDirectory, find_run
@@ -86,7 +86,7 @@ class Snapshots(StopAtFirstTick):
     def __call__(self, timed: TimedEvent) -> None:
         if isinstance(timed.event, NodeEnded) and timed.event.skill:
             directory = RunDirectory(find_run(LATEST, self.runs))
-            world = directory.world
+            world = directory.world_log
             self.worlds.append(world.stat().st_size if is_log(world) else world.read_bytes())
             self.lengths.append(directory.journal.stat().st_size)
 
@@ -184,13 +184,13 @@ def _report(path: Path) -> None:
 
 
 def _replay(subject: Subject, path: Path) -> None:
-    if difference := replay(path, read_journal(path / "journal.jsonl"), subject.skills).difference:
+    if difference := replay_run(path, read_journal(path / "journal.jsonl"), subject.skills).difference:
         raise SystemExit(_tell(1, difference))
 
 
 def _resume_to_first_tick(subject: Subject, path: Path) -> None:
     options = RunOptions(subject.seed, kind=subject.kind)
-    resume_run(path, subject.skills, options, RecordOptions([StopAtFirstTick()], frames=False))
+    resume_run(path, subject.skills, options, RecordOptions([StopAtFirstTick()], saves_pictures=False))
 
 
 def _film_first_picture(path: Path) -> None:
@@ -247,13 +247,13 @@ def _resume(subject: Subject, path: Path, case: str) -> Figures:
     def resume() -> Figures:
         options = RunOptions(subject.seed, kind=subject.kind)
         try:
-            result = resume_run(path, subject.skills, options, RecordOptions(frames=False))
+            result = resume_run(path, subject.skills, options, RecordOptions(saves_pictures=False))
         except InputError as error:
             has_begun = "had not begun" not in str(error)
             return {"agrees": True, "status": "refused", "problems": [str(error)] if has_begun else []}
         after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = find_wrong_claims(result)
-        if difference := compare(subject.loaded, subject.skills, after, result.seed).difference:
+        if difference := compare_replay(subject.loaded, subject.skills, after, result.seed).difference:
             problems.append(f"the replay differs: {difference}")
         return {"agrees": not disagreement(result), "status": result.status, "problems": problems}
 

@@ -275,7 +275,7 @@ def _run_in_this_process(
     loaded = load_mission(mission, skills, {}, cell_kind)
     maker = AuditedCellMaker(detectors)
     options = RunOptions(seed, kind=maker, scene=scene)
-    result = record_run(loaded, skills, options, runs, RecordOptions(frames=False))
+    result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))
     reports = read_reports(Path(result.run) / "journal.jsonl")
     objects = tuple(
         replace(one, reports=tuple(reports[item] for item in one.items if item in reports))

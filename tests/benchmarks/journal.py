@@ -27,7 +27,7 @@ def measure(subject: Subject, runs: Path) -> Figures:
     options = RunOptions(subject.seed, subject.requests, kind=subject.kind)
     run = assemble(subject.loaded, subject.skills, options)
     with closing(run), tempfile.TemporaryDirectory(prefix=".journal-", dir=runs) as folder:
-        with closing(Recorder(RunDirectory(Path(folder)), frames=False)) as recorder:
+        with closing(Recorder(RunDirectory(Path(folder)), saves_pictures=False)) as recorder:
 
             def record(event: Event) -> None:
                 received = time.perf_counter()

@@ -27,7 +27,7 @@ from executive.plugins import cell_kind
 from executive.record.journal import find_end, read_journal
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
-from executive.record.replay import compare
+from executive.record.replay import compare_replay
 from executive.record.result import Result, disagreement
 from executive.record.resumed_run import resume_run
 from executive.record.run_directory import LATEST, find_run
@@ -121,10 +121,10 @@ def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> F
     def resume() -> Figures:
         done = change_world(subject, seed, path, past, change) if change else ""
         options = RunOptions(seed, kind=subject.kind)
-        result = resume_run(path, subject.skills, options, RecordOptions(frames=False))
+        result = resume_run(path, subject.skills, options, RecordOptions(saves_pictures=False))
         after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = [*check_result(result, change_made=done), *find_handled_twice(after.events)]
-        difference = compare(subject.loaded, subject.skills, after, seed).difference
+        difference = compare_replay(subject.loaded, subject.skills, after, seed).difference
         if difference:
             problems.append(f"the replay differs: {difference}")
         ending = f"{result.status} {result.reason}".strip()

@@ -80,7 +80,7 @@ def measure_changes(nodes: int, blocks: int, folder: Path) -> Figures:
     events: list[Event] = []
     build_ours(nodes, _SucceedAtOnce, events.append).tick_once()
     folder.mkdir()
-    with closing(Recorder(RunDirectory(folder), frames=False)) as recorder:
+    with closing(Recorder(RunDirectory(folder), saves_pictures=False)) as recorder:
         ours, bare = build_ours(nodes, _SucceedAtOnce, recorder), build_bare(nodes, Status.SUCCESS)
         ours_us, bare_us = find_best_costs(ours, bare, blocks, max(1, NODE_RUNS_PER_BLOCK // nodes))
     row = {"changes": len(events), "nodes": nodes, "ours_us": ours_us, "py_trees_us": bare_us}

@@ -116,7 +116,7 @@ def run_crowded(
     skills = discover()
     loaded = load_mission(mission, skills, kinds=cell_kind)
     options = RunOptions(1, keyboard=False, kind=kind)
-    result = record_run(loaded, skills, options, runs, RecordOptions(frames=False))
+    result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))
     return result, (Path(result.run) / "journal.jsonl").read_text()
 
 

@@ -8,8 +8,8 @@ import pytest
 from events import at, run_ended
 
 from executive.events import NodeStarted
-from executive.record.frames import PictureRecorder
 from executive.record.journal import read_journal
+from executive.record.picture_recorder import PictureRecorder
 from executive.record.recorder import Recorder
 from executive.record.run_directory import RunDirectory
 

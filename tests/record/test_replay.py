@@ -21,7 +21,7 @@ from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replay import Replay, compare, replay
+from executive.record.replay import ReplayResult, compare_replay, replay_run
 from executive.record.run_directory import find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
@@ -37,12 +37,12 @@ def recorded(missions: Path, runs: Path, name: str, kind: Any = FakeCell) -> Pat
     loaded = load_mission(missions / f"{name}.yaml", discover())
     requests = [*loaded.routes] * 4
     options = RunOptions(3, requests, kind=kind)
-    record_run(loaded, discover(), options, runs, RecordOptions(frames=False))
+    record_run(loaded, discover(), options, runs, RecordOptions(saves_pictures=False))
     return find_run("latest", runs)
 
 
-def again(path: Path, mission: Path | None = None) -> Replay:
-    return replay(path, read_journal(path / "journal.jsonl"), discover(), mission)
+def again(path: Path, mission: Path | None = None) -> ReplayResult:
+    return replay_run(path, read_journal(path / "journal.jsonl"), discover(), mission)
 
 
 @pytest.mark.parametrize(
@@ -50,14 +50,14 @@ def again(path: Path, mission: Path | None = None) -> Replay:
 )
 def test_the_same_mission_decides_the_same(missions: Path, tmp_path: Path, name: str) -> None:
     done = again(recorded(missions, tmp_path, name))
-    assert (done.same, done.difference) == (True, "")
+    assert (done.is_equal, done.difference) == (True, "")
     assert done.decisions > 100
 
 
 @pytest.mark.slow
 def test_so_it_does_without_the_simulator(missions: Path, tmp_path: Path) -> None:
     done = again(recorded(missions, tmp_path, "sort_wrist", kind=make_oracle_kind()))
-    assert (done.same, done.edited) == (True, False)
+    assert (done.is_equal, done.edited) == (True, False)
 
 
 def edited(path: Path, old: str, new: str) -> Path:
@@ -79,15 +79,15 @@ def test_the_first_decision_of_an_edited_mission_that_differs_is_told(missions: 
         for each in (done.recorded, done.replayed)
     )
     assert done.recorded.event.item != done.replayed.event.item
-    assert done.difference == f"the record says {before}, and now it is {now}"
+    assert done.difference == f"recorded: {before}; replayed: {now}"
 
 
 def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     file, skills = missions / "sort_overhead.yaml", discover()
     four_times = [during("*/Grasp", seal_fails(), nth=(1, 2, 3, 4))]
     log = InputLog.from_events(run_mission(file, seed=3, faults=four_times).events)
-    assert compare(load_mission(file, skills), skills, log, 3).same
-    done = compare(load_mission(file, skills, {"attempts": "2"}), skills, log, 3, edited=True)
+    assert compare_replay(load_mission(file, skills), skills, log, 3).same
+    done = compare_replay(load_mission(file, skills, {"attempts": "2"}), skills, log, 3, edited=True)
     assert done.replayed.event.node == "RejectTarget"
 
 
@@ -103,8 +103,8 @@ def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Pat
 
 
 def test_a_directory_without_answers_cannot_be_replayed(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no run that can be replayed: its journal holds no answers"):
-        replay(tmp_path, [], discover())
+    with pytest.raises(InputError, match="can be replayed: its journal contains no inputs"):
+        replay_run(tmp_path, [], discover())
 
 
 def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missions: Path) -> None:
@@ -115,6 +115,6 @@ def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missi
     decided = NodeStarted | NodeEnded | BranchChosen | TargetSelected | ItemChanged | ToolCommanded
     without = [one for n, one in enumerate(cut) if n < missing or not isinstance(one.event, decided)]
     loaded = load_mission(file, skills)
-    assert compare(loaded, skills, InputLog.from_events(cut), 3).same
-    done = compare(loaded, skills, InputLog.from_events(without), 3)
+    assert compare_replay(loaded, skills, InputLog.from_events(cut), 3).same
+    done = compare_replay(loaded, skills, InputLog.from_events(without), 3)
     assert (done.recorded, done.replayed and type(done.replayed.event)) == (None, ToolCommanded)

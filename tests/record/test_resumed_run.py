@@ -29,7 +29,7 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replay import replay
+from executive.record.replay import replay_run
 from executive.record.result import Result
 from executive.record.resumed_run import resume_run
 from executive.record.run_directory import find_run
@@ -77,7 +77,7 @@ def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> Result:
     skills, views = options.pop("skills", discover()), options.pop("views", ())
     frames = options.pop("frames", False)
     run = RunOptions(SEED, [*loaded.routes] * 4, **{"kind": FakeCell, **options})
-    return record_run(loaded, skills, run, runs, RecordOptions(views, frames=frames))
+    return record_run(loaded, skills, run, runs, RecordOptions(views, saves_pictures=frames))
 
 
 def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
@@ -90,12 +90,12 @@ def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
 def resumed(path: Path, **options: Any) -> Result:
     skills, views = options.pop("skills", discover()), options.pop("views", ())
     run = RunOptions(SEED, **{"kind": FakeCell, **options})
-    return resume_run(path, skills, run, RecordOptions(views, frames=False))
+    return resume_run(path, skills, run, RecordOptions(views, saves_pictures=False))
 
 
 def redecided(path: Path) -> str:
     """Decide the whole run once more, its cuts included, and return what differs."""
-    return replay(path, read_journal(path / "journal.jsonl"), discover()).difference
+    return replay_run(path, read_journal(path / "journal.jsonl"), discover()).difference
 
 
 def placed(path: Path) -> Counter[str]:
@@ -234,7 +234,7 @@ def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(missions: Path, tm
 
 def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> None:
     path = Path(run_of(load(missions, "sort_overhead"), tmp_path).run)
-    with pytest.raises(InputError, match=r"came to its end: SUCCESS; there is nothing to resume"):
+    with pytest.raises(InputError, match=r"ended as SUCCESS; there is nothing to resume"):
         resumed(path)
     (path / "journal.jsonl").write_text("")
     with pytest.raises(InputError, match=r"had not begun when it was cut off; run the mission again"):
@@ -326,7 +326,7 @@ def test_a_mission_that_is_decided_otherwise_now_is_not_gone_on_with(missions: P
     old, new = "try: {SelectTarget: {prefer: surest}}", "try: SelectTarget"
     assert old in file.read_text()
     file.write_text(file.read_text().replace(old, new))
-    with pytest.raises(InputError, match=r"cannot be resumed: the record says at .* and now it is"):
+    with pytest.raises(InputError, match=r"cannot be resumed: recorded: at .*; replayed: "):
         resumed(path)
 
 
@@ -358,7 +358,7 @@ def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> Non
     assert result.audit.agrees
     assert set(placed(path).values()) == {1}
     assert redecided(path) == ""
-    with pytest.raises(InputError, match="came to its end: SUCCESS"):
+    with pytest.raises(InputError, match="ended as SUCCESS"):
         resumed(path)
 
 

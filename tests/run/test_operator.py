@@ -16,7 +16,7 @@ from executive.errors import InputError, Stopped
 from executive.events import Event, NodeEnded, NodeStarted, OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.replay import compare
+from executive.record.replay import compare_replay
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions, assemble
 from executive.run.operator import ScriptedOperator, TerminalOperator, parse_request
@@ -139,7 +139,7 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
     ends = {one.event.status for one in events if isinstance(one.event, NodeEnded)}
     assert ends == {"INVALID"}, "nothing failed, and nobody quit"
-    again = compare(loaded, discover(), InputLog.from_events(events), 1)
+    again = compare_replay(loaded, discover(), InputLog.from_events(events), 1)
     assert again.difference == ""
     assert again.decisions == sum(isinstance(one.event, NodeStarted | NodeEnded) for one in events) > 0
 

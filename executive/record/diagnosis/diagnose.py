@@ -14,8 +14,8 @@ from executive.mission.model.paths import name_of
 from executive.record.diagnosis.advice import give_advice
 from executive.record.diagnosis.case import FailedRun, verdict
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
-from executive.record.frames import find_picture
-from executive.record.result import ENDED
+from executive.record.picture_recorder import find_picture
+from executive.record.result import FINAL_STATUSES
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.activation import Reading, skill_name
 from executive.record.timeline.items import ItemTimeline, Look, Sighting
@@ -87,7 +87,7 @@ def diagnose(
         holds=end.holds,
         raised_at=_place_of_exception(timeline.traceback),
         recorded=not case.is_unrecorded,
-        resumes=end.status not in ENDED and (not case.is_unrecorded or has_begun),
+        resumes=end.status not in FINAL_STATUSES and (not case.is_unrecorded or has_begun),
         picture=_picture(case, run),
         next=list(give_advice(case, arm, reads)),
     )

@@ -39,7 +39,7 @@ def write_film(
         progress: Callback that receives the number of complete frames and the number of all frames.
     """
     steps_per_frame = speed / format.frame_rate / source.start.step
-    steps = select_steps(count_steps(source.directory.world), steps_per_frame)
+    steps = select_steps(count_steps(source.directory.world_log), steps_per_frame)
     end_frame_count = round(END_DURATION * format.frame_rate)
 
     def report_frames() -> Generator[Image.Image, None, None]:
@@ -66,9 +66,9 @@ def _draw_frames(
     speed_text = f" · {speed:g}x speed" if speed != 1 else ""
     subtitle = f"seed {start.seed} · cell {source.config.cell}{speed_text}"
     duration = steps[-1] * start.step
-    state = FilmRunState(source.events, source.nodes, list(directory.frames.glob("*.jpg")))
+    state = FilmRunState(source.events, source.nodes, list(directory.pictures.glob("*.jpg")))
     view = overview(source.config, SCENE_SIZE, CELL_BOX)
-    shoot = Shoot(source.config, start.seed, directory.world, view, directory.scene)
+    shoot = Shoot(source.config, start.seed, directory.world_log, view, directory.scene)
     with closing(take_pictures(shoot, steps, workers)) as pictures:
         for step, picture in zip(steps, pictures, strict=True):
             state.advance_to(step, step * start.step)

@@ -55,13 +55,13 @@ def _require_log(directory: RunDirectory) -> None:
     Raises:
         InputError: The record does not contain the log.
     """
-    if not directory.world.exists():
+    if not directory.world_log.exists():
         raise InputError(
             f'the run in "{directory.path}" cannot be filmed: it has no world.log, from which its world is '
             "simulated again; sweeps do not keep this file. Run the mission again with `executive run` and "
             "the same seed, and film that run"
         )
-    if not is_log(directory.world):
+    if not is_log(directory.world_log):
         raise InputError(
             f'the run in "{directory.path}" cannot be filmed: its cell has no simulated world; '
             "film a run on a cell of `kind: sim`"

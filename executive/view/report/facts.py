@@ -9,7 +9,7 @@ from executive.mission.text.files import shipped_folder
 from executive.record.diagnosis.text import resume_command
 from executive.record.journal import find_end, find_start, read_journal
 from executive.record.recorded_mission import read_tree
-from executive.record.result import ENDED, list_requests, read_result
+from executive.record.result import FINAL_STATUSES, list_requests, read_result
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
 from executive.view.report.pictures import collect_pictures
@@ -59,11 +59,11 @@ class ReportFacts:
         items = self.timeline.items.now()
         self.objects = [item for item in items if item.state != "phantom"]
         self.shares = compute_shares(self.timeline, self.nodes)
-        self.pictures = collect_pictures(directory.frames, [item.item for item in items])
+        self.pictures = collect_pictures(directory.pictures, [item.item for item in items])
         self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
         mission = file.stem if file.parent == shipped_folder() else str(file)
         origin = mission, self.start.seed, self.start.overrides
         self.repeat = repeat_command(*origin, self.requests, directory.scene)
-        self.resume = "" if self.status in ENDED else resume_command(str(path))
+        self.resume = "" if self.status in FINAL_STATUSES else resume_command(str(path))
         self.replay = shlex.join(["executive", "replay", str(path)])

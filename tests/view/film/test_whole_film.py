@@ -65,7 +65,7 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
     world = first_world(source.config, source.start.seed)
     tool = SuctionTool(world, source.config.tool)
     rebuilding, holds = Rebuilding(world, tool), [False]
-    for command in read_commands(filmed_run.world):
+    for command in read_commands(filmed_run.world_log):
         rebuilding.do(command)
         if command.kind == STEP:
             holds.append(tool.holding)
@@ -78,7 +78,7 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
     assert holds[grasped]
     assert not any(holds[: closed + 1])
     # The last thing that the journal tells of happened after the last step.
-    assert events[-1].tick == count_steps(filmed_run.world) == len(holds) - 1
+    assert events[-1].tick == count_steps(filmed_run.world_log) == len(holds) - 1
 
 
 def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None:

@@ -45,7 +45,7 @@ def test_a_run_that_ended_is_told_by_its_result(failed):
 def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
     run = copy(killed)
     assert ReportFacts(run).status == CUT_OFF
-    resume_run(run, discover(), RunOptions(3, kind=FakeCell), RecordOptions(frames=False))
+    resume_run(run, discover(), RunOptions(3, kind=FakeCell), RecordOptions(saves_pictures=False))
     facts = ReportFacts(run)
     assert (facts.status, facts.resume) == ("SUCCESS", "")
     transits = [one for one in facts.timeline.activations if one.node.endswith("/Transit")]

@@ -12,8 +12,8 @@ from events import at, detected, frame_searched, item_changed, run_started, skil
 from executive.cell.frame import Frame, FrameTaken
 from executive.events import DetectedObject, NodeEnded, TargetSelected, TimedEvent
 from executive.geometry import Pose
-from executive.record import frames as module
-from executive.record.frames import MAX_LOOKS, PictureRecorder, find_picture
+from executive.record import picture_recorder as module
+from executive.record.picture_recorder import MAX_LOOKS, PictureRecorder, find_picture
 from executive.record.pictures.drawer import Drawer
 
 CUBE = detected("cube")
