@@ -29,7 +29,7 @@ from executive.mission.schema.files import mission_schema
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml, plain
 from executive.plugins import cell_kind, discover
-from executive.record.result import EXIT_CODES
+from executive.record.result import EXIT_CODE_BY_STATUS
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
 from executive.tree.registry import load_control_nodes
@@ -133,7 +133,7 @@ def test_the_reference_of_missions_is_that_of_the_code() -> None:
 
 def test_the_reference_names_every_exit_code() -> None:
     exit_codes = read("missions/reference.md").partition("## Exit codes\n")[2]
-    assert {int(code) for code in re.findall(r"\d+", exit_codes)} == {2, *EXIT_CODES.values()}
+    assert {int(code) for code in re.findall(r"\d+", exit_codes)} == {2, *EXIT_CODE_BY_STATUS.values()}
 
 
 @pytest.mark.parametrize(("guide", "limit"), [("README.md", 8_000), (TUTORIAL, 20_000)])

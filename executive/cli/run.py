@@ -82,7 +82,7 @@ def command(
         from executive.record.diagnosis.text import diagnosis_lines
         from executive.record.guarded_view import GuardedView
         from executive.record.recorded_run import RecordOptions
-        from executive.record.result import disagreement, exit_code
+        from executive.record.result import describe_disagreement, find_exit_code
         from executive.record.run_directory import RunDirectory
         from executive.run.assembly import RunOptions
         from executive.view.report.page import leave_report
@@ -119,12 +119,12 @@ def command(
             )
         elif result.story is not None:
             click.echo("\n".join(diagnosis_lines(result.story, result.run, repeat, report)), err=True)
-        elif result.status == "INCOMPLETE" or disagreement(result):
+        elif result.status == "INCOMPLETE" or describe_disagreement(result):
             ended = verdict(result.status, result.reason, result.node, result.message)
-            click.echo("\n".join(filter(None, (disagreement(result), ended))), err=True)
+            click.echo("\n".join(filter(None, (describe_disagreement(result), ended))), err=True)
     if as_json:
         print_json(plain(result))
-    ctx.exit(exit_code(result))
+    ctx.exit(find_exit_code(result))
 
 
 def _run_mission(

@@ -23,11 +23,11 @@ def command(cell: bool, library: bool, journal: bool) -> None:
         from executive.mission.schema.files import library_schema, mission_schema
         from executive.mission.schema.types import cell_schema
         from executive.plugins import discover
-        from executive.record.journal_format import journal_schema
+        from executive.record.journal_format import make_journal_schema
         from executive.tree.registry import load_control_nodes
 
         if cell or journal:
-            schema = cell_schema() if cell else journal_schema()
+            schema = cell_schema() if cell else make_journal_schema()
         else:
             schema = (library_schema if library else mission_schema)(discover(), load_control_nodes())
     print_json(schema)

@@ -1,4 +1,4 @@
-"""Atomic writing of files: an interruption leaves the old content or the new content."""
+"""Atomic writing of files: after an interruption, a file has its old content or its new content."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from pathlib import Path
 
 
 @contextlib.contextmanager
-def atomic_replacement(path: Path) -> Iterator[Path]:
-    """Yield a temporary file; it replaces `path` after the block, or is removed after an exception.
+def replace_atomically(path: Path) -> Iterator[Path]:
+    """Yield a temporary file that replaces `path` after the `with` block, or is removed after an exception.
 
     Raises:
         OSError: The file cannot be written; `path` is unchanged.
     """
-    part = path.with_name(f".{path.name}.part")
+    temporary = path.with_name(f".{path.name}.part")
     try:
-        part.touch()
-        yield part
-        part.replace(path)
+        temporary.touch()
+        yield temporary
+        temporary.replace(path)
     except BaseException:
         with contextlib.suppress(OSError):
-            part.unlink()
+            temporary.unlink()
         raise
 
 
@@ -32,7 +32,7 @@ def write_atomically(path: Path, text: str) -> None:
     Raises:
         OSError: The file cannot be written; `path` is unchanged.
     """
-    with atomic_replacement(path) as part, part.open("w", encoding="utf-8") as file:
+    with replace_atomically(path) as temporary, temporary.open("w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())

@@ -1,4 +1,4 @@
-"""A view whose errors do not affect the run."""
+"""Wrapper of a view that keeps errors of the view from the run."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 class GuardedView:
-    """Forwards all calls to a view until its first error, and then closes it. Implements `View`.
+    """Forwards all calls to a view until its first error, and then closes the view; implements `View`.
 
     Args:
         view: The view.
 
     Attributes:
-        problem: First error of the view as a sentence, or "".
+        problem: Message about the first error of the view, or "".
     """
 
     def __init__(self, view: View) -> None:
@@ -36,11 +36,11 @@ class GuardedView:
         self._forward(lambda: self._view(timed))
 
     def close(self) -> None:
-        """Stop showing."""
+        """Stop showing the run."""
         self._forward(self._view.close)
 
     def note(self, sentence: str) -> None:
-        """Show a sentence about the record."""
+        """Show a message about the record of the run."""
         self._forward(lambda: self._view.note(sentence))
 
     def _forward(self, call: Callable[[], None]) -> None:
@@ -51,6 +51,6 @@ class GuardedView:
         except Exception as error:
             name = type(self._view).__name__
             self.problem = f"the view {name} failed during the run: {type(error).__name__}: {error}"
-            # An open view would keep the screen and the keyboard.
+            # A view that stays open would block the screen and the keyboard.
             with contextlib.suppress(Exception):
                 self._view.close()

@@ -1,4 +1,4 @@
-"""Journal of a run: its recorded events, one JSON object per line, which only one process writes."""
+"""Journal of a run: file with the recorded events, one JSON object per line, written by one process."""
 
 from __future__ import annotations
 
@@ -13,26 +13,27 @@ from pydantic_core import from_json
 
 from executive.errors import Fault, InputError, RecordLost, describe_os_error, explain_os_errors
 from executive.events import ItemChanged, RunEnded, RunStarted, TimedEvent, ToolCommanded
-from executive.record.journal_format import decode_all, encode
+from executive.record.journal_format import decode_events, encode_event
 
-LOCKS = Path("/proc/locks")
-"""File in which Linux lists all locks with the processes that hold them."""
+LOCK_LIST = Path("/proc/locks")
+"""File in which Linux lists the locks on all files, each with the id of the process that holds the lock."""
 
 
 class Journal:
-    """Observer that appends each event to a file.
+    """Observer that appends each event to a file, which it locks until the end of the process.
 
-    Commands of the tool, placements and the end of the run are synced to the disk before the run continues.
-    After a power cut, the journal shows which item the tool may hold and which items are in a bin. The kernel
-    releases the lock on the file when the process ends.
+    Commands to the tool, placements of items and the end of the run are synced to the disk before the run
+    continues. Therefore the journal shows after a power cut which item the tool may hold, and which items are
+    in a bin.
 
     Args:
         path: The file.
-        resume: True to append to an existing journal, after an incomplete last line is removed; False to
-            create a journal.
+        resume: True to remove an incomplete last line of an existing journal and append to the journal; False
+            to create a journal.
 
     Raises:
-        InputError: A process writes the file, a new journal is not empty, or the file cannot be opened.
+        InputError: Another process writes the file, the file of a new journal is not empty, or the file
+            cannot be opened.
     """
 
     def __init__(self, path: Path, *, resume: bool = False) -> None:
@@ -45,10 +46,10 @@ class Journal:
                 _lock(file, path)
                 if not resume and os.fstat(file).st_size:
                     raise InputError(
-                        f'"{path}" is the record of another run; a new run needs a directory of its own, '
-                        "for instance below another --runs DIR"
+                        f'"{path}" is the journal of another run; a new run needs its own directory: name '
+                        "another folder with --runs DIR"
                     )
-                self._length = _repair(file) if resume else 0
+                self._length = _repair_end(file) if resume else 0
             except BaseException:
                 os.close(file)
                 raise
@@ -59,12 +60,12 @@ class Journal:
 
         Raises:
             RecordLost: Writing failed, or another program deleted, replaced or truncated the file.
-                Later events are dropped without a second fault, so that the arm can be brought to rest.
-            Fault: JSON cannot represent the event; only this event is missing.
+                Later events are ignored without an exception, so that the run can brake the arm.
+            Fault: JSON cannot represent the event; only this event is missing in the journal.
         """
         if self._file is None or self._has_failed or not timed.event.is_recorded:
             return
-        line = encode(timed)
+        line = encode_event(timed)
         try:
             self._write(self._file, line)
             event = timed.event
@@ -73,110 +74,111 @@ class Journal:
                 self._sync(self._file)
         except OSError as error:
             self._has_failed = True
-            # An incomplete line cannot be read.
+            # Remove an incomplete line, which could not be read.
             with contextlib.suppress(OSError):
                 if os.fstat(self._file).st_size > self._length:
                     os.ftruncate(self._file, self._length)
             raise RecordLost(
                 f'the journal "{self._path}" cannot be written: {describe_os_error(error)}; '
-                "the run stops because it could not be explained afterwards"
+                "the run stops, because without a journal it could not be explained"
             ) from error
 
     def close(self) -> None:
         """Sync the file to the disk and close the file; further calls have no effect.
 
         Raises:
-            Fault: The last lines may be missing, and no earlier error has reported the lost record.
+            Fault: The file may lack its last lines, and no earlier `RecordLost` reported the loss.
         """
         if self._file is None:
             return
         file, self._file = self._file, None
-        advice = "believe what you see in the cell rather than the record"
+        advice = "check what the tool holds and what is in the bins"
         try:
             with explain_os_errors(Fault, f'the journal "{self._path}" may lack its last lines', advice):
                 if not self._is_synced and not self._has_failed:
                     self._sync(file)
         finally:
-            # An error of the disk has been reported by the sync.
+            # The sync has reported any error of the disk.
             with contextlib.suppress(OSError):
                 os.close(file)
 
     def _write(self, file: int, line: bytes) -> None:
-        """Write a line, in several parts if the disk is nearly full."""
-        # Unbuffered, so that the file holds all events before a crash of the process.
-        rest = line
-        while rest:
-            rest = rest[os.write(file, rest) :]
+        """Write a line without a buffer, so that the file contains all lines if the process crashes."""
+        unwritten = line
+        while unwritten:
+            # If the disk is nearly full, the system may write a part only.
+            unwritten = unwritten[os.write(file, unwritten) :]
         self._length += len(line)
         self._is_synced = False
 
     def _sync(self, file: int) -> None:
+        """Sync the file to the disk, and raise an OSError if another program changed the file."""
         os.fsync(file)
         self._is_synced = True
         status = os.fstat(file)
-        # Writing to a deleted file causes no error; its content is lost when the file is closed.
+        # Writing to a deleted file causes no error, but its content is lost when the file is closed.
         if not self._path.exists():
-            raise FileNotFoundError(errno.ENOENT, "it was deleted while the run went on")
+            raise FileNotFoundError(errno.ENOENT, "another program deleted it during the run")
         if not os.path.samestat(status, self._path.stat()):
-            raise FileExistsError(errno.EEXIST, "another program replaced it while the run went on")
+            raise FileExistsError(errno.EEXIST, "another program replaced it during the run")
         if status.st_size != self._length:
             raise OSError(
                 errno.EIO,
-                f"another program changed its length from {self._length} to {status.st_size} bytes while the "
-                "run went on",
+                f"another program changed its length from {self._length} to {status.st_size} bytes during "
+                "the run",
             )
 
 
 def read_journal(path: Path) -> list[TimedEvent]:
     """Return the events of a journal, one for each line.
 
-    A power cut may leave an incomplete line or zeros at the end of the file; both are ignored.
+    An incomplete line and zeros at the end of the file are ignored, because a power cut may leave them.
 
     Raises:
         InputError: The file cannot be read, has another format, or has a line without an event.
     """
     with explain_os_errors(InputError, f'cannot read the journal "{path}"'):
         content = path.read_bytes()
-    return decode_all(content[: _valid_length(content)].splitlines(), str(path))
+    return decode_events(content[: _measure_valid_length(content)].splitlines(), str(path))
 
 
 def find_start(events: Sequence[TimedEvent], path: Path, advice: str) -> RunStarted:
-    """Return the start of the run in the directory `path`.
+    """Return the event of the start of the run in the directory `path`.
 
     Raises:
-        InputError: The journal ends before the start of the run; the message ends with `advice`.
+        InputError: The journal lacks the start of the run; the message ends with `advice`.
     """
     for timed in events:
         if isinstance(timed.event, RunStarted):
             return timed.event
-    raise InputError(f'the run in "{path}" had not begun when it was cut off; {advice}')
+    raise InputError(f'the run in "{path}" was interrupted before its start; {advice}')
 
 
 def find_end(events: Sequence[TimedEvent]) -> RunEnded | None:
-    """Return the end of a run by its journal, or None if the run was interrupted or is running.
+    """Return the last event if it is the end of the run, or None if the run was interrupted or is running.
 
-    Only the end of the last resumption counts as the end of a resumed run.
+    In a resumed run, an earlier end does not count.
     """
     last = events[-1].event if events else None
     return last if isinstance(last, RunEnded) else None
 
 
-def _valid_length(content: bytes) -> int:
-    """Return the number of bytes in complete lines of a journal; the last line may lack its line feed."""
+def _measure_valid_length(content: bytes) -> int:
+    """Return the length of the complete lines of a journal [bytes]; the last one may lack its line feed."""
     written = content.rstrip(b"\0")
-    last = written.rfind(b"\n") + 1
+    last_line_start = written.rfind(b"\n") + 1
     try:
-        from_json(written[last:])
+        from_json(written[last_line_start:])
     except ValueError:
-        return last
+        return last_line_start
     return len(written)
 
 
-def _repair(file: int) -> int:
+def _repair_end(file: int) -> int:
     """Remove an incomplete last line of a journal, add a missing line feed, and return the length [bytes]."""
     with open(file, "rb", closefd=False) as journal:
         content = journal.read()
-    length = _valid_length(content)
+    length = _measure_valid_length(content)
     os.ftruncate(file, length)
     if length and content[length - 1 : length] != b"\n":
         length += os.write(file, b"\n")
@@ -188,17 +190,17 @@ def _lock(file: int, path: Path) -> None:
     """Lock the open journal for this process until the file is closed.
 
     Raises:
-        InputError: Another process, or another part of this process, has locked the journal.
+        InputError: Another process, or another `Journal` of this process, has locked the journal.
         OSError: The file system does not support locks.
     """
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         holder = _find_lock_holder(file)
-        writer, end = (f"process {holder}", f'"kill {holder}"') if holder else ("another process", "Ctrl-C")
+        writer, stop = (f"process {holder}", f'"kill {holder}"') if holder else ("another process", "Ctrl-C")
         raise InputError(
             f'the run directory "{path.parent}" is in use: {writer} writes its journal, and two runs cannot '
-            f"share it; wait until that run has ended, or end it with {end}"
+            f"share it; wait until that run has ended, or stop it with {stop}"
         ) from error
 
 
@@ -207,7 +209,7 @@ def _find_lock_holder(file: int) -> int | None:
     status = os.fstat(file)
     file_id = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}:{status.st_ino}"
     with contextlib.suppress(OSError):
-        for line in LOCKS.read_text().splitlines():
+        for line in LOCK_LIST.read_text().splitlines():
             # 1: FLOCK  ADVISORY  WRITE 4711 fe:00:5309462 0 EOF
             fields = line.split()
             if fields[1:2] == ["FLOCK"] and fields[5] == file_id and int(fields[4]) > 0:

@@ -1,4 +1,4 @@
-"""Format of a journal: one JSON object per event, with its kind, its time and its fields."""
+"""Format of a journal: one line of JSON per event, with the kind, the time and the fields of the event."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from executive.events import JOURNAL_FORMAT, Event, InputRead, RunStarted, Timed
 from executive.replay.recorded_cell import check_input
 
 MAX_TICK = 10**9
-"""Maximum number of control steps: 48 days in simulation."""
+"""Maximum number of control steps of a run: 48 days in simulation."""
 CLOCK_TOLERANCE = 1e-5
 """Maximum difference between the clock of an event and the time of its control step [s]."""
 
-KINDS: Mapping[str, type[Event]] = {
-    kind.__name__: kind
-    for kind in sorted(Event.__subclasses__(), key=lambda kind: kind.__name__)
-    if kind.is_recorded
+EVENT_CLASSES: Mapping[str, type[Event]] = {
+    cls.__name__: cls
+    for cls in sorted(Event.__subclasses__(), key=lambda cls: cls.__name__)
+    if cls.is_recorded
 }
-"""Recorded kinds of events by name."""
+"""Classes of the recorded events by kind, which is the name of the class."""
 
 _TIME_KEYS = ("kind", "tick", "clock")
 
-_KEYS: Mapping[str, KeysView[str]] = {
-    name: dict.fromkeys([*_TIME_KEYS, *(field.name for field in fields(kind))]).keys()
-    for name, kind in KINDS.items()
+_KEYS_BY_KIND: Mapping[str, KeysView[str]] = {
+    kind: dict.fromkeys([*_TIME_KEYS, *(field.name for field in fields(cls))]).keys()
+    for kind, cls in EVENT_CLASSES.items()
 }
-"""Keys of the lines of each kind."""
+"""Keys in a line of each kind."""
 
-_ADAPTERS: Mapping[str, TypeAdapter[Event]] = {name: TypeAdapter(kind) for name, kind in KINDS.items()}
+_ADAPTER_BY_KIND: Mapping[str, TypeAdapter[Event]] = {k: TypeAdapter(cls) for k, cls in EVENT_CLASSES.items()}
 
 
-def journal_schema() -> dict[str, JsonValue]:
+def make_journal_schema() -> dict[str, JsonValue]:
     """Return the JSON Schema of one line of a journal."""
     definitions: dict[str, JsonValue] = {}
-    for name, adapter in _ADAPTERS.items():
+    for name, adapter in _ADAPTER_BY_KIND.items():
         schema = adapter.json_schema(ref_template="#/definitions/{model}")
         definitions |= schema.pop("$defs", {})
         time = {
@@ -48,17 +48,17 @@ def journal_schema() -> dict[str, JsonValue]:
             "clock": {"type": "number", "minimum": 0},
         }
         schema["properties"] = time | schema.get("properties", {})
-        definitions[name] = schema | {"required": list(_KEYS[name]), "additionalProperties": False}
+        definitions[name] = schema | {"required": list(_KEYS_BY_KIND[name]), "additionalProperties": False}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": f"An event of a journal, format {JOURNAL_FORMAT}",
-        "oneOf": [{"$ref": f"#/definitions/{name}"} for name in KINDS],
+        "oneOf": [{"$ref": f"#/definitions/{name}"} for name in EVENT_CLASSES],
         "definitions": definitions,
     }
 
 
-def encode(timed: TimedEvent) -> bytes:
-    """Return the line of an event, with a line feed.
+def encode_event(timed: TimedEvent) -> bytes:
+    """Return the line of an event with its line feed, in UTF-8.
 
     Raises:
         Fault: JSON cannot represent a value of the event.
@@ -66,33 +66,34 @@ def encode(timed: TimedEvent) -> bytes:
     kind = type(timed.event).__name__
     entry = {"kind": kind, "tick": timed.tick, "clock": timed.clock, **vars(timed.event)}
     try:
-        # A lone surrogate, as in a file name that is not UTF-8, becomes a question mark.
+        # A lone surrogate, from a file name that is not UTF-8, becomes a question mark.
         return (_ENCODER.encode(entry) + "\n").encode(errors="replace")
     except (TypeError, ValueError, RecursionError) as error:
-        raise Fault(f"the journal cannot hold an event of kind {kind}: {error}") from error
+        raise Fault(f"JSON cannot represent an event of kind {kind}: {error}") from error
 
 
-def decode(line: bytes) -> TimedEvent:
-    """Return the event of a line.
+def decode_event(line: bytes) -> TimedEvent:
+    """Return the event in a line of a journal.
 
     Raises:
-        ValueError: The line holds no event of this format.
+        ValueError: The line contains no event in this format.
     """
     entry = from_json(line, allow_inf_nan=False)
     if not isinstance(entry, dict):
-        raise ValueError("it is no object")
+        raise ValueError("it contains no JSON object")
     kind, tick, clock = (entry.get(key) for key in _TIME_KEYS)
-    if not isinstance(kind, str) or kind not in _ADAPTERS:
-        raise ValueError(f'"kind" is {kind!r}; allowed are {", ".join(KINDS)}')
+    if not isinstance(kind, str) or kind not in _ADAPTER_BY_KIND:
+        raise ValueError(f'"kind" is {kind!r}; allowed are {", ".join(EVENT_CLASSES)}')
     if isinstance(tick, bool) or not isinstance(tick, int) or not 0 <= tick <= MAX_TICK:
         raise ValueError(f'"tick" is {tick!r}, not an integer from 0 to {MAX_TICK}')
     if isinstance(clock, bool) or not isinstance(clock, int | float) or clock < 0:
         raise ValueError(f'"clock" is {clock!r}, not a time in seconds')
-    if differing := entry.keys() ^ _KEYS[kind]:
-        problem = "has no" if differing <= _KEYS[kind] else "has the unknown"
-        raise ValueError(f'{kind} {problem} key "{min(differing)}"; its keys are {", ".join(_KEYS[kind])}')
+    keys = _KEYS_BY_KIND[kind]
+    if differing := entry.keys() ^ keys:
+        problem = "has no" if differing <= keys else "has the unknown"
+        raise ValueError(f'{kind} {problem} key "{min(differing)}"; its keys are {", ".join(keys)}')
     try:
-        event = _ADAPTERS[kind].validate_json(line)
+        event = _ADAPTER_BY_KIND[kind].validate_json(line)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))
@@ -100,43 +101,43 @@ def decode(line: bytes) -> TimedEvent:
     return TimedEvent(tick, float(clock), event)
 
 
-def decode_all(lines: Iterable[bytes], name: str) -> list[TimedEvent]:
+def decode_events(lines: Iterable[bytes], name: str) -> list[TimedEvent]:
     """Return the events of the lines of a journal.
 
     Raises:
-        InputError: A line holds no event, or an event whose clock contradicts its control step; the message
-            begins with `name` and the number of the line.
+        InputError: A line contains no event, or the time of an event contradicts its control step; the
+            message begins with `name` and the number of the line.
     """
     events: list[TimedEvent] = []
-    step = ahead = 0.0
+    period = clock_offset = 0.0
     for number, line in enumerate(lines, start=1):
         try:
-            timed = decode(line)
+            timed = decode_event(line)
             event = timed.event
             if isinstance(event, RunStarted):
-                step = event.step
-            if step and abs(timed.clock - timed.tick * step - ahead) > CLOCK_TOLERANCE:
+                period = event.step
+            if period and abs(timed.clock - timed.tick * period - clock_offset) > CLOCK_TOLERANCE:
                 raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
             if isinstance(event, InputRead) and event.name == "clock" and not event.raised:
-                ahead = _read_clock_offset(event.value)
+                clock_offset = _read_clock_offset(event.value)
             elif isinstance(event, InputRead) and not event.raised:
                 check_input(event.name, event.value)
         except ValueError as error:
-            if number == 1 and (old := _describe_old_format(line)):
-                raise InputError(f"{name}: {old}") from error
+            if number == 1 and (message := _describe_old_format(line)):
+                raise InputError(f"{name}: {message}") from error
             raise InputError(
-                f"{name}:{number}: this line is no event ({error}); a journal is only ever appended to, so "
-                "somebody changed it after the run, or the disk lost a part of it; restore a copy"
+                f"{name}:{number}: this line is no event ({error}); the file was changed or damaged after "
+                "the run, because a run only appends to its journal; restore a copy of the file"
             ) from error
         events.append(timed)
     return events
 
 
 def _read_clock_offset(value: JsonValue) -> float:
-    """Return the recorded time of the cell's clock minus the time of all control steps [s].
+    """Return the value of the input `clock`: time of the cell's clock minus time of all control steps [s].
 
     Raises:
-        ValueError: The value is no number.
+        ValueError: The value is not a number.
     """
     if not isinstance(value, int | float):
         raise ValueError(f'"value" of the input "clock" is {value!r}, not a time in seconds')
@@ -144,7 +145,7 @@ def _read_clock_offset(value: JsonValue) -> float:
 
 
 def _describe_old_format(line: bytes) -> str:
-    """Return a message if the first line of a journal is of format 1, which states no version, else ""."""
+    """Return a message if the first line of a journal has format 1, which contains no version, else ""."""
     try:
         entry = from_json(line)
     except ValueError:
@@ -155,7 +156,7 @@ def _describe_old_format(line: bytes) -> str:
     version = versions.get("executive", "0.1") if isinstance(versions, dict) else "0.1"
     return (
         f"this journal has format 1, written by executive {version}; this version reads format "
-        f"{JOURNAL_FORMAT}; read it with executive {version}, or run the mission again"
+        f"{JOURNAL_FORMAT}; read the journal with executive {version}, or run the mission again"
     )
 
 
@@ -169,7 +170,7 @@ def _as_json(value: object) -> object:
         return dict(value)
     if is_dataclass(value):
         return vars(value)
-    raise TypeError(f"a {type(value).__name__} is not plain")
+    raise TypeError(f"JSON has no equivalent of a {type(value).__name__}")
 
 
 _ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False, default=_as_json)

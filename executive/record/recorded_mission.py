@@ -1,4 +1,4 @@
-"""Mission, cell and tree of a recorded run, from its directory."""
+"""Reading of the mission, the cell and the tree of a recorded run from its directory."""
 
 from __future__ import annotations
 
@@ -20,58 +20,58 @@ from executive.skill import Skill
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
 
-_NODES = TypeAdapter(list[OutlineNode])
+_NODES_ADAPTER = TypeAdapter(list[OutlineNode])
 
 
 def read_mission_of_run(
-    path: Path, run: RunStarted, skills: Mapping[str, type[Skill]], mission: Path | None = None
+    path: Path, start: RunStarted, skills: Mapping[str, type[Skill]], mission: Path | None = None
 ) -> LoadedMission:
     """Return the mission of a run directory, with the params and the cell of the run.
 
     Args:
         path: The run directory.
-        run: Start of the run.
+        start: Start of the run.
         skills: Installed skills by name.
         mission: Mission file that replaces the recorded mission, or None.
 
     Raises:
         MissionError: The mission has errors, for instance because installed skills have changed.
-        InputError: A file of the directory cannot be read.
+        InputError: A file in the directory cannot be read.
     """
     from executive.mission.load import load_mission
 
-    overrides = {key: text for key, text in run.overrides.items() if not key.startswith("cell.")}
-    given = GivenCell(read_cell(path), Path(run.base) / "cell.yaml")
-    return load_mission(mission or path / "mission.yaml", skills, overrides, cell=given)
+    overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
+    given_cell = GivenCell(read_cell(path), Path(start.base) / "cell.yaml")
+    return load_mission(mission or path / "mission.yaml", skills, overrides, cell=given_cell)
 
 
 def read_cell(path: Path) -> CellConfig:
-    """Return the configuration of the cell in a run directory.
+    """Return the cell file in a run directory.
 
     Raises:
-        InputError: The file of the cell cannot be read.
+        InputError: The cell file cannot be read.
     """
     try:
         return CellConfig(**yaml.safe_load((path / "cell.yaml").read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError, yaml.YAMLError) as error:
-        raise InputError(f'the run directory "{path}" holds no cell that can be read: {error}') from error
+        raise InputError(f'cannot read the cell file in the run directory "{path}": {error}') from error
 
 
 def format_tree(nodes: Sequence[OutlineNode]) -> str:
-    """Return an outline as JSON; values that JSON cannot represent become text."""
+    """Return the outline of a tree as JSON; values that JSON cannot represent become strings."""
     return to_json(list(nodes), inf_nan_mode="strings", fallback=str, indent=1).decode() + "\n"
 
 
 def read_tree(path: Path) -> list[OutlineNode]:
-    """Return the outline of the built tree of a run from a file.
+    """Return the outline of the tree of a run from its file `tree.json`.
 
     Raises:
-        InputError: The file cannot be read or holds no outline.
+        InputError: The file cannot be read or contains no outline.
     """
-    hint = "every run leaves one beside its journal since version 0.1"
+    hint = "since version 0.1 every run writes this file beside its journal"
     with explain_os_errors(InputError, f'cannot read the tree "{path}"', hint):
         content = path.read_bytes()
     try:
-        return _NODES.validate_json(content)
+        return _NODES_ADAPTER.validate_json(content)
     except ValidationError as error:
-        raise InputError(f'"{path}" holds no tree of a run: {error.errors()[0]["msg"].lower()}') from error
+        raise InputError(f'"{path}" contains no tree of a run: {error.errors()[0]["msg"].lower()}') from error

@@ -1,4 +1,4 @@
-"""Result of a run: the object that `result.json` holds and `--json` prints."""
+"""Result of a run: content of `result.json`, and output of `executive run --json`."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ from executive.record.journal import find_end
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import PlanningTotals, Timeline
 
-QUIT = "quit"
-"""Request of the operator to end the requests."""
+QUIT_REQUEST = "quit"
+"""Request that ends the requests of the operator."""
 
-VERSION = 2
-"""Version of the schema of `result.json`; the first had no `version`, no skipped items and no `agrees`."""
+RESULT_VERSION = 2
+"""Version of the schema of `result.json`; version 1 had no `version`, no skipped items and no `agrees`."""
 
-MISTAKES = {
+MISTAKE_DESCRIPTIONS = {
     "wrong_bin": "in a wrong bin",
     "fell_in_wrong_bin": "fallen into a wrong bin",
     "unseen": "never seen",
 }
-"""Description of each kind of mistake that the audit counts."""
+"""Description of each count of an audit that is a mistake, by its key in `PLACES`."""
 
-EXIT_CODES = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "INCOMPLETE": 4, "HALTED": 130}
-"""Exit code by the status of the run, unless the audit disagrees (`exit_code`)."""
+EXIT_CODE_BY_STATUS = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "INCOMPLETE": 4, "HALTED": 130}
+"""Exit code by the status of the run, if the audit agrees; see `find_exit_code`."""
 
 FINAL_STATUSES = ("SUCCESS", "FAILURE")
-"""Status of a run that cannot be resumed: its tree has ended, and nothing was rejected."""
+"""Statuses of a run that cannot be resumed: its tree has ended, and no item was rejected."""
 
 
 @dataclass(frozen=True)
 class ItemCounts:
-    """Counts of the items by final state; `seen` is the sum of the next four."""
+    """Number of items by final state; `seen` is the sum of placed, rejected, skipped and lost items."""
 
     seen: int = 0
     placed: int = 0
@@ -53,10 +53,10 @@ class ItemCounts:
 
 @dataclass(frozen=True)
 class Audit:
-    """Counts of the objects by true place, as in `executive.cell.workcell.PLACES`.
+    """Number of objects by true place, as in `executive.cell.workcell.PLACES`.
 
     Attributes:
-        agrees: Result of `agrees`.
+        agrees: True if the true places confirm the counts of the ledger.
     """
 
     agrees: bool = True
@@ -77,12 +77,12 @@ class Result:
         mission: Name of the mission.
         status, reason, message, node, empty, holds, ticks: As in `RunEnded`.
         seed: Seed of all random numbers.
-        items: Counts of the ledger.
+        items: Number of items by final state, from the ledger.
         unknown: Largest number of boxes in a look for each label that the cell file does not declare.
-        doubts: Reasons why error rates of detectors were assumed.
-        audit: Counts of the audit; None in a cell without ground truth.
-        planning: Planned motions.
-        requests: Requests of the operator, by `list_requests`.
+        doubts: Reasons for which error rates of detectors were assumed.
+        audit: Comparison with the true places of the objects; None in a cell without ground truth.
+        planning: Number of planned motions, and time spent waiting for them.
+        requests: Requests with which a scripted operator repeats the run.
         robot_time_s: Time on the clock of the run [s].
         wall_time_s: Wall time of the run [s].
         trace: Hash of all decisions.
@@ -90,7 +90,7 @@ class Result:
         story: Diagnosis of a run that did not succeed, or None.
     """
 
-    version: int = VERSION
+    version: int = RESULT_VERSION
     mission: str
     status: str
     reason: str
@@ -119,7 +119,7 @@ def write_result(path: Path, result: Result) -> None:
     Raises:
         ExecutiveError: The file cannot be written.
     """
-    hint = "the journal beside it tells how the run ended, and so does what --json prints"
+    hint = "the journal in the same folder and the output of --json contain the end of the run"
     with explain_os_errors(ExecutiveError, f'cannot write the result "{path}"', hint):
         write_atomically(
             path, json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
@@ -127,46 +127,46 @@ def write_result(path: Path, result: Result) -> None:
 
 
 def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result | None:
-    """Return the result that belongs to a journal, or None if there is none.
+    """Return the result of a run, or None if the file is missing, damaged or older than the end of the run.
 
-    A resumed run may have the result of an earlier end.
+    A resumed run may still have the result file of an earlier end.
     """
     try:
         result = TypeAdapter(Result).validate_json(directory.result.read_bytes())
     except (OSError, ValueError):
         return None
-    ending = find_end(events)
-    if ending is not None:
-        return result if (result.status, result.ticks) == (ending.status, ending.ticks) else None
-    # If the end could not be written to the journal, only the result contains the end.
+    end = find_end(events)
+    if end is not None:
+        return result if (result.status, result.ticks) == (end.status, end.ticks) else None
+    # If writing the end to the journal failed, only the result contains the end.
     is_resumed = any(isinstance(timed.event, RunResumed) for timed in events)
-    return result if result.status in EXIT_CODES and not is_resumed else None
+    return result if result.status in EXIT_CODE_BY_STATUS and not is_resumed else None
 
 
 def list_requests(timeline: Timeline) -> list[str]:
-    """Return a list of requests with which a scripted operator repeats the answers of the run.
+    """Return the requests with which a scripted operator repeats the requests of the run.
 
-    Trailing requests to quit are omitted, because the scripted operator quits at the end of the list; a list
-    with only requests to quit keeps the first.
+    Requests to quit at the end are omitted, because a scripted operator quits at the end of its list. If all
+    requests are requests to quit, the first one is kept.
     """
-    words = [wanted or QUIT for wanted in timeline.requests]
-    while len(words) > 1 and words[-1] == QUIT:
-        words.pop()
-    return words
+    requests = [request or QUIT_REQUEST for request in timeline.requests]
+    while len(requests) > 1 and requests[-1] == QUIT_REQUEST:
+        requests.pop()
+    return requests
 
 
 def make_audit(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> Audit:
-    """Return the counts of an audit with the result of `agrees`."""
-    return Audit(agrees(items, audit, empty), **{place: int(audit[place]) for place in PLACES})
+    """Return the true counts `audit`, compared with the counts `items` of the ledger."""
+    return Audit(is_confirmed_by_audit(items, audit, empty), **{place: int(audit[place]) for place in PLACES})
 
 
-def agrees(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> bool:
-    """Return True if the audit confirms the counts of the ledger.
+def is_confirmed_by_audit(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> bool:
+    """Return True if the true places of the objects confirm the counts of the ledger.
 
     Args:
-        items: Counts of the ledger.
-        audit: Counts of the audit.
-        empty: True if the run reported an empty table, which excludes unseen objects.
+        items: Number of items by final state.
+        audit: Number of objects by true place.
+        empty: True if the run reported an empty table, so that no object may be unseen.
     """
     left = items["rejected"] + items["skipped"]
     return bool(
@@ -178,13 +178,13 @@ def agrees(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> b
     )
 
 
-def disagreement(result: Result) -> str:
-    """Return one sentence with the counts of audit and ledger if the audit disagrees, else ""."""
+def describe_disagreement(result: Result) -> str:
+    """Return a message with the counts of audit and ledger if they differ, else ""."""
     audit, items = result.audit, result.items
     if audit is None or audit.agrees:
         return ""
-    counts = {words: getattr(audit, place) for place, words in MISTAKES.items()}
-    mistakes = ", ".join(f"{count} {words}" for words, count in counts.items() if count)
+    counts = {text: getattr(audit, place) for place, text in MISTAKE_DESCRIPTIONS.items()}
+    mistakes = ", ".join(f"{count} {text}" for text, count in counts.items() if count)
     comparison = (
         f"the audit found {audit.right} in their bins, {audit.left} on the table and "
         f"{audit.elsewhere} elsewhere; the executive reports {items.placed} placed, "
@@ -193,7 +193,7 @@ def disagreement(result: Result) -> str:
     return "THE AUDIT DISAGREES: " + "; ".join(filter(None, (mistakes, comparison)))
 
 
-def exit_code(result: Result) -> int:
-    """Return the exit code of a run: 1 instead of 0 or 4 if the audit disagrees."""
-    code = EXIT_CODES[result.status]
-    return 1 if code in (0, 4) and disagreement(result) else code
+def find_exit_code(result: Result) -> int:
+    """Return the exit code of a run: code 1 replaces 0 and 4 if the audit disagrees with the ledger."""
+    code = EXIT_CODE_BY_STATUS[result.status]
+    return 1 if code in (0, 4) and describe_disagreement(result) else code

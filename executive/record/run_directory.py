@@ -1,4 +1,4 @@
-"""Directory of a run: its name, the files from which the run can be repeated, and the search for it."""
+"""Run directory: its name and files, its creation, and the search for a run directory."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ import yaml
 from executive.errors import InputError, describe_os_error
 from executive.record.atomic_file import write_atomically
 
-LATEST = "latest"
+LATEST_LINK = "latest"
 """Name of the link to the last run directory."""
-SCENE = "scene.yaml"
+SCENE_FILE = "scene.yaml"
 """Name of the copy of the scene file."""
 NO_SPACE_ERRORS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
-"""Error numbers of a full disk, an exceeded quota and a file that is too large."""
-_USE_OTHER_FOLDER = "name another place with --runs DIR"
+"""Values of `errno` for a full disk, an exceeded quota and a too large file."""
+_OTHER_FOLDER_ADVICE = "name another folder with --runs DIR"
 
 
 class RunDirectory:
@@ -30,8 +30,8 @@ class RunDirectory:
     Attributes:
         path: `RUNS/<YYYY-MM-DD>/<HH-MM-SS>_<mission>_s<seed>`.
         journal: File with the recorded events, one JSON object per line.
-        world_log: File from which the last state of a simulated world can be rebuilt.
-        tree: File with the outline of the built tree.
+        world_log: File from which a simulated world can be rebuilt at any control step.
+        tree: File with the outline of the behaviour tree.
         report: HTML page that explains the run.
         result: File with the output of `executive run --json`.
         pictures: Folder with pictures of selections and failures.
@@ -48,15 +48,15 @@ class RunDirectory:
 
     @property
     def scene(self) -> Path | None:
-        """Copy of the scene file, or None if the run had none."""
-        path = self.path / SCENE
+        """Copy of the scene file, or None if the run had no scene file."""
+        path = self.path / SCENE_FILE
         return path if path.is_file() else None
 
     @staticmethod
     def create(runs: Path, *, mission: str, seed: int, started: datetime) -> RunDirectory:
-        """Make a directory below `runs`, named by the time `started`, and return the directory.
+        """Make and return a directory below `runs`; its name consists of start time, mission and seed.
 
-        Further runs that start in the same second get the suffix `-2`, `-3`, ....
+        If the name exists already, it gets the suffix `-2`, `-3`, ....
 
         Raises:
             InputError: The directory cannot be made.
@@ -82,17 +82,17 @@ class RunDirectory:
 
         Args:
             mission: Text of the mission file.
-            params: Resolved params, as values that YAML can represent exactly.
-            cell: Content of the cell file, as values that YAML can represent exactly.
-            tree: Text of `tree.json`, or "".
-            libraries: Text of each library, by its path relative to the mission.
-            scene: Text of the scene file, or "".
+            params: Values of the params, which YAML can represent exactly.
+            cell: Content of the cell file, which YAML can represent exactly.
+            tree: Text of `tree.json`, or "" to write no file.
+            libraries: Text of each library by its path relative to the mission.
+            scene: Text of the scene file, or "" to write no file.
 
         Raises:
-            InputError: A file cannot be written; no file is incomplete.
+            InputError: A file cannot be written; each existing file is complete.
         """
         with convert_os_errors(f'write to the run directory "{self.path}"'):
-            # Libraries are written first and must not replace files of the record.
+            # Libraries must not replace files of the record; the other files are written afterwards.
             for reference, text in (libraries or {}).items():
                 library = self.path / reference
                 if library not in (self.journal, self.result) and self.pictures not in library.parents:
@@ -105,53 +105,55 @@ class RunDirectory:
             if tree:
                 write_atomically(self.tree, tree)
             if scene:
-                write_atomically(self.path / SCENE, scene)
-        _point_latest(self.path.parents[1], self.path)
+                write_atomically(self.path / SCENE_FILE, scene)
+        _update_latest_link(self.path.parents[1], self.path)
 
 
 def check_runs_folder(runs: Path) -> None:
-    """Make the folder `runs` if it does not exist, and check that directories can be made in it.
+    """Make the folder `runs` if it does not exist, and check that a directory can be made in the folder.
 
     Raises:
-        InputError: No directory can be made.
+        InputError: A directory cannot be made.
     """
     with convert_os_errors(f'make a run directory below "{runs}"'):
         runs.mkdir(parents=True, exist_ok=True)
-        # The permissions do not show whether the file system is read-only.
+        # Only an attempt shows whether the file system is read-only.
         with TemporaryDirectory(prefix=".try-", dir=runs):
             pass
 
 
 @contextlib.contextmanager
-def convert_os_errors(action: str, advice: str = _USE_OTHER_FOLDER) -> Iterator[None]:
-    """Raise an OSError of the block as an InputError that names the failed action and ends with advice."""
+def convert_os_errors(action: str, advice: str = _OTHER_FOLDER_ADVICE) -> Iterator[None]:
+    """Convert an OSError in the `with` block to an InputError with the failed action and advice."""
     try:
         yield
     except OSError as error:
-        space = "free some space or " if error.errno in NO_SPACE_ERRORS else ""
-        raise InputError(f"cannot {action}: {describe_os_error(error)}; {space}{advice}") from error
+        space_advice = "free some space or " if error.errno in NO_SPACE_ERRORS else ""
+        raise InputError(f"cannot {action}: {describe_os_error(error)}; {space_advice}{advice}") from error
 
 
 def find_run(name: str, runs: Path) -> Path:
-    """Return a run directory by its path, by its path below `runs`, or the last one by the name `latest`.
+    """Return the run directory at the path `name`, or at the path `name` below `runs`.
+
+    The name `latest` is a link to the last run directory below `runs`.
 
     Raises:
-        InputError: There is no run directory of this name.
+        InputError: There is no such run directory.
     """
     for path in (Path(name), runs / name):
         # Path.is_file raises an error for a name that is too long.
         if os.path.isfile(path / "journal.jsonl"):
             return path.resolve()
     known = sorted((path.parent for path in runs.glob("*/*/journal.jsonl")), reverse=True)
-    hint = f"the last ones there: {', '.join(str(path.relative_to(runs)) for path in known[:3])}"
+    hint = f"the last runs there: {', '.join(str(path.relative_to(runs)) for path in known[:3])}"
     raise InputError(
-        f'"{name}" is no run directory, nor is there one of that name below "{runs}"; '
-        f"{hint if known else 'there is none at all; say where they are with --runs DIR'}"
+        f'"{name}" is no run directory, and "{runs}" contains no run directory of this name; '
+        f"{hint if known else 'it contains no run at all; name the folder of the runs with --runs DIR'}"
     )
 
 
 def _make_unique(day: Path, name: str) -> Path:
-    """Make and return `day/name`, or the first free `day/name-2`, `-3`, ...; safe between processes."""
+    """Make and return the folder `day/name`, or the first of `day/name-2`, `-3`, ... that does not exist."""
     number = 1
     while True:
         path = day / (name if number == 1 else f"{name}-{number}")
@@ -162,10 +164,10 @@ def _make_unique(day: Path, name: str) -> Path:
             number += 1
 
 
-def _point_latest(runs: Path, path: Path) -> None:
-    """Replace the link `runs/latest` by a link to `path`, atomically."""
+def _update_latest_link(runs: Path, path: Path) -> None:
+    """Replace the link `runs/latest` atomically by a link to `path`."""
     link = runs / f".latest-{os.getpid()}"
-    # A run needs no link, and some file systems do not support links.
+    # An error is ignored: a run needs no link, and some file systems do not support links.
     with contextlib.suppress(OSError):
         link.symlink_to(path.relative_to(runs), target_is_directory=True)
-        link.replace(runs / LATEST)
+        link.replace(runs / LATEST_LINK)

@@ -1,4 +1,4 @@
-"""Trace of a run: one short hash of all its decisions. Runs with equal traces made the same decisions."""
+"""Trace of a run: a hash of all its decisions, by which runs can be compared."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circula
 
 
 class Trace:
-    """Hashes the starts and ends of nodes, the changes of items and the selected targets, with their ticks.
+    """Hash of the starts and ends of nodes, the changes of items and the selected targets, with their ticks.
 
-    Wall time, messages, paths and the run directory are not hashed, so the same mission, seed and weights
-    give the same trace on the same kind of processor.
+    Wall times, messages and paths of files are not hashed, so that the same mission, seed and weights of
+    detectors give the same trace on the same kind of processor.
     """
 
     def __init__(self) -> None:
@@ -27,8 +27,8 @@ class Trace:
             case NodeStarted(node, skill, item):
                 decision = ["status", node, "RUNNING", *(("", item) if skill else (None, None)), None]
             case NodeEnded(node, status, skill):
-                about = (event.reason, event.item) if skill else (event.reason or None, None)
-                decision = ["status", node, status, *about, event.outputs]
+                details = (event.reason, event.item) if skill else (event.reason or None, None)
+                decision = ["status", node, status, *details, event.outputs]
             case ItemChanged(item, label, state, position):
                 decision = ["item", item, state, label, position, event.bin]
             case TargetSelected(item, label, frame):
@@ -38,5 +38,5 @@ class Trace:
         self._hash.update(_ENCODER.encode([timed.tick, *decision]).encode() + b"\n")
 
     def hexdigest(self) -> str:
-        """Return the first 16 hexadecimal digits of the SHA-256 so far."""
+        """Return the first 16 hexadecimal digits of the SHA-256 of all decisions up to now."""
         return self._hash.hexdigest()[:16]

@@ -15,7 +15,7 @@ from executive.errors import InputError
 from executive.events import FaultInjected, NodeEnded, NodeStarted, Observer, RunEnded, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.result import agrees
+from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.skill import Skill
@@ -48,7 +48,7 @@ class MissionResult(RunEnded):
     @property
     def agrees(self) -> bool:
         """True if the counts of ledger and audit agree, or there is no audit."""
-        return self.audit is None or agrees(self.items, self.audit, self.empty)
+        return self.audit is None or is_confirmed_by_audit(self.items, self.audit, self.empty)
 
     def list_activated_nodes(self, pattern: str) -> list[str]:
         """Return the paths of all activated nodes, in order of activation, that match the pattern."""

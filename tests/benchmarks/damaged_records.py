@@ -25,9 +25,9 @@ from executive.events import NodeEnded, RunResumed, TimedEvent
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replay import compare_replay, replay_run
-from executive.record.result import Result, disagreement
+from executive.record.result import Result, describe_disagreement
 from executive.record.resumed_run import resume_run
-from executive.record.run_directory import LATEST, RunDirectory, find_run
+from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.view.film.film import write_film
@@ -85,7 +85,7 @@ class Snapshots(StopAtFirstTick):
 
     def __call__(self, timed: TimedEvent) -> None:
         if isinstance(timed.event, NodeEnded) and timed.event.skill:
-            directory = RunDirectory(find_run(LATEST, self.runs))
+            directory = RunDirectory(find_run(LATEST_LINK, self.runs))
             world = directory.world_log
             self.worlds.append(world.stat().st_size if is_log(world) else world.read_bytes())
             self.lengths.append(directory.journal.stat().st_size)
@@ -106,7 +106,7 @@ def measure(
         snapshots, problem = ForkRunner(RESUME_TIMEOUT).call(lambda: _record_whole(subject, base / "whole"))
         if snapshots is None:
             raise InputError(f"the run cannot be recorded: {problem}")
-        whole = find_run(LATEST, base / "whole")
+        whole = find_run(LATEST_LINK, base / "whole")
         commands = {
             "report": (reports, _report),
             "replay": (others, lambda path: _replay(subject, path)),
@@ -225,7 +225,7 @@ def _resume_killed(subject: Subject, base: Path, case: int, snapshots: Snapshots
     duration = 2.0
     while not run_and_kill(subject, subject.seed + case, runs, rng.uniform(0.0, duration)):
         duration *= 0.9
-    path = find_run(LATEST, runs)
+    path = find_run(LATEST_LINK, runs)
     lost = []
     for file in ("journal.jsonl", "world.log"):
         if file == "journal.jsonl" or is_log(path / file):
@@ -249,13 +249,13 @@ def _resume(subject: Subject, path: Path, case: str) -> Figures:
         try:
             result = resume_run(path, subject.skills, options, RecordOptions(saves_pictures=False))
         except InputError as error:
-            has_begun = "had not begun" not in str(error)
+            has_begun = "was interrupted before its start" not in str(error)
             return {"agrees": True, "status": "refused", "problems": [str(error)] if has_begun else []}
         after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = find_wrong_claims(result)
         if difference := compare_replay(subject.loaded, subject.skills, after, result.seed).difference:
             problems.append(f"the replay differs: {difference}")
-        return {"agrees": not disagreement(result), "status": result.status, "problems": problems}
+        return {"agrees": not describe_disagreement(result), "status": result.status, "problems": problems}
 
     figures, problem = ForkRunner(RESUME_TIMEOUT).call(resume)
     if not (figures and figures["problems"]) and not problem:
@@ -272,7 +272,7 @@ def find_wrong_claims(result: Result) -> list[str]:
     ending = f"{result.status} {result.reason}: {result.message}"
     if result.status == "FAULT":
         return [f"it ended with {ending}"]
-    if not disagreement(result) or result.audit is None:
+    if not describe_disagreement(result) or result.audit is None:
         return []
     is_named = result.status == "INCOMPLETE" and "-" in result.message
     if is_named and result.items.placed <= result.audit.right:

@@ -24,7 +24,7 @@ from executive.perception.envelope.rated_detectors import build_rated_detectors
 from executive.plugins import cell_kind, discover
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.result import exit_code
+from executive.record.result import find_exit_code
 from executive.run.assembly import RunOptions
 from tests.benchmarks.forks import ForkRunner
 from tests.benchmarks.report import WALL_TIME_LIMIT
@@ -285,7 +285,7 @@ def _run_in_this_process(
         mission=mission,
         seed=seed,
         status=result.status,
-        exit_code=exit_code(result),
+        exit_code=find_exit_code(result),
         message=result.message,
         items=asdict(result.items),
         audit=asdict(result.audit),

@@ -28,9 +28,9 @@ from executive.record.journal import find_end, read_journal
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
 from executive.record.replay import compare_replay
-from executive.record.result import Result, disagreement
+from executive.record.result import Result, describe_disagreement
 from executive.record.resumed_run import resume_run
-from executive.record.run_directory import LATEST, find_run
+from executive.record.run_directory import LATEST_LINK, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.testing.faults.world_access import TrueObject, WorldAccess
@@ -98,7 +98,7 @@ def run_and_kill(subject: Subject, seed: int, runs: Path, delay: float) -> bool:
     if not os.WIFSIGNALED(status):
         return False
     try:
-        entries = read_journal(find_run(LATEST, runs) / "journal.jsonl")
+        entries = read_journal(find_run(LATEST_LINK, runs) / "journal.jsonl")
     except ExecutiveError:
         return False
     return InputLog.from_events(entries).start is not None and find_end(entries) is None
@@ -106,7 +106,7 @@ def run_and_kill(subject: Subject, seed: int, runs: Path, delay: float) -> bool:
 
 def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
     """Change the world if asked to, resume a killed run, and return its figures and problems."""
-    path = find_run(LATEST, runs)
+    path = find_run(LATEST_LINK, runs)
     past = InputLog.from_events(read_journal(path / "journal.jsonl"))
     nodes = (timed.event for timed in past.events if isinstance(timed.event, NodeStarted | NodeEnded))
     last = {event.node: event for event in nodes if event.skill}
@@ -184,7 +184,7 @@ def is_on_table(position: Array, table: TableConfig) -> bool:
 def check_result(result: Result, *, change_made: str) -> list[str]:
     """Return what is wrong with the end of a resumed run; only a removed or dropped object may be lost."""
     problems = []
-    if disagreement(result):
+    if describe_disagreement(result):
         problems.append(f"the ledger says {result.items}; the audit {result.audit}")
     may_lose = change_made.startswith(("removed", "dropped"))
     if result.status != "SUCCESS" and not (may_lose and result.reason == "lost"):

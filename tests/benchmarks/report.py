@@ -26,7 +26,7 @@ from executive.cli.options import MISSION, json_option, oracle_option, overrides
 from executive.cli.streams import print_json, stdout_kept_clean
 from executive.errors import ExecutiveError, InputError
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.result import disagreement
+from executive.record.result import describe_disagreement
 from executive.run.assembly import RunOptions
 
 Figures = dict[str, Any]
@@ -92,7 +92,7 @@ def record_subject(subject: Subject, seed: int, runs: Path) -> tuple[Figures, st
     result = record_run(subject.loaded, subject.skills, options, runs, RecordOptions(saves_pictures=False))
     if result.status == "HALTED":
         raise KeyboardInterrupt
-    if result.status == "SUCCESS" and not disagreement(result):
+    if result.status == "SUCCESS" and not describe_disagreement(result):
         return plain(result), ""
     return plain(result), (
         f"seed {seed} ended with {result.status} {result.reason}; the ledger says {result.items}, "

@@ -307,5 +307,5 @@ def test_a_sweep_tells_of_a_run_without_a_directory_and_of_no_place_for_any(proj
     assert (shown.exit_code, shown.stderr) == (
         2,
         f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
-        "name another place with --runs DIR\n",
+        "name another folder with --runs DIR\n",
     )

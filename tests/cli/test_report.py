@@ -101,8 +101,8 @@ def refused(*words: str) -> str:
 def test_what_has_no_report_is_refused_with_what_helps(run: Path) -> None:
     runs = run.parents[1]
     assert refused("nowhere", "--runs", str(runs)) == (
-        f'"nowhere" is no run directory, nor is there one of that name below "{runs}"; '
-        f"the last ones there: {run.relative_to(runs)}\n"
+        f'"nowhere" is no run directory, and "{runs}" contains no run directory of this name; '
+        f"the last runs there: {run.relative_to(runs)}\n"
     )
     (run / "report.html").mkdir()
     assert refused(str(run), "--json") == (
@@ -111,6 +111,6 @@ def test_what_has_no_report_is_refused_with_what_helps(run: Path) -> None:
     )
     (run / "tree.json").unlink()
     assert refused(str(run)) == (
-        f'cannot read the tree "{run / "tree.json"}": no such file or directory; every run leaves one beside '
-        "its journal since version 0.1\n"
+        f'cannot read the tree "{run / "tree.json"}": no such file or directory; since version 0.1 '
+        "every run writes this file beside its journal\n"
     )

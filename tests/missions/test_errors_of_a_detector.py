@@ -13,7 +13,7 @@ from executive.cells.fake.noisy_detector import NoisyDetector
 from executive.mission.load import LoadedMission, load_mission
 from executive.perception.detectors.setting import DetectorSetting
 from executive.plugins import cell_kind, discover
-from executive.record.result import agrees
+from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -84,4 +84,4 @@ def test_everything_is_in_its_bin_and_the_books_are_right(
         run.close()
     assert (outcome.status, outcome.message) == ("SUCCESS", "")
     assert items["placed"] == audit["right"] == items["seen"] >= 3
-    assert agrees(items, audit, outcome.empty)
+    assert is_confirmed_by_audit(items, audit, outcome.empty)

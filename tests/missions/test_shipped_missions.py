@@ -14,7 +14,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import cell_kind, discover
-from executive.record.result import agrees
+from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
 
@@ -72,7 +72,7 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
 
 def assert_done(name: str, done: Done) -> None:
     assert (done.outcome.status, done.outcome.message) == ("SUCCESS", "")
-    assert agrees(done.items, done.audit, done.outcome.empty)
+    assert is_confirmed_by_audit(done.items, done.audit, done.outcome.empty)
     assert done.items["placed"] == done.audit["right"] >= 1
     assert done.items["lost"] == done.audit["wrong_bin"] == 0
     if name not in KEEPS_SOMETHING:

@@ -124,7 +124,7 @@ def test_a_run_whose_directory_is_deleted_ends_at_rest_and_says_so(run, monkeypa
     monkeypatch.setattr(Recorder, "__call__", steal)
     shown, left = run()
     assert (shown.exit_code, left) == (3, None)
-    assert "it was deleted while the run went on; the run stops" in json.loads(shown.stdout)["message"]
+    assert "another program deleted it during the run; the run stops" in json.loads(shown.stdout)["message"]
     assert "note: cannot write the result" in shown.stderr
-    assert "no such file or directory; the journal beside it" in shown.stderr
+    assert "no such file or directory; the journal in the same folder" in shown.stderr
     assert cells[-1].arm.at_rest

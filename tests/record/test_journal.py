@@ -38,10 +38,10 @@ from executive.events import (
 )
 from executive.record import journal_format
 from executive.record.journal import Journal, find_end, find_start, read_journal
-from executive.record.journal_format import KINDS, encode, journal_schema
+from executive.record.journal_format import EVENT_CLASSES, encode_event, make_journal_schema
 
 NODE, END = NodeStarted("a"), run_ended()
-FIRST = encode(at(1, run_started()))
+FIRST = encode_event(at(1, run_started()))
 
 
 @pytest.fixture
@@ -107,12 +107,12 @@ def test_a_full_disk_is_one_fault_then_silence_and_no_part_of_a_line(path, monke
         journal(at(1, NODE))
     journal(at(1, END))
     journal.close()
-    assert path.read_bytes() == before == FIRST * resume + encode(at(0, NODE))
+    assert path.read_bytes() == before == FIRST * resume + encode_event(at(0, NODE))
 
 
 def test_what_reaches_the_disk_only_at_the_close_is_not_believed_unseen(path, monkeypatch):
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(Fault, match=r"may lack its last lines: no space left on device; believe"):
+    with pytest.raises(Fault, match=r"may lack its last lines: no space left on device; check what"):
         write(path, at(0, NODE))
 
 
@@ -128,7 +128,9 @@ def test_a_journal_deleted_meanwhile_is_a_fault_at_the_next_command_of_the_tool_
     if whole:
         directory.rmdir()
     journal(at(1, NODE))
-    with pytest.raises(Fault, match="cannot be written: it was deleted while the run went on; the run stops"):
+    with pytest.raises(
+        Fault, match="cannot be written: another program deleted it during the run; the run stops"
+    ):
         journal(at(2, event))
     journal.close()
 
@@ -166,7 +168,7 @@ def test_a_line_the_disk_takes_in_parts_is_whole(path, monkeypatch):
     assert find_end(read_journal(path)) == END
 
 
-LAST = encode(at(2, NodeStarted("ä")))[:-1]
+LAST = encode_event(at(2, NodeStarted("ä")))[:-1]
 ENDS = {
     b"": 0,
     FIRST: 1,
@@ -193,7 +195,7 @@ def test_a_torn_end_is_left_out_and_cut_off_where_the_journal_goes_on(path, cont
     if ticks:
         assert [timed.tick for timed in read_journal(path)] == [*ticks, 3]
     else:
-        assert path.read_bytes() == encode(resumed)
+        assert path.read_bytes() == encode_event(resumed)
 
 
 def test_a_torn_end_is_cut_on_the_disk_before_anything_is_appended(path, syncs):
@@ -209,7 +211,7 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
         Journal(path, resume=True)
     assert list(path.parent.iterdir()) == []
     path.write_bytes(FIRST)
-    with pytest.raises(InputError, match="the record of another run; a new run needs a directory of its own"):
+    with pytest.raises(InputError, match="the journal of another run; a new run needs its own directory"):
         Journal(path)
     assert path.read_bytes() == FIRST
     Journal(path, resume=True).close()
@@ -220,7 +222,7 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
     [
         (b'{"tick"', "EOF while parsing"),
         (b"", "EOF while parsing"),
-        (b"[1]", "it is no object"),
+        (b"[1]", "it contains no JSON object"),
         (b"\0\0\0\0", "expected value"),
         (b'{"a": "\xc3"}', "invalid unicode code point"),
         (b"[" * 100_000, "recursion limit exceeded"),
@@ -248,26 +250,29 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
             b'{"kind": "RunHalted", "tick": 240, "clock": 3.0, "ticked": true}',
             '"tick" 240 and "clock" 3.0 contra',
         ),
-        (encode(at(1, NodeEnded("a", "SUCCESS"))).replace(b"SUCC", b"ODDN"), '"status" of NodeEnded: string'),
         (
-            encode(at(1, frame_searched(detected("cube")))).replace(b'"label"', b'"name"'),
+            encode_event(at(1, NodeEnded("a", "SUCCESS"))).replace(b"SUCC", b"ODDN"),
+            '"status" of NodeEnded: string',
+        ),
+        (
+            encode_event(at(1, frame_searched(detected("cube")))).replace(b'"label"', b'"name"'),
             '"found.0.label" of Fr',
         ),
         (
-            encode(at(1, item_changed("cube-1"))).replace(b"[0.5, 0.0, 0.02]", b"[0.5, 0.0]"),
+            encode_event(at(1, item_changed("cube-1"))).replace(b"[0.5, 0.0, 0.02]", b"[0.5, 0.0]"),
             '"position" of ItemChanged: ',
         ),
     ],
 )
 def test_a_line_that_is_no_event_is_an_error_with_its_number(path, line, why):
-    path.write_bytes(FIRST + line + b"\n" + encode(at(2, NODE)))
+    path.write_bytes(FIRST + line + b"\n" + encode_event(at(2, NODE)))
     with pytest.raises(InputError) as raised:
         read_journal(path)
     message = str(raised.value)
     assert message.startswith(f"{path}:2: this line is no event (")
     assert why in message
     assert message.endswith(
-        "somebody changed it after the run, or the disk lost a part of it; restore a copy"
+        "after the run, because a run only appends to its journal; restore a copy of the file"
     )
 
 
@@ -284,7 +289,7 @@ def test_a_journal_of_the_first_format_is_named(path, first, version):
         read_journal(path)
     assert str(raised.value) == (
         f"{path}: this journal has format 1, written by executive {version}; this version reads format 2; "
-        f"read it with executive {version}, or run the mission again"
+        f"read the journal with executive {version}, or run the mission again"
     )
 
 
@@ -314,7 +319,7 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
     timed = [at(tick, event) for tick, event in enumerate(events)]
     write(path, *timed)
     assert repr(read_journal(path)) == repr(timed)
-    assert {type(event).__name__ for event in events} == KINDS.keys()
+    assert {type(event).__name__ for event in events} == EVENT_CLASSES.keys()
 
 
 def test_a_text_that_is_not_unicode_is_kept_readable(path):
@@ -326,7 +331,7 @@ def test_a_text_that_is_not_unicode_is_kept_readable(path):
 def test_a_value_that_is_not_json_is_a_fault_and_the_journal_goes_on(path, value):
     with closing(Journal(path)) as journal:
         journal(at(0, run_started()))
-        with pytest.raises(Fault, match="the journal cannot hold an event of kind InputRead: "):
+        with pytest.raises(Fault, match="JSON cannot represent an event of kind InputRead: "):
             journal(at(0, read("arm.q", value)))
         journal(at(1, END))
     assert find_end(read_journal(path)) == END
@@ -335,11 +340,11 @@ def test_a_value_that_is_not_json_is_a_fault_and_the_journal_goes_on(path, value
 def test_the_schema_that_ships_describes_the_events():
     shipped = Path(journal_format.__file__).with_name("journal.schema.json")
     made = "executive schema --journal > executive/record/journal.schema.json"
-    assert json.loads(shipped.read_text(encoding="utf-8")) == journal_schema(), f"run: {made}"
+    assert json.loads(shipped.read_text(encoding="utf-8")) == make_journal_schema(), f"run: {made}"
 
 
 def test_every_line_of_a_journal_fits_the_schema(path):
     write(path, at(0, run_started()), at(1, NODE), at(2, frame_searched(detected("cube"))), at(3, END))
-    validator = Draft7Validator(journal_schema())
+    validator = Draft7Validator(make_journal_schema())
     for line in path.read_text().splitlines():
         validator.validate(json.loads(line))

@@ -41,12 +41,12 @@ def refusal(path: Path, **how: bool) -> str:
 def test_a_second_run_is_told_which_process_writes_there(tmp_path, holder):
     assert refusal(tmp_path / "journal.jsonl") == (
         f'the run directory "{tmp_path}" is in use: process {holder.pid} writes its journal, and two runs '
-        f'cannot share it; wait until that run has ended, or end it with "kill {holder.pid}"'
+        f'cannot share it; wait until that run has ended, or stop it with "kill {holder.pid}"'
     )
 
 
 def test_where_nobody_tells_which_process_it_is_it_is_another(tmp_path, holder, monkeypatch):
-    monkeypatch.setattr(module, "LOCKS", tmp_path / "none")
+    monkeypatch.setattr(module, "LOCK_LIST", tmp_path / "none")
     assert "is in use: another process writes its journal" in refusal(tmp_path / "journal.jsonl", resume=True)
 
 
@@ -57,10 +57,10 @@ def test_where_nobody_tells_which_process_it_is_it_is_another(tmp_path, holder, 
      "-> FLOCK  ADVISORY  WRITE {pid} {file}"],
 )  # fmt: skip
 def test_a_process_that_holds_another_lock_is_not_named(tmp_path, holder, monkeypatch, line):
-    monkeypatch.setattr(module, "LOCKS", tmp_path / "locks")
+    monkeypatch.setattr(module, "LOCK_LIST", tmp_path / "locks")
     state = (tmp_path / "journal.jsonl").stat()
     file = f"{os.major(state.st_dev):02x}:{os.minor(state.st_dev):02x}:{state.st_ino}"
-    module.LOCKS.write_text(f"1: {line} 0 EOF\n\n".format(pid=holder.pid, file=file))
+    module.LOCK_LIST.write_text(f"1: {line} 0 EOF\n\n".format(pid=holder.pid, file=file))
     assert "another process" in refusal(tmp_path / "journal.jsonl", resume=True)
 
 

@@ -24,5 +24,5 @@ def test_a_tree_is_read_as_it_was_written_and_values_that_json_lacks_as_text(tmp
     assert leaf == LEAF
     assert read.params["x"] == "Infinity" and "object" in read.params["y"]
     file.write_text("{}")
-    with pytest.raises(InputError, match=r"holds no tree of a run: input should be a valid array"):
+    with pytest.raises(InputError, match=r"contains no tree of a run: input should be a valid array"):
         read_tree(file)

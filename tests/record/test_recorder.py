@@ -47,6 +47,6 @@ def test_the_pictures_are_waited_for_whatever_became_of_the_journal(directory, m
     assert closed == [False]
     recorder.close()
     assert closed == [False, True]
-    first, second = recorder.problem.split("; believe what you see in the cell rather than the record; ")
+    first, second = recorder.problem.split("; check what the tool holds and what is in the bins; ")
     assert "may lack its last lines" in first
     assert second == "no pictures were drawn: file exists"

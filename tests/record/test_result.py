@@ -12,8 +12,8 @@ from executive.errors import ExecutiveError
 from executive.record.result import (
     ItemCounts,
     Result,
-    disagreement,
-    exit_code,
+    describe_disagreement,
+    find_exit_code,
     list_requests,
     make_audit,
     read_result,
@@ -56,7 +56,7 @@ def test_is_written_and_can_be_read_again(tmp_path):
 
 
 def test_a_disk_that_does_not_take_it_is_a_sentence(tmp_path):
-    with pytest.raises(ExecutiveError, match=r"cannot write the result .* the journal beside it"):
+    with pytest.raises(ExecutiveError, match=r"cannot write the result .* the journal in the same folder"):
         write_result(tmp_path / "nowhere" / "result.json", result())
 
 
@@ -79,15 +79,15 @@ def test_a_disk_that_does_not_take_it_is_a_sentence(tmp_path):
 )
 def test_every_disagreement_of_ledger_and_audit_is_noticed(audit, ended, warning):
     made = result(audit=None if audit is None else AUDIT | audit, **ended)
-    assert warning in disagreement(made)
-    assert bool(disagreement(made)) == bool(warning)
-    assert exit_code(made) == (1 if warning else 0)
+    assert warning in describe_disagreement(made)
+    assert bool(describe_disagreement(made)) == bool(warning)
+    assert find_exit_code(made) == (1 if warning else 0)
 
 
 @pytest.mark.parametrize(
     ("status", "code"), [("SUCCESS", 0), ("FAILURE", 1), ("FAULT", 3), ("INCOMPLETE", 4), ("HALTED", 130)]
 )
 def test_the_exit_code_follows_from_the_status_unless_the_audit_disagrees(status, code):
-    assert exit_code(result(status=status)) == code
+    assert find_exit_code(result(status=status)) == code
     wrong = result(status=status, audit=AUDIT | {"right": 1, "wrong_bin": 1})
-    assert exit_code(wrong) == (1 if code in (0, 4) else code)
+    assert find_exit_code(wrong) == (1 if code in (0, 4) else code)

@@ -237,11 +237,11 @@ def test_there_must_be_something_to_take_up(missions: Path, tmp_path: Path) -> N
     with pytest.raises(InputError, match=r"ended as SUCCESS; there is nothing to resume"):
         resumed(path)
     (path / "journal.jsonl").write_text("")
-    with pytest.raises(InputError, match=r"had not begun when it was cut off; run the mission again"):
+    with pytest.raises(InputError, match=r"was interrupted before its start; run the mission again"):
         resumed(path)
-    with pytest.raises(InputError, match=r'"nowhere" is no run directory, .* the last ones there: 20'):
+    with pytest.raises(InputError, match=r'"nowhere" is no run directory, .* the last runs there: 20'):
         find_run("nowhere", tmp_path)
-    with pytest.raises(InputError, match=r"there is none at all; say where they are with --runs DIR"):
+    with pytest.raises(InputError, match=r"it contains no run at all; name the folder of the runs with"):
         find_run("latest", tmp_path / "empty")
 
 

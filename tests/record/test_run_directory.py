@@ -59,7 +59,7 @@ def test_a_place_that_cannot_be_written_to_is_a_sentence(tmp_path, make):
         make(tmp_path / "file" / "runs")
     assert str(raised.value) == (
         f'cannot make a run directory below "{tmp_path}/file/runs": not a directory; '
-        "name another place with --runs DIR"
+        "name another folder with --runs DIR"
     )
 
 
@@ -69,7 +69,7 @@ def test_space_is_spoken_of_where_it_is_what_is_missing(number):
     with pytest.raises(InputError) as raised, convert_os_errors("write"):
         raise OSError(number, reason)
     assert str(raised.value) == (
-        f"cannot write: {reason.lower()}; free some space or name another place with --runs DIR"
+        f"cannot write: {reason.lower()}; free some space or name another folder with --runs DIR"
     )
 
 

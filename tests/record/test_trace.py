@@ -9,7 +9,7 @@ import pytest
 from events import at, frame_searched, item_changed, run_ended, run_started
 
 from executive.events import NodeEnded, NodeStarted, RequestGiven, TargetSelected, TimedEvent, ToolCommanded
-from executive.record.journal_format import decode, encode
+from executive.record.journal_format import decode_event, encode_event
 from executive.record.trace import Trace
 
 FAILED = NodeEnded("sort/Grasp", "FAILURE", "Grasp", "cube-1", "missed", "no seal")
@@ -48,7 +48,7 @@ def test_one_line_of_compact_json_is_hashed_per_decision():
 
 
 def test_the_journal_gives_the_same_trace():
-    assert digest(*(decode(encode(event)) for event in EVENTS)) == digest(*EVENTS)
+    assert digest(*(decode_event(encode_event(event)) for event in EVENTS)) == digest(*EVENTS)
 
 
 def test_wording_does_not_count():

@@ -11,7 +11,7 @@ from executive.campaign.faults.judgement import format_counts
 from executive.campaign.subject import Subject
 from executive.errors import InputError
 from executive.events import NodeEnded, NodeStarted, TimedEvent
-from executive.record.result import agrees
+from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 
 
@@ -80,7 +80,7 @@ def rehearse(subject: Subject) -> Rehearsal:
             f"{description} ends as {outcome.status} {outcome.reason}: {outcome.message}; "
             "a campaign needs a run that succeeds: choose another seed"
         )
-    if audit is not None and (audit["unseen"] or not agrees(items, audit, outcome.empty)):
+    if audit is not None and (audit["unseen"] or not is_confirmed_by_audit(items, audit, outcome.empty)):
         raise InputError(
             f"{description} ends with a wrong ledger: the ledger says {format_counts(items)}; "
             f"the audit {format_counts(audit)}; choose another seed, or a mission that looks at the "

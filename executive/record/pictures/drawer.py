@@ -7,7 +7,7 @@ from concurrent.futures import wait as wait_for
 from pathlib import Path
 
 from executive.errors import ExecutiveError, explain_os_errors
-from executive.record.atomic_file import atomic_replacement
+from executive.record.atomic_file import replace_atomically
 from executive.record.pictures.draw import draw
 from executive.record.pictures.scene import PictureScene
 
@@ -69,6 +69,6 @@ def save(path: Path, scene: PictureScene) -> None:
     _, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     with (
         explain_os_errors(ExecutiveError, f'cannot write the picture "{path}"'),
-        atomic_replacement(path) as part,
+        replace_atomically(path) as part,
     ):
         part.write_bytes(data.tobytes())

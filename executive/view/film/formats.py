@@ -139,6 +139,6 @@ def prepare_file(path: Path, *, force: bool) -> Iterator[Path]:
     remedy = "name another place with -o"
     with (
         explain_os_errors(InputError, f'cannot write the film "{path}"', remedy),
-        atomic_replacement(path) as partial_file,
+        replace_atomically(path) as partial_file,
     ):
         yield partial_file

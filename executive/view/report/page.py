@@ -15,7 +15,7 @@ from executive.perception.evidence import describe_unknown
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis import text
 from executive.record.pictures.palette import PALETTE
-from executive.record.result import disagreement
+from executive.record.result import describe_disagreement
 from executive.record.run_directory import RunDirectory, convert_os_errors
 from executive.record.timeline.activation import count_ends, find_last_failure, group_by_node
 from executive.view.report.facts import ReportFacts
@@ -97,7 +97,7 @@ def _find_reason(facts: ReportFacts) -> str:
 
 def _describe_end(facts: ReportFacts) -> str:
     """Return a sentence about the end of the run, after a warning if ledger and audit disagree."""
-    warning = "" if facts.result is None else disagreement(facts.result)
+    warning = "" if facts.result is None else describe_disagreement(facts.result)
     return ". ".join(filter(None, (warning, _describe_status(facts))))
 
 

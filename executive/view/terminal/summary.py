@@ -10,7 +10,7 @@ from pathlib import Path
 from executive.events import ItemChanged
 from executive.perception.evidence import describe_unknown
 from executive.record.diagnosis.text import diagnosis_lines, resume_command, wrap_lines
-from executive.record.result import Result, disagreement
+from executive.record.result import Result, describe_disagreement
 
 
 def repeat_command(
@@ -64,7 +64,7 @@ def summary(result: Result, items: Iterable[ItemChanged], repeat: str, report: s
     if unknown := describe_unknown(result.unknown):
         ends.append(f"  {unknown}")
     ends += [f"  assumed error rates: {doubt}" for doubt in result.doubts]
-    warning = wrap_lines(disagreement(result), "", "  ", max_lines=3)
+    warning = wrap_lines(describe_disagreement(result), "", "  ", max_lines=3)
     if result.story is not None:
         lines = [times, *ends, "", *diagnosis_lines(result.story, result.run, repeat, report)]
     else:

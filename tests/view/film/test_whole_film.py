@@ -96,8 +96,8 @@ def test_the_source_is_the_record_and_may_be_cut_off(copy: RunDirectory) -> None
     ("file", "content", "sentence"),
     [
         ("tree.json", None, 'cannot read the tree "'),
-        ("cell.yaml", None, "holds no cell that can be read"),
-        ("journal.jsonl", "", "had not begun when it was cut off; there is nothing to film"),
+        ("cell.yaml", None, "cannot read the cell file in the run directory"),
+        ("journal.jsonl", "", "was interrupted before its start; there is nothing to film"),
         ("world.log", "{}",
          "its cell has no simulated world; film a run on a cell of `kind: sim`"),
         ("world.log", None,

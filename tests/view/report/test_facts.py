@@ -15,7 +15,7 @@ from executive.errors import InputError
 from executive.events import Event, FaultInjected, RequestGiven, RunResumed
 from executive.mission.text.files import shipped_folder
 from executive.plugins import discover
-from executive.record.journal_format import encode
+from executive.record.journal_format import encode_event
 from executive.record.recorded_run import RecordOptions
 from executive.record.resumed_run import resume_run
 from executive.run.assembly import RunOptions
@@ -24,7 +24,7 @@ from executive.view.report.facts import CUT_OFF, ReportFacts
 
 def append(run: Path, tick: int, event: Event) -> None:
     with (run / "journal.jsonl").open("ab") as journal:
-        journal.write(encode(at(tick, event)))
+        journal.write(encode_event(at(tick, event)))
 
 
 def without_end(run: Path) -> None:
@@ -103,5 +103,5 @@ def test_a_run_that_had_not_begun_has_nothing_to_report(done, copy):
     with pytest.raises(InputError) as caught:
         ReportFacts(run)
     assert str(caught.value) == (
-        f'the run in "{run}" had not begun when it was cut off; there is nothing to report'
+        f'the run in "{run}" was interrupted before its start; there is nothing to report'
     )
