@@ -71,7 +71,7 @@ def test_leaves_a_directory_that_explains_the_run(run, tmp_path):
 
 def test_a_view_is_told_the_tree_first_and_the_end_last(run):
     view, other = Watcher(), Watcher()
-    run(view, other, frames=False)
+    run(view, other, saves_pictures=False)
     assert view.seen == other.seen
     root, first, *_, last, closed = view.seen
     assert isinstance(root, py_trees.behaviour.Behaviour)
@@ -83,7 +83,7 @@ def test_whatever_ends_a_run_early_view_journal_and_cell_are_closed(run, tmp_pat
     def fails(self):
         raise error
 
-    monkeypatch.setattr(Run, "audit", fails)
+    monkeypatch.setattr(Run, "count_ground_truth", fails)
     view, other = Watcher(), Watcher()
     with pytest.raises(type(error)):
         run(view, other)
