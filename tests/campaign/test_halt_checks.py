@@ -28,7 +28,7 @@ def journal_of(*statuses: tuple[str, str], end: RunEnded = HALTED) -> list[Timed
 
 def test_an_arm_that_moves_is_told(fake: FakeCell) -> None:
     assert list(check_rest(fake)) == []
-    fake.arm.start(fake.arm._solve(fake.arm.destination, "home", Task()) or pytest.fail())
+    fake.arm.start(fake.arm._plan_motion(fake.arm.destination, "home", Task()) or pytest.fail())
     fake.arm._path *= 20
     found = list(check_rest(fake))
     assert found[0] == "the arm is not at rest"

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image, ImageColor
 
 from executive.errors import InputError, explain_os_errors
-from executive.record.atomic_file import atomic_replacement
+from executive.record.atomic_file import replace_atomically
 from executive.view.film.style import FAILURE, RUNNING, SUCCESS
 
 GIF_SIZE = (960, 540)
