@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, get_args, g
 from executive.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from executive.cell.protocols import Cell, LeastTimes
+    from executive.cell.protocols import Cell, MinTimes
 
 T = TypeVar("T")
 
@@ -213,7 +213,7 @@ class Skill:
         raise NotImplementedError
 
     @classmethod
-    def min_time(cls, min_times: LeastTimes, values: Mapping[str, Any]) -> float:
+    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
         """Return the minimum time in which the skill can succeed [s]; by default the duration of `waits`.
 
         Args:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from executive.cell.arm import Goal, Task
 from executive.cell.objects import ObjectClass, Target
-from executive.cell.protocols import Cell, LeastTimes, Steps, Tool
+from executive.cell.protocols import Cell, MinTimes, Steps, Tool
 from executive.manipulation.motions import follow, plan
 from executive.manipulation.tool_goals import (
     OVERTRAVEL,
@@ -49,10 +49,10 @@ class Approach(Skill):
     tool_state: ClassVar = (EMPTY, EMPTY)
 
     @classmethod
-    def min_time(cls, min_times: LeastTimes, values: Mapping[str, Any]) -> float:
+    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
         """Return the duration of the guarded descent [s]; the arm may already be above the target."""
         del values
-        return min_times.descent
+        return min_times.descent_time
 
     def run(self, cell: Cell) -> Steps:
         """Move to the target and descend until the cup touches something."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from executive.cell.detection import Detections
-from executive.cell.protocols import Cell, LeastTimes, Steps
+from executive.cell.protocols import Cell, MinTimes, Steps
 from executive.errors import Crowded, Unavailable
 from executive.manipulation.obstacles import shows_bin_content
 from executive.skill import Out, Skill, param, port
@@ -38,9 +38,9 @@ class Detect(Skill):
     senses: ClassVar = True
 
     @classmethod
-    def min_time(cls, min_times: LeastTimes, values: Mapping[str, Any]) -> float:
+    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
         """Return the time until the detector's answer [s]."""
-        return min_times.answer(values["detector"])
+        return min_times.get_answer_time(values["detector"])
 
     def run(self, cell: Cell) -> Steps:
         """Take a frame, ask the detector, wait for its answer."""
@@ -49,7 +49,7 @@ class Detect(Skill):
             raise self.failure("hidden", f"the arm hides part of the workspace from camera {camera.name}")
         detector = cell.detectors[self.detector or next(iter(cell.detectors))]
         frame = camera.capture()
-        if displacement := camera.displacement(frame):
+        if displacement := camera.describe_displacement(frame):
             raise self.failure("camera_moved", displacement)
         request = detector.request(frame, self.view)
         while not request.ready:
@@ -63,4 +63,6 @@ class Detect(Skill):
         on_table = (box for box in answer.doubtful if not shows_bin_content(cell, box, frame))
         if not answer.found and self.doubtful == "fail" and (best := next(on_table, None)):
             raise self.failure("unsure", answer.describe_doubt(best))
-        self.detections = Detections(**vars(answer), frame=frame, view=self.view, area=camera.area(self.view))
+        self.detections = Detections(
+            **vars(answer), frame=frame, view=self.view, area=camera.get_view_box(self.view)
+        )

@@ -44,7 +44,7 @@ class SelectTarget(Skill):
         self.target, self.item = best, best.item
         bins = cell.routes[cell.ledger.get_label(best.item)]
         self.bin = min(bins, key=lambda bin: count_used_slots(cell, bin))
-        cell.decided(best, self.bin)
+        cell.report_selection(best, self.bin)
 
     def _is_requested(self, cell: Cell, item: Item) -> bool:
         label = cell.ledger.get_label(item)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from executive.cell.objects import Item
-from executive.cell.protocols import Cell, LeastTimes, Steps
+from executive.cell.protocols import Cell, MinTimes, Steps
 from executive.manipulation.motions import carry
 from executive.manipulation.tool_goals import DROP_HEIGHT, goal_in_bin
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
@@ -34,9 +34,9 @@ class Transit(Skill):
     tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
 
     @classmethod
-    def min_time(cls, min_times: LeastTimes, values: Mapping[str, Any]) -> float:
+    def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
         """Return the time of the shortest transit from the workspace to the bin, if it is known [s]."""
-        return min_times.carry(values.get("bin"))
+        return min_times.get_transport_time(values.get("bin"))
 
     def run(self, cell: Cell) -> Steps:
         """Plan the motion, then follow it while the seal holds."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
 from executive.cells.fake.cell import SilentOperator
-from executive.events import ignore
+from executive.events import discard_event
 from executive.mission.load import LoadedMission
 from executive.testing.faults.world_access import WorldAccess, open_world
 
@@ -30,7 +30,7 @@ def meanwhile(
         kind: Makes the work cell, a fake or a simulated one.
     """
     options = CellOptions(SilentOperator(), base=loaded.cell_path.parent, resume=ResumePoint(log))
-    cell = kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=ignore, options=options)
+    cell = kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=discard_event, options=options)
     with closing(cell):
         world = open_world(cell)
         world.settle()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from executive.cell.config import CellConfig, DetectorConfig
-from executive.cell.layout import object_class
+from executive.cell.layout import build_object_class
 from executive.cell.protocols import Localizer
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_count
@@ -211,7 +211,7 @@ def _build_localizer(config: CellConfig) -> Localizer | None:
     """Return the cell's localizer; None for `ray`, which needs the simulated world."""
     if config.localization == "ray":
         return None
-    classes = {label: object_class(label, kind) for label, kind in config.objects.items()}
+    classes = {label: build_object_class(label, kind) for label, kind in config.objects.items()}
     return build_localizer(config.localization, classes)
 
 

@@ -92,7 +92,7 @@ class Arm(Protocol):
         """True while the arm neither follows a motion nor brakes."""
 
     @property
-    def met(self) -> str | None:
+    def collision(self) -> str | None:
         """Description of the collision that ended the last motion, or None."""
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Planning:

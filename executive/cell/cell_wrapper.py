@@ -69,7 +69,7 @@ class CellWrapper:
         self.inner.close()
 
 
-def innermost(workcell: Workcell) -> Workcell:
+def find_innermost_cell(workcell: Workcell) -> Workcell:
     """Return the work cell inside all wrappers."""
     while isinstance(workcell, CellWrapper):
         workcell = workcell.inner

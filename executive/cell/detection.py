@@ -90,7 +90,7 @@ class Detections(Answer):
 
     def is_searched(self, points: Array) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the points `(N, 3)` [m] at which an object would be seen completely."""
-        return self.is_in_area(points) & self.frame.is_unobstructed(points)
+        return self.is_in_area(points) & self.frame.is_unoccluded(points)
 
 
 @dataclass(frozen=True, eq=False)

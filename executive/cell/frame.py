@@ -46,7 +46,7 @@ class Frame:
     visible: NDArray[np.bool_]
     epoch: int
 
-    def visible_share(self, box: Box) -> float:
+    def compute_visible_fraction(self, box: Box) -> float:
         """Return the share of a box (0 to 1) in which the arm does not hide the scene."""
         height, width = self.visible.shape
         left, right = (min(max(round(x), 0), width) for x in box[::2])
@@ -67,7 +67,7 @@ class Frame:
         inside = (pixels >= (left + margin, top + margin)) & (pixels < (right - margin, bottom - margin))
         return np.asarray(is_ahead & inside.all(axis=1))
 
-    def is_unobstructed(self, points: Array) -> NDArray[np.bool_]:
+    def is_unoccluded(self, points: Array) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the points `(N, 3)` [m] at which the arm hides no part of an object."""
         mask = np.ones(len(points), dtype=bool)
         height, width = self.visible.shape
@@ -77,11 +77,11 @@ class Frame:
             mask &= is_ahead & self.visible[rows, columns]
         return mask
 
-    def depth_of(self, position: Array) -> float:
+    def compute_depth(self, position: Array) -> float:
         """Return the distance [m] of a point `(3,)` [m] from the camera, along the optical axis."""
         return float(self.X_WC.inverse().apply(position)[2])
 
-    def opencv(self) -> tuple[Array, Array, Array]:
+    def to_opencv(self) -> tuple[Array, Array, Array]:
         """Return the camera in OpenCV's form: matrix `(3, 3)`, rvec `(3,)` [rad] and tvec `(3,)` [m].
 
         `cv2.projectPoints(points, rvec, tvec, matrix, None)` then returns world points in OpenCV's pixels.
@@ -101,7 +101,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class FrameTaken(Event):
+class FrameCaptured(Event):
     """Image of the next `FrameSearched`; only for observers in this process.
 
     Attributes:

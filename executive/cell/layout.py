@@ -21,7 +21,7 @@ NECK_LENGTH = 0.015
 """Length of the thin part at the end of the tool, which has the radius of the cup [m]."""
 
 
-def as_bin(name: str, config: BinConfig) -> Bin:
+def build_bin(name: str, config: BinConfig) -> Bin:
     """Return a bin of a cell file, with its slots distributed evenly over the floor."""
     position, size = np.array(config.position), np.array(config.size)
     columns, rows = config.slots
@@ -31,25 +31,25 @@ def as_bin(name: str, config: BinConfig) -> Bin:
     return Bin(name, position, size, slots)
 
 
-def object_class(label: str, config: ObjectConfig) -> ObjectClass:
+def build_object_class(label: str, config: ObjectConfig) -> ObjectClass:
     """Return an object class of a cell file for skills, with the default mass."""
     return ObjectClass(label, config.height, config.radius, config.ring)
 
 
-def travel_height(config: CellConfig) -> float:
+def compute_travel_height(config: CellConfig) -> float:
     """Return the tool height [m] at which the tallest load clears the highest wall and pile."""
     max_height = max(kind.height for kind in config.objects.values())
     wall_top = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
-    return max(wall_top, pile_height(config)) + max_height + config.motion.clearance
+    return max(wall_top, compute_max_pile_height(config)) + max_height + config.motion.clearance
 
 
-def pile_height(config: CellConfig) -> float:
+def compute_max_pile_height(config: CellConfig) -> float:
     """Return the largest height of a pile on the table [m]: the tallest object, twice if stacked."""
     max_height = max(kind.height for kind in config.objects.values())
     return 2 * max_height if config.table.stacked else max_height
 
 
-def bin_walls(size: tuple[float, float, float]) -> Sequence[tuple[Triple, Triple]]:
+def list_bin_walls(size: tuple[float, float, float]) -> Sequence[tuple[Triple, Triple]]:
     """Return the half extents of a bin's floor and walls, and their centres relative to the bin [m]."""
     (length, width, height), t = size, BIN_THICKNESS
     across, along = (t / 2, width / 2 + t, height / 2), (length / 2, t / 2, height / 2)
@@ -59,7 +59,7 @@ def bin_walls(size: tuple[float, float, float]) -> Sequence[tuple[Triple, Triple
     return floor, *sides
 
 
-def places_out_of_reach(
+def find_unreachable_places(
     config: CellConfig, require: Callable[[Array, float], None]
 ) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key in the cell file and a sentence for each bin or safe place that is out of reach.
@@ -69,7 +69,7 @@ def places_out_of_reach(
         require: Raises `Unreachable` if a place `(2,)` [m] on a floor of a height [m] is out of reach.
     """
     places: list[tuple[KeyPath, str, Array, float]] = [
-        (("bins", name, "position"), f'the bin "{name}"', as_bin(name, bin).slots, bin.position[2])
+        (("bins", name, "position"), f'the bin "{name}"', build_bin(name, bin).slots, bin.position[2])
         for name, bin in config.bins.items()
     ]
     safe_place = np.array([config.safe_place[:2]])
@@ -82,11 +82,11 @@ def places_out_of_reach(
             yield keys, f"{name} is out of reach: {error}"
 
 
-def bins_of(config: CellConfig) -> dict[str, Bin]:
+def build_bins(config: CellConfig) -> dict[str, Bin]:
     """Return the bins of a cell file by name."""
-    return {name: as_bin(name, bin) for name, bin in config.bins.items()}
+    return {name: build_bin(name, bin) for name, bin in config.bins.items()}
 
 
-def object_classes(config: CellConfig) -> dict[str, ObjectClass]:
+def build_object_classes(config: CellConfig) -> dict[str, ObjectClass]:
     """Return the object classes of a cell file by label, each with the default mass."""
-    return {label: object_class(label, kind) for label, kind in config.objects.items()}
+    return {label: build_object_class(label, kind) for label, kind in config.objects.items()}

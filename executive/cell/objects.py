@@ -59,11 +59,11 @@ class Load:
 
     Attributes:
         kind: Class of the object.
-        bears: Largest force that the seal withstands [N].
+        holding_force: Largest force that the seal withstands [N].
     """
 
     kind: ObjectClass
-    bears: float = math.inf
+    holding_force: float = math.inf
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ class Tool(Protocol):
         """True while the vacuum sensor reports a seal."""
 
     @property
-    def bears(self) -> float:
+    def holding_force(self) -> float:
         """Largest force that the seal withstands, by the vacuum gauge [N]; 0 without a seal."""
 
     def close(self) -> None:
@@ -77,7 +77,7 @@ class Camera(Protocol):
     def next_pose(self) -> str:
         """Return the next scan pose in turn, for a look from another viewpoint."""
 
-    def area(self, view: str) -> Box:
+    def get_view_box(self, view: str) -> Box:
         """Return the part of the image [pixel] that a view shows: `table` (the workspace) or `full`."""
 
     def sees_table(self) -> bool:
@@ -86,7 +86,7 @@ class Camera(Protocol):
     def capture(self) -> Frame:
         """Return a new frame."""
 
-    def displacement(self, frame: Frame) -> str:
+    def describe_displacement(self, frame: Frame) -> str:
         """Return a sentence about the displacement of the camera that a frame shows, or ""."""
 
 
@@ -147,23 +147,23 @@ class Operator(Protocol):
         """
 
 
-class LeastTimes(Protocol):
+class MinTimes(Protocol):
     """Lower bounds of the times of actions in a cell [s].
 
     An action with a shorter timeout always fails.
     """
 
     @property
-    def descent(self) -> float:
+    def descent_time(self) -> float:
         """Time of the guarded last part of an approach to an object on the table [s]."""
 
-    def carry(self, bin: str | None) -> float:
+    def get_transport_time(self, bin: str | None) -> float:
         """Return the time from the workspace to a bin [s], from rest to rest; None: the nearest bin.
 
         0 for a bin that the cell lacks.
         """
 
-    def answer(self, detector: str) -> float:
+    def get_answer_time(self, detector: str) -> float:
         """Return the time from a frame to the answer [s]; "": the first detector; 0 for an unknown one."""
 
 
@@ -186,7 +186,7 @@ class Cell:
         safe_place: Place on the table for a put-down `(3,)` [m].
         descent: Length of the guarded last part of an approach above the expected surface [m].
         descent_speed: Tool speed of the guarded part [m/s].
-        decided: Records a selected target and the name of its bin; a skill that selects a target calls it.
+        report_selection: Reports a target that a skill has selected, and the name of its bin, to the run.
     """
 
     clock: Clock
@@ -203,4 +203,4 @@ class Cell:
     safe_place: Array
     descent: float
     descent_speed: float
-    decided: Callable[[Target, str], None]
+    report_selection: Callable[[Target, str], None]

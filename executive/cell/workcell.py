@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from executive.cell.protocols import Cell, LeastTimes, Operator, Routes
+from executive.cell.protocols import Cell, MinTimes, Operator, Routes
 from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
 
@@ -148,5 +148,5 @@ class CellKind(Protocol):
         errors.
         """
 
-    def least_times(self, config: Any) -> LeastTimes:
+    def min_times(self, config: Any) -> MinTimes:
         """Return the minimum times of actions in a cell for which `check` returns no finding."""

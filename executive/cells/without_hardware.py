@@ -10,7 +10,7 @@ import numpy as np
 
 from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
-from executive.cell.layout import bins_of, object_classes
+from executive.cell.layout import build_bins, build_object_classes
 from executive.cell.objects import Target
 from executive.cell.protocols import Cell, Routes
 from executive.cell.visuals import Visuals
@@ -48,7 +48,12 @@ class CellWithoutHardware:
         self.config, self.routes = config, dict(routes)
         self.steps = self.last_command = 0
         self.accounts = Tracker(
-            config.ledger, config.table, bins_of(config), self.routes, emit, classes_distinct_by_touch(config)
+            config.ledger,
+            config.table,
+            build_bins(config),
+            self.routes,
+            emit,
+            classes_distinct_by_touch(config),
         )
         missing: Any = None
 
@@ -63,14 +68,14 @@ class CellWithoutHardware:
             detectors=dict.fromkeys(config.detectors, missing),
             ledger=self.accounts,
             operator=options.operator,
-            bins=bins_of(config),
-            classes=object_classes(config),
+            bins=build_bins(config),
+            classes=build_object_classes(config),
             routes=self.routes,
             localizer=missing,
             safe_place=np.array(config.safe_place),
             descent=config.motion.descent,
             descent_speed=config.motion.descent_speed,
-            decided=emit_decision,
+            report_selection=emit_decision,
         )
 
     def log_to(self, path: Path) -> None:

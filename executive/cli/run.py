@@ -78,7 +78,7 @@ def command(
         ),
     )
     with stdout_kept_clean():
-        from executive.cell.plain import plain
+        from executive.cell.json_values import to_json
         from executive.record.diagnosis.text import diagnosis_lines
         from executive.record.guarded_view import GuardedView
         from executive.record.recorded_run import RecordOptions
@@ -123,7 +123,7 @@ def command(
             ended = verdict(result.status, result.reason, result.node, result.message)
             click.echo("\n".join(filter(None, (describe_disagreement(result), ended))), err=True)
     if as_json:
-        print_json(plain(result))
+        print_json(to_json(result))
     ctx.exit(find_exit_code(result))
 
 

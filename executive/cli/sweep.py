@@ -48,7 +48,7 @@ def command(
     """
     with stdout_kept_clean():
         from executive.campaign.sweep import Job, summarize, sweep
-        from executive.cell.plain import plain
+        from executive.cell.json_values import to_json
         from executive.cli.progress import bar, print_halting
         from executive.mission.load import load_mission
         from executive.plugins import cell_kind, discover
@@ -68,7 +68,7 @@ def command(
         click.echo(_describe(figures), err=True)
     if as_json:
         settings = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}
-        print_json({**settings, **figures, "results": plain(results)})
+        print_json({**settings, **figures, "results": to_json(results)})
     has_problem = figures["succeeded"] < figures["runs"] or bool(figures["disagreements"])
     ctx.exit(130 if figures["cut_off"] else int(has_problem))
 

@@ -63,7 +63,7 @@ def command(
 
 def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:
     """Return a mission's name and its tree's outline."""
-    from executive.events import ignore
+    from executive.events import discard_event
     from executive.mission.build import build
     from executive.mission.load import load_mission
     from executive.mission.outline import outline
@@ -74,4 +74,4 @@ def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[
     loaded = load_mission(mission, skills, overrides)
     # A tree that never runs needs no cell, only a clock, which stands still.
     nowhere = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
-    return loaded.mission.name, outline(build(loaded, skills, nowhere, Blackboard(), ignore))
+    return loaded.mission.name, outline(build(loaded, skills, nowhere, Blackboard(), discard_event))

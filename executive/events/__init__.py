@@ -5,7 +5,7 @@ A journal holds one JSON object per event; its keys are the fields of these clas
 """
 
 from executive.events.cell import FaultInjected, InputRead, MotionPlanned, ToolCommanded
-from executive.events.event import Emit, Event, Observer, TimedEvent, ignore
+from executive.events.event import Emit, Event, Observer, TimedEvent, discard_event
 from executive.events.ledger import DetectedObject, FrameSearched, ItemChanged, TargetSelected
 from executive.events.run import (
     JOURNAL_FORMAT,
@@ -43,5 +43,5 @@ __all__ = [
     "TargetSelected",
     "TimedEvent",
     "ToolCommanded",
-    "ignore",
+    "discard_event",
 ]

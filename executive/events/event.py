@@ -45,5 +45,5 @@ Observer = Callable[[TimedEvent], None]
 """Function that receives an event on the tick thread and returns at once."""
 
 
-def ignore(event: Event) -> None:
+def discard_event(event: Event) -> None:
     """Do nothing: the `emit` of a part without observers."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from executive.cell.detection import Observation
 from executive.cell.frame import Frame
+from executive.cell.json_values import round_values
 from executive.cell.objects import Target
-from executive.cell.plain import round_values
 from executive.events import ItemChanged
 from executive.geometry import Array
 from executive.ledger.belief import Belief

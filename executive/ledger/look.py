@@ -11,7 +11,7 @@ import numpy as np
 
 from executive.cell.config import LedgerConfig
 from executive.cell.detection import Detections, Observation
-from executive.cell.plain import round_values
+from executive.cell.json_values import round_values
 from executive.events import DetectedObject, FrameSearched
 from executive.ledger.association import associate, find_duplicate, find_moved_item, may_show
 from executive.ledger.belief import ITEM_AREA_FRACTION, Belief, make_viewpoint_key

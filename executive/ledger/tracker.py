@@ -11,7 +11,7 @@ import numpy as np
 from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.detection import Detections, Observation
-from executive.cell.frame import Frame, FrameTaken
+from executive.cell.frame import Frame, FrameCaptured
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Routes
 from executive.errors import Fault
@@ -93,7 +93,7 @@ class Tracker:
         if frame.id != self._last_frame_id:
             self._last_frame_id = frame.id
             self._update(detections, observations)
-        self._emit(FrameTaken(frame))
+        self._emit(FrameCaptured(frame))
         self._emit(make_look_event(detections, observations))
         return self.find_targets()
 

@@ -66,9 +66,9 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
     finally:
         arm.stop()
     yield from wait_for_rest(arm)
-    if arm.met is not None:
+    if arm.collision is not None:
         cell.ledger.invalidate_positions()
-        raise skill.failure("blocked", arm.met)
+        raise skill.failure("blocked", arm.collision)
 
 
 def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str) -> Steps:
@@ -130,4 +130,4 @@ def task_of_moving(cell: Cell) -> Task:
 def task_of_carrying(cell: Cell, item: Item) -> Task:
     """Return the task of a motion with `item` in the tool."""
     kind = cell.classes[cell.ledger.get_label(item)]
-    return Task(Load(kind, cell.tool.bears), list_obstacles(cell, item))
+    return Task(Load(kind, cell.tool.holding_force), list_obstacles(cell, item))

@@ -101,7 +101,7 @@ def load_mission(
         cell_findings = [files.cell.finding(keys, "robot", text) for keys, text in kind.check(config, base)]
         findings += cell_findings
         labels = dict(kind.labels(config, base))
-        min_times = None if cell_findings else kind.least_times(config)
+        min_times = None if cell_findings else kind.min_times(config)
     expanded = expand(mission, skills)
     tree = with_paths(expanded.tree or UnknownNode(files.source.mark(), ""))
     case = Case(mission, tree, expanded.unused, skills, control, config, labels, min_times)

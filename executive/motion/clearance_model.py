@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, pile_height
+from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, compute_max_pile_height
 from executive.cell.objects import Load, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
@@ -212,7 +212,7 @@ def _build_prisms(config: CellConfig, around: Sequence[Obstacle]) -> Prisms:
     max_radius = max(kind.radius for kind in config.objects.values())
     # Columns: x range, y range, radius, top [m]; undetected objects; flat; name.
     rows: list[tuple[float, float, float, float, float, float, bool, bool, str]] = [
-        (*config.table.x, *config.table.y, max_radius, pile_height(config), True, False,
+        (*config.table.x, *config.table.y, max_radius, compute_max_pile_height(config), True, False,
          "the space for undetected objects"),
         (-2.0, 2.0, -2.0, 2.0, 0.0, 0.0, False, True, "the table"),
     ]  # fmt: skip

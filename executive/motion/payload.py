@@ -38,7 +38,7 @@ class PayloadLimit:
     """
 
     def __init__(self, load: Load, kinematics: Kinematics) -> None:
-        self._max_pull = load.bears / SAFETY_FACTOR / load.kind.mass  # force per mass [m/s²]
+        self._max_pull = load.holding_force / SAFETY_FACTOR / load.kind.mass  # force per mass [m/s²]
         self._centre_offset = load.kind.height / 2
         self._kinematics = kinematics
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from executive.cell.arm import Goal, Task
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
-from executive.cell.layout import travel_height
+from executive.cell.layout import compute_travel_height
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
@@ -73,7 +73,7 @@ class Planner:
         Raises:
             Unreachable: No posture does; the text states the excess of the best posture.
         """
-        rise = max(0.0, travel_height(self._config) - goal.position[2])
+        rise = max(0.0, compute_travel_height(self._config) - goal.position[2])
         find_postures(self.kinematics, goal, rise, np.zeros(self.limits.joint_count))
 
     def _plan(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:

@@ -11,7 +11,7 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import travel_height
+from executive.cell.layout import compute_travel_height
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
 from executive.motion.arm_model import Configuration, Kinematics
@@ -63,7 +63,7 @@ class Search:
         self._kinematics = kinematics
         self._limits = limits
         self._connector = Connector(limits)
-        self._travel_height = travel_height(config)
+        self._travel_height = compute_travel_height(config)
         self._end = end
         self._straight = config.motion.straight
         self._discs = discs_below_flange(config, task.load)

@@ -61,7 +61,7 @@ def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) 
 def convert_from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Array, Pose]:
     """Return camera matrix `(3, 3)` [pixel] and pose `X_WC` of a camera calibrated with OpenCV.
 
-    The inverse of `Frame.opencv`. Pixel centres have integer coordinates in OpenCV, and are half a pixel
+    The inverse of `Frame.to_opencv`. Pixel centres have integer coordinates in OpenCV, and are half a pixel
     further here; rvec [rad] and tvec [m] of `cv2.solvePnP` transform points from W to C.
     """
     # The import takes a third of a second, and few cells have a camera calibrated with OpenCV.

@@ -110,7 +110,7 @@ def describe_wrong_top(
     except NoDepth:
         return ""
     expected = _list_tops(detection.label, classes)
-    tolerance = TOP_TOLERANCE * max(1.0, (frame.depth_of(position) / REFERENCE_DISTANCE) ** 2)
+    tolerance = TOP_TOLERANCE * max(1.0, (frame.compute_depth(position) / REFERENCE_DISTANCE) ** 2)
     if min(abs(top - height) for height in expected) <= tolerance:
         return ""
     *lower, highest = [f"{height * 1000:.0f}" for height in expected]
@@ -146,7 +146,7 @@ def describe_wrong_size(
         return ""
     left, top, right, bottom = detection.box
     sides = _project_cylinder(position, frame, object_class)
-    scale = float(frame.matrix[0, 0]) / frame.depth_of(position)
+    scale = float(frame.matrix[0, 0]) / frame.compute_depth(position)
     shortest = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_MARGIN
     longest = max(sides) * (1 + SIZE_TOLERANCE) + SIZE_MARGIN
     measured = max(right - left, bottom - top)
@@ -162,7 +162,7 @@ def _is_whole(detection: Detection, frame: Frame, area: Box) -> bool:
     """Return True if neither the border of the searched area nor the arm cuts off part of a box."""
     left, top, right, bottom = detection.box
     border_distance = min(left - area[0], top - area[1], area[2] - right, area[3] - bottom)
-    return border_distance >= MIN_BORDER_DISTANCE and frame.visible_share(detection.box) >= 1.0
+    return border_distance >= MIN_BORDER_DISTANCE and frame.compute_visible_fraction(detection.box) >= 1.0
 
 
 def _project_cylinder(position: Array, frame: Frame, object_class: ObjectClass) -> tuple[float, float]:

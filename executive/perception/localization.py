@@ -79,7 +79,7 @@ class CellLocalizer:
     ) -> Observation:
         frame = detections.frame
         position = self.locate(detection, frame)
-        std = detections.error_rates.jitter * frame.depth_of(position) / float(frame.matrix[0, 0])
+        std = detections.error_rates.jitter * frame.compute_depth(position) / float(frame.matrix[0, 0])
         contradiction = "" if is_doubtful else self._describe_contradiction(detections, detection, position)
         return Observation(detection, position, std, not (is_doubtful or contradiction), contradiction)
 

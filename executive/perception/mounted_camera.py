@@ -53,9 +53,9 @@ class MountedCamera:
         self._turn += 1
         return self.scan_poses[self._turn % len(self.scan_poses)]
 
-    def area(self, view: str) -> Box:
+    def get_view_box(self, view: str) -> Box:
         """Return the box [pixel] of a view of the image: `table` or `full`."""
-        return self.config.area(view)
+        return self.config.get_view_box(view)
 
     def capture(self) -> Frame:
         """Capture a frame."""

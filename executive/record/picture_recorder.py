@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from executive.cell.detection import Detection
-from executive.cell.frame import Frame, FrameTaken
+from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawer import Drawer
 from executive.record.pictures.scene import PictureScene
@@ -49,7 +49,7 @@ class PictureRecorder:
     def __call__(self, timed: TimedEvent) -> None:
         """Store a look; after a selection or a failure, draw the frame of the selection."""
         event = timed.event
-        if isinstance(event, FrameTaken):
+        if isinstance(event, FrameCaptured):
             # Depth is not drawn and needs three times as much memory as the image.
             self._last_frame = replace(event.frame, depth=None)
         elif isinstance(event, FrameSearched):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
-from executive.cell.plain import plain
+from executive.cell.json_values import to_json
 from executive.cell.workcell import PLACES
 from executive.errors import ExecutiveError, explain_os_errors
 from executive.events import RunResumed, TimedEvent
@@ -122,7 +122,7 @@ def write_result(path: Path, result: Result) -> None:
     hint = "the journal in the same folder and the output of --json contain the end of the run"
     with explain_os_errors(ExecutiveError, f'cannot write the result "{path}"', hint):
         write_atomically(
-            path, json.dumps(plain(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+            path, json.dumps(to_json(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
         )
 
 

@@ -60,7 +60,7 @@ def _put_down(cell: Cell) -> Steps:
     goal = goal_aside(cell, tallest, DROP_HEIGHT)
     problems = []
     # With the tallest class as the load, the start may seem to be in collision: then plan without a load.
-    for load in (Load(tallest, cell.tool.bears), None):
+    for load in (Load(tallest, cell.tool.holding_force), None):
         try:
             yield from _move(cell, goal, Task(load, list_obstacles(cell)))
         except (Unreachable, Blocked) as error:
@@ -83,12 +83,14 @@ def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
         yield
     try:
         answer = request.result()
-        detections = Detections(**vars(answer), frame=frame, view="full", area=cell.camera.area("full"))
+        detections = Detections(
+            **vars(answer), frame=frame, view="full", area=cell.camera.get_view_box("full")
+        )
         observations = cell.localizer.localize(detections)
     except (Unavailable, NoDepth):
         return frame
     # If the camera is displaced, this look is ignored; a skill of the mission reports the displacement.
-    if not cell.camera.displacement(frame):
+    if not cell.camera.describe_displacement(frame):
         cell.ledger.observe(detections, observations)
     return frame
 
@@ -105,5 +107,5 @@ def _move(cell: Cell, goal: Goal | str, task: Task) -> Steps:
     cell.arm.start(planning.result())
     while not cell.arm.at_rest:
         yield
-    if cell.arm.met is not None:
+    if cell.arm.collision is not None:
         cell.ledger.invalidate_positions()

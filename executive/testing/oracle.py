@@ -136,7 +136,7 @@ class Oracle:
             box = np.array(true.box) + random.normal(0.0, self.box_std, 4)
             detection = Detection(true.label, true.confidence, (box[0], box[1], box[2], box[3]))
             column, row = detection.centre
-            left, top, right, bottom = self.camera.area(view)
+            left, top, right, bottom = self.camera.get_view_box(view)
             if left <= column < right and top <= row < bottom and frame.visible[int(row), int(column)]:
                 found.append(detection)
         answer: Future[list[Detection]] = Future()

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from executive.cell.cell_wrapper import innermost
+from executive.cell.cell_wrapper import find_innermost_cell
 from executive.cell.workcell import Accounts, Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
@@ -128,7 +128,7 @@ def run_mission(
             items=run.count_items(),
             accounts=workcell.accounts,
             audit=run.count_ground_truth(),
-            cell=innermost(workcell),
+            cell=find_innermost_cell(workcell),
         )
     finally:
         run.close()

@@ -132,9 +132,9 @@ def log_commands(cell: Cell, commands: list[str]) -> Cell:
 
     def log_decision(target: Target, bin: str) -> None:
         log("decided", target, bin)
-        cell.decided(target, bin)
+        cell.report_selection(target, bin)
 
-    return replace(intercept(cell, log_access, _INTERCEPTED_ROLES), decided=log_decision)
+    return replace(intercept(cell, log_access, _INTERCEPTED_ROLES), report_selection=log_decision)
 
 
 def describe_argument(argument: object) -> str:

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from executive.cell.protocols import Clock
 from executive.errors import Fault, InputError
-from executive.events import BranchChosen, Emit, NodeEnded, NodeStarted, ignore
+from executive.events import BranchChosen, Emit, NodeEnded, NodeStarted, discard_event
 from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
@@ -42,7 +42,7 @@ class NodeContext:
     clock: Clock
     blackboard: Blackboard
     label: str = ""
-    emit: Emit = ignore
+    emit: Emit = discard_event
 
 
 class ControlNode(KeyOwner, Behaviour):

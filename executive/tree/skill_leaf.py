@@ -9,8 +9,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from pydantic import JsonValue
 
+from executive.cell.json_values import to_json_or_type_name
 from executive.cell.objects import Target
-from executive.cell.plain import plain_or_type
 from executive.cell.protocols import Cell
 from executive.errors import Fault
 from executive.events import NodeEnded, NodeStarted
@@ -154,7 +154,7 @@ class SkillLeaf(Behaviour):
         self._blackboard.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._find_item(outputs) or self._item
         self._close(Status.SUCCESS)
-        reported = {port: plain_or_type(value) for port, value in outputs.items()}
+        reported = {port: to_json_or_type_name(value) for port, value in outputs.items()}
         self._emit_end(Status.SUCCESS, outputs=reported)
 
     def _fail(self, failed: SkillFailed) -> None:

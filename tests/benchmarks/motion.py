@@ -18,7 +18,7 @@ import numpy as np
 
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
-from executive.cell.layout import travel_height
+from executive.cell.layout import compute_travel_height
 from executive.cells.sim.world import World
 from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Array
@@ -142,7 +142,7 @@ class _MethodComparison:
     def _compare(self, start: Array, scene: Scene) -> None:
         """Compute the motions of the other methods between the same positions."""
         kinematics, limits = self._planner.kinematics, self._planner.limits
-        height = travel_height(self._cell)
+        height = compute_travel_height(self._cell)
         waypoints = baselines.find_waypoints(kinematics, limits, start, scene.touch, scene.drop, height)
         if "lower bound" not in self._durations:
             baselines.plan_with_toppra(waypoints[0], limits)  # The first call compiles; do not time it.

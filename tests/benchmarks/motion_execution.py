@@ -176,8 +176,8 @@ class _Execution:
             steps += 1
             if steps % CLEARANCE_PERIOD_STEPS == 0:
                 self._measure(grasp)
-        if arm.met is not None:
-            self._failures.append(f"contact: {arm.met}")
+        if arm.collision is not None:
+            self._failures.append(f"contact: {arm.collision}")
         return steps
 
     def _measure(self, grasp: Pose | None) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
-from executive.cell.layout import as_bin
+from executive.cell.layout import build_bin
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.models import load_mesh, object_class_with_mass
@@ -96,7 +96,7 @@ class SceneGenerator:
         self._planner = planner
         self._world = world
         self._random = np.random.default_rng(seed)
-        self._bins = [as_bin(name, bin) for name, bin in cell.bins.items()]
+        self._bins = [build_bin(name, bin) for name, bin in cell.bins.items()]
         self._tallest = max(kind.height for kind in cell.objects.values())
 
     def draw(self) -> Scene:

@@ -20,7 +20,7 @@ from rich.progress import track
 from rich.table import Table
 
 from executive.campaign.subject import Subject, load_subject
-from executive.cell.plain import plain
+from executive.cell.json_values import to_json
 from executive.cli.cells import load_cells
 from executive.cli.options import MISSION, json_option, oracle_option, overrides_option, seed_option
 from executive.cli.streams import print_json, stdout_kept_clean
@@ -93,8 +93,8 @@ def record_subject(subject: Subject, seed: int, runs: Path) -> tuple[Figures, st
     if result.status == "HALTED":
         raise KeyboardInterrupt
     if result.status == "SUCCESS" and not describe_disagreement(result):
-        return plain(result), ""
-    return plain(result), (
+        return to_json(result), ""
+    return to_json(result), (
         f"seed {seed} ended with {result.status} {result.reason}; the ledger says {result.items}, "
         f"the audit {result.audit}"
     )

@@ -7,7 +7,7 @@ import pytest
 
 from executive.cell.arm import Goal
 from executive.cell.config import CellConfig
-from executive.cell.layout import travel_height
+from executive.cell.layout import compute_travel_height
 from executive.cells.sim.world import World
 from executive.cli.cells import load_cells
 from executive.geometry import Pose
@@ -58,7 +58,7 @@ def test_the_methods_are_in_order_and_pass_the_waypoints(cell: CellConfig) -> No
     arm, limits = planner.kinematics, planner.limits
     touch, drop = Goal((0.5, 0.1, 0.051)), Goal((0.24, -0.48, 0.065))
     start = find_postures(arm, Goal((0.24, 0.48, 0.065)), 0.1, np.zeros(7)).low[0]
-    height = travel_height(cell)
+    height = compute_travel_height(cell)
     chains = baselines.find_waypoints(arm, limits, start, touch, drop, height)
     tips, _ = arm.tips(np.concatenate(chains))
     high_object, high_bin = (0.5, 0.1, height), (0.24, -0.48, height)

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 import pytest
 from click.testing import CliRunner
 
-from executive.cell.plain import plain
+from executive.cell.json_values import to_json
 from executive.cli.main import COMMANDS, main
 from executive.errors import Fault, InputError
 from executive.mission.findings import Finding, MissionError
@@ -246,7 +246,7 @@ def test_a_run_passes_on_everything_it_was_asked_for(project):
     ((options, runs, record),) = project.run
     assert options == RunOptions(7, ("cube", "duck"), realtime=True)
     assert (runs, record.paused, len(record.views)) == (Path("out"), False, 1)
-    assert json.loads(shown.stdout) == plain(RESULT), "nothing else is on standard output"
+    assert json.loads(shown.stdout) == to_json(RESULT), "nothing else is on standard output"
     assert "repeat: executive run sort --seed 7" in shown.stderr
     invoke("run", "sort")
     assert project.run[1][0].requests is None, "the operator is asked"
@@ -294,7 +294,11 @@ def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses,
     assert shown.exit_code == code
     assert told in shown.stderr
     figures = json.loads(shown.stdout)
-    assert (figures["asked"], figures["cut_off"], figures["results"]) == (asked, code == 130, plain(results))
+    assert (figures["asked"], figures["cut_off"], figures["results"]) == (
+        asked,
+        code == 130,
+        to_json(results),
+    )
 
 
 def test_a_sweep_tells_of_a_run_without_a_directory_and_of_no_place_for_any(project, monkeypatch, tmp_path):

@@ -93,7 +93,7 @@ class Bench:
     ) -> Observation:
         label, x, y = thing
         position = np.array([x, y, 0.025])
-        std = by.jitter * frame.depth_of(position) / float(frame.matrix[0, 0])
+        std = by.jitter * frame.compute_depth(position) / float(frame.matrix[0, 0])
         detection = Detection(label, confidence, (0, 0, 1, 1))
         return Observation(detection, position, std, confidence >= by.threshold, contradiction)
 

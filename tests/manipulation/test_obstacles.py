@@ -51,10 +51,10 @@ def test_what_is_carried_is_the_load_and_in_nobodys_way(fake: FakeCell, targets:
     task = task_of_moving(fake.cell)
     assert task == task_of_carrying(fake.cell, "cube-1")
     assert task.load is not None
-    assert (task.load.kind.label, task.load.bears) == ("cube", 7.9)
+    assert (task.load.kind.label, task.load.holding_force) == ("cube", 7.9)
     assert [obstacle.name for obstacle in task.around] == ["duck-1"]
     fake.tool.breakaway_force = 3.0
-    assert task_of_moving(fake.cell).load.bears == 3.0  # type: ignore[union-attr]
+    assert task_of_moving(fake.cell).load.holding_force == 3.0  # type: ignore[union-attr]
 
 
 def test_what_lies_in_a_bin_is_in_the_way_as_high_as_it_is_piled(fake: FakeCell) -> None:

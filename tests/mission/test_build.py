@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
-from executive.events import Event, NodeEnded, ignore
+from executive.events import Event, NodeEnded, discard_event
 from executive.mission.build import build
 from executive.mission.load import LoadedMission
 from executive.mission.outline import outline
@@ -47,7 +47,7 @@ trees:
 
 @pytest.fixture
 def built(load: Callable[..., LoadedMission], skills: dict[str, type[Skill]]) -> Any:
-    def built(text: str, scope: Blackboard | None = None, emit: Any = ignore) -> Any:
+    def built(text: str, scope: Blackboard | None = None, emit: Any = discard_event) -> Any:
         clock = SimpleNamespace(now=0.0)
         cell: Any = SimpleNamespace(clock=clock)
         return build(load(text), skills, cell, Blackboard() if scope is None else scope, emit)
@@ -109,7 +109,7 @@ def test_two_trees_of_one_mission_share_nothing(
     loaded = load(HEAD + "tree: Look\n")
     first, second = Blackboard(), Blackboard()
     cell: Any = SimpleNamespace(clock=None)
-    one, two = (build(loaded, skills, cell, scope, ignore) for scope in (first, second))
+    one, two = (build(loaded, skills, cell, scope, discard_event) for scope in (first, second))
     one.tick_once()
     one.tick_once()
     assert (dict(first), dict(second)) == ({"seen": [1]}, {})

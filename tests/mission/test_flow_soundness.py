@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from py_trees.common import Status
 
 from executive.cell.protocols import Cell, Steps
-from executive.events import ignore
+from executive.events import discard_event
 from executive.mission.build import Builder
 from executive.mission.check.case import Case
 from executive.mission.check.checks import check
@@ -207,7 +207,7 @@ def sound(tree: Tree) -> Case | None:
 def run(case: Case, seed: int) -> tuple[World, Any]:
     """Run a mission until it ends or for long enough; return its world and its root."""
     world = World(seed)
-    root = Builder(SKILLS, cast("Cell", world), Blackboard(), ignore).build_node(case.tree)
+    root = Builder(SKILLS, cast("Cell", world), Blackboard(), discard_event).build_node(case.tree)
     while world.ticks < MOST_TICKS:
         root.tick_once()
         if root.status is not Status.RUNNING:

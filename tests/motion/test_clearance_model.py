@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, pile_height
+from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, compute_max_pile_height
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
@@ -129,9 +129,9 @@ def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: 
 @settings(max_examples=60)
 def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, y, z) -> None:
     end = np.array([[0.53, 0.0]])
-    tip, discs = (x, y, min(z, pile_height(config))), discs_below_flange(config, None)
+    tip, discs = (x, y, min(z, compute_max_pile_height(config))), discs_below_flange(config, None)
     away = math.hypot(x - end[0, 0], y - end[0, 1])
-    if away > OBSERVED_RADIUS + pile_height(config):
+    if away > OBSERVED_RADIUS + compute_max_pile_height(config):
         assert slack(ClearanceModel(config, (), end), tip, discs=discs) < 0
     elif away < OBSERVED_RADIUS - 1e-9:
         wanted = min(

@@ -85,7 +85,7 @@ def test_what_determines_no_ray_or_pose_is_refused():
 
 @given(matrices, cameras, points)
 def test_opencv_projects_where_we_do_half_a_pixel_aside_and_its_camera_is_ours(matrix, X_WC, point):
-    opencv = Frame.opencv(SimpleNamespace(matrix=matrix, X_WC=X_WC))
+    opencv = Frame.to_opencv(SimpleNamespace(matrix=matrix, X_WC=X_WC))
     theirs, rvec, tvec = opencv
     (((u, v),),), _ = cv2.projectPoints(point[None], rvec, tvec, theirs, None)
     assert (u + 0.5, v + 0.5) == pytest.approx(project(matrix, X_WC, point), abs=1e-6)

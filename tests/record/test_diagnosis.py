@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from executive.cell.plain import plain
+from executive.cell.json_values import to_json
 from executive.events import OperatorAsked
 from executive.plugins import discover
 from executive.record.diagnosis.diagnosis import Diagnosis
@@ -165,7 +165,7 @@ def test_whatever_goes_wrong_its_story_can_be_told(breaks, slips, misses, gone, 
     story = run.diagnose(outcome, lambda: True)
     assert (story is None) == (outcome.status in ("SUCCESS", "INCOMPLETE"))
     if story is not None:
-        assert TypeAdapter(Diagnosis).validate_json(json.dumps(plain(story), allow_nan=False)) == story
+        assert TypeAdapter(Diagnosis).validate_json(json.dumps(to_json(story), allow_nan=False)) == story
         assert story.verdict
         assert [link.path for link in story.chain][-1:] == ([outcome.node] if outcome.node else [])
         assert all(link.why for link in story.chain[:-1])

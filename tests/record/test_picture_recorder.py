@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from events import at, detected, frame_searched, item_changed, run_started, skill_ended, skill_started
 
-from executive.cell.frame import Frame, FrameTaken
+from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, NodeEnded, TargetSelected, TimedEvent
 from executive.geometry import Pose
 from executive.record import picture_recorder as module
@@ -25,7 +25,7 @@ def look(number: int, *found: DetectedObject) -> list[TimedEvent]:
     image = np.full((160, 160, 3), 150, np.uint8)
     visible = np.ones((160, 160), bool)
     frame = Frame(number, "overhead", image, None, np.eye(3), Pose.identity(), 0.5, visible, 0)
-    return [at(number, FrameTaken(frame), 0.5), at(number, frame_searched(*found, frame=number), 0.5)]
+    return [at(number, FrameCaptured(frame), 0.5), at(number, frame_searched(*found, frame=number), 0.5)]
 
 
 def decision(frame: int = 1, tick: int = 12) -> list[TimedEvent]:

@@ -7,7 +7,7 @@ import json
 import py_trees
 import pytest
 
-from executive.cell.plain import plain
+from executive.cell.json_values import to_json
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import RunEnded, RunStarted, TargetSelected
@@ -61,7 +61,7 @@ def test_leaves_a_directory_that_explains_the_run(run, tmp_path):
         "mission.yaml", "params.yaml", "cell.yaml", "tree.json", "journal.jsonl", "world.log",
         "result.json", "frames",
     }  # fmt: skip
-    assert json.loads((left / "result.json").read_text()) == plain(result)
+    assert json.loads((left / "result.json").read_text()) == to_json(result)
     assert result.audit.agrees
     events = read_journal(left / "journal.jsonl")
     (decision,) = (one for one in events if isinstance(one.event, TargetSelected))

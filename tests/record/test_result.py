@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 import pytest
 
-from executive.cell.plain import plain
+from executive.cell.json_values import to_json
 from executive.errors import ExecutiveError
 from executive.record.result import (
     ItemCounts,
@@ -52,7 +52,7 @@ def test_is_written_and_can_be_read_again(tmp_path):
     ]  # fmt: skip
     assert written["audit"] == {"agrees": True, **AUDIT}
     (tmp_path / "journal.jsonl").touch()
-    assert plain(read_result(RunDirectory(tmp_path), [])) == written
+    assert to_json(read_result(RunDirectory(tmp_path), [])) == written
 
 
 def test_a_disk_that_does_not_take_it_is_a_sentence(tmp_path):

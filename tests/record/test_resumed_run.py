@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from executive.cell.plain import plain
+from executive.cell.json_values import to_json
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import (
@@ -133,7 +133,7 @@ def test_it_ends_as_if_nothing_had_happened(missions: Path, tmp_path: Path, name
     assert watcher.notes == [], "a kill loses no action of the tool"
     assert set(placed(path).values()) <= {1}
     assert redecided(path) == ""
-    assert json.loads((path / "result.json").read_text()) == plain(result)
+    assert json.loads((path / "result.json").read_text()) == to_json(result)
 
 
 @pytest.mark.parametrize("nth", [1, 2, 3, 10])
@@ -314,7 +314,7 @@ def test_the_result_of_a_run_that_was_killed_after_its_end_is_written(missions: 
     (path / "result.json").unlink()
     completed = resumed(path)
     assert completed == replace(result, wall_time_s=completed.wall_time_s)
-    assert json.loads((path / "result.json").read_text()) == plain(completed)
+    assert json.loads((path / "result.json").read_text()) == to_json(completed)
     assert (path / "journal.jsonl").read_bytes() == journal
     with pytest.raises(InputError, match="there is nothing to resume"):
         resumed(path)

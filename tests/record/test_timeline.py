@@ -10,7 +10,7 @@ import pytest
 from events import at, detected, frame_searched, item_changed, read, run_started, skill_ended, skill_started
 from failed_runs import PICK, FailedRun
 
-from executive.cell.frame import FrameTaken
+from executive.cell.frame import FrameCaptured
 from executive.events import (
     BranchChosen,
     Event,
@@ -44,7 +44,7 @@ def test_the_journal_of_a_run_gives_the_timeline_that_was_observed(mission, tmp_
     run = FailedRun(mission, requests=["cube", "quit"])
     live, journal = Timeline(), Journal(Path("journal.jsonl"))
     run.run.add_observer(live)
-    run.run.add_observer(lambda timed: None if isinstance(timed.event, FrameTaken) else journal(timed))
+    run.run.add_observer(lambda timed: None if isinstance(timed.event, FrameCaptured) else journal(timed))
     run.slip(2)
     run.run.execute()
     journal.close()
@@ -224,7 +224,7 @@ def test_the_memory_of_a_live_run_grows_only_with_its_items(tmp_path, monkeypatc
     timeline, sizes = Timeline(history=False), []
     for number in range(40):
         for timed in events:
-            if not isinstance(timed.event, FrameTaken):
+            if not isinstance(timed.event, FrameCaptured):
                 timeline(timed if number < 20 else _renamed(timed, number))
         sizes.append(len(pickle.dumps(timeline)))
     assert sizes[19] < 1.01 * sizes[1]

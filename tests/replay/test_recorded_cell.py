@@ -6,12 +6,12 @@ from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.proxy import IS_METHOD
 from executive.cells.fake.cell import FakeCell
-from executive.events import Emit, Event, ToolCommanded, ignore
+from executive.events import Emit, Event, ToolCommanded, discard_event
 from executive.replay.input_recorder import InputRecorder
 from executive.replay.recorded_cell import COMMANDS, INPUT_FORMATS, RECORDED_ROLES, make_recorded_cell
 
 
-def recorded(fake: FakeCell, emit: Emit = ignore) -> Cell:
+def recorded(fake: FakeCell, emit: Emit = discard_event) -> Cell:
     return make_recorded_cell(fake.cell, InputRecorder(emit), StepClock(lambda: 0.0), emit)
 
 
@@ -28,7 +28,7 @@ def test_every_part_that_can_answer_is_recorded() -> None:
     same = {name for name in vars(cell) if getattr(cell, name) is getattr(fake.cell, name)}
     # The content of a file, and the knowledge of the run itself.
     assert same == {
-        "ledger", "bins", "classes", "routes", "safe_place", "descent", "descent_speed", "decided",
+        "ledger", "bins", "classes", "routes", "safe_place", "descent", "descent_speed", "report_selection",
     }  # fmt: skip
 
 

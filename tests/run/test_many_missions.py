@@ -14,7 +14,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
-from executive.cell.plain import plain
+from executive.cell.json_values import to_json
 from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.mission.build import build
@@ -82,7 +82,7 @@ def variables(root: Behaviour) -> list[dict[str, Any]]:
     """Return the variables of every blackboard of a tree."""
     leaves = (node for node in root.iterate() if isinstance(node, SkillLeaf))
     scopes = {id(leaf._blackboard): leaf._blackboard for leaf in leaves}
-    return [plain(scope) for scope in scopes.values()]
+    return [to_json(scope) for scope in scopes.values()]
 
 
 def items_of(workcell: Workcell) -> dict[str, object]:

@@ -22,12 +22,12 @@ from skills.wait import Wait
 class Least:
     """A cell in which everything takes another time."""
 
-    descent = 0.3
+    descent_time = 0.3
 
-    def carry(self, bin: str | None) -> float:
+    def get_transport_time(self, bin: str | None) -> float:
         return {None: 0.5, "red_bin": 0.7}[bin]
 
-    def answer(self, detector: str) -> float:
+    def get_answer_time(self, detector: str) -> float:
         return {"": 0.05, "slow": 2.0}[detector]
 
 

@@ -48,7 +48,7 @@ def test_what_falls_on_the_way_is_dropped_where_the_arm_stops(fake: FakeCell, he
 
 def test_what_is_torn_off_by_running_into_something_is_dropped(fake: FakeCell, held: str) -> None:
     fake.arm.next_obstacle = "the held cube ran into a hand"
-    failure = lost(fake, held, lambda: fake.arm.met is not None)
+    failure = lost(fake, held, lambda: fake.arm.collision is not None)
     assert failure.reason == "dropped"
     assert failure.message.startswith("the seal on cube-1 broke on the way to the safe place, near (")
     assert fake.ledger.find_held_item() is None

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.cell.frame import FrameTaken
+from executive.cell.frame import FrameCaptured
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
@@ -85,7 +85,7 @@ def test_a_failure_that_only_passes_through_a_control_node_is_none_of_its_own(lo
 
 def test_without_disturbances_a_mission_goes_as_it_always_goes() -> None:
     def without_images(events: Iterable[TimedEvent]) -> list[TimedEvent]:
-        return [one for one in events if not isinstance(one.event, FrameTaken)]
+        return [one for one in events if not isinstance(one.event, FrameCaptured)]
 
     events: list[TimedEvent] = []
     loaded, options = load_mission("sort_overhead", discover()), RunOptions(7, (), kind=FakeCell)

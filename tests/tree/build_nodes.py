@@ -10,7 +10,7 @@ from typing import Any
 from hand_set_clock import Clock
 from py_trees.behaviour import Behaviour
 
-from executive.events import Emit, ignore
+from executive.events import Emit, discard_event
 from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Reason
 from executive.tree.fallback import Fallback
@@ -30,7 +30,9 @@ from executive.tree.while_loop import While
 Names = Iterable[tuple[str, str]]
 
 
-def make_site(path: str = "node", label: str = "", emit: Emit = ignore, clock: Any = None) -> NodeContext:
+def make_site(
+    path: str = "node", label: str = "", emit: Emit = discard_event, clock: Any = None
+) -> NodeContext:
     return NodeContext(path, clock or Clock(), Blackboard(), label, emit)
 
 

@@ -10,7 +10,7 @@ from py_trees.common import Status
 
 from executive.campaign.faults.fault import InjectedError, PlannedFault
 from executive.cell.bins import BIN_THICKNESS, Bin
-from executive.cell.frame import Frame, FrameTaken
+from executive.cell.frame import Frame, FrameCaptured
 from executive.events import FaultInjected, FrameSearched, ItemChanged, RunEnded, TimedEvent
 from executive.ledger.item import State
 from executive.ledger.outcomes import is_balanced
@@ -67,7 +67,7 @@ def count_hidden(
     if not drop_ticks:
         return NOTHING_HIDDEN
     later = (timed.event for timed in events if timed.tick > drop_ticks[-1])
-    frames = [event.frame for event in later if isinstance(event, FrameTaken)]
+    frames = [event.frame for event in later if isinstance(event, FrameCaptured)]
     hidden = [true for true in objects if not any(_is_shown(true, frame) for frame in frames)]
     inside = sum(any(bin.contains(true.position, BIN_THICKNESS) for bin in bins) for true in hidden)
     return HiddenCounts(len(hidden) - inside, inside)
@@ -131,7 +131,7 @@ def _is_shown(true: TrueObject, frame: Frame) -> bool:
     height, width = frame.visible.shape
     place = true.position[None]
     is_inside = frame.is_in_area(place, (0, 0, width, height), MIN_BORDER_DISTANCE)
-    return bool((is_inside & frame.is_unobstructed(place))[0])
+    return bool((is_inside & frame.is_unoccluded(place))[0])
 
 
 def count_faults(events: Sequence[TimedEvent], name: str) -> int:

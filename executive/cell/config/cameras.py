@@ -120,7 +120,7 @@ class CameraConfig(Section):
     depth: DepthConfig | None = None
     """Depth sensor; none by default. `depth: {}` is a depth sensor with the default noise."""
 
-    def area(self, view: str) -> tuple[int, int, int, int]:
+    def get_view_box(self, view: str) -> tuple[int, int, int, int]:
         """Return the part of the image [pixel] of a `view` (`table` or `full`)."""
         return self.table_view if view == "table" else (0, 0, self.width, self.height)
 

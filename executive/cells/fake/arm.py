@@ -12,13 +12,13 @@ import numpy as np
 from executive.cell.arm import Goal, Motion, Task, refuse_steps
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
-from executive.cell.layout import places_out_of_reach, travel_height
+from executive.cell.layout import compute_travel_height, find_unreachable_places
 from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
 from executive.cells.fake.obstacles import Collision, FakeObstacles
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
-from executive.events import Emit, ignore
+from executive.events import Emit, discard_event
 from executive.geometry import Array, Pose, tool_down
 from executive.motion.arms import build_kinematics
 from executive.motion.plans import Plan, Plans
@@ -63,12 +63,14 @@ class FakeArm:
         commands: Names of the executed commands, `start` or `stop`, in order, for tests.
     """
 
-    def __init__(self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit = ignore) -> None:
+    def __init__(
+        self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit = discard_event
+    ) -> None:
         self.poses = compute_named_poses(config)
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
-        self._height = travel_height(config)
+        self._height = compute_travel_height(config)
         self._joint_count = config.arm.joint_count
         self._obstacles = FakeObstacles(config)
         self._plans = Plans(self._plan_motion, clock, config.motion.planning_time, emit)
@@ -103,7 +105,7 @@ class FakeArm:
         return not self._path
 
     @property
-    def met(self) -> str | None:
+    def collision(self) -> str | None:
         """Description of the obstacle that stopped the last motion, or None."""
         return self._met_obstacle
 
@@ -147,7 +149,7 @@ class FakeArm:
         self._path = []
 
     def run_into(self, obstacle: str) -> None:
-        """Stop the running motion and set `met` to an obstacle; do nothing if the arm is at rest."""
+        """Stop the running motion and set `collision` to an obstacle; do nothing if the arm is at rest."""
         if self._path:
             self._met_obstacle = obstacle
             self.stop()
@@ -237,7 +239,7 @@ class FakeTool:
         return self._world.held is not None
 
     @property
-    def bears(self) -> float:
+    def holding_force(self) -> float:
         """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
         return self.breakaway_force if self.holding else 0.0
 
@@ -288,8 +290,8 @@ def check_reachable(position: Array) -> None:
 
 def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield a key of the cell file and a message for each bin and safe place beyond `MAX_REACH`."""
-    height = travel_height(config)
-    return places_out_of_reach(config, lambda place, _: check_reachable(np.array([*place, height])))
+    height = compute_travel_height(config)
+    return find_unreachable_places(config, lambda place, _: check_reachable(np.array([*place, height])))
 
 
 def _make_straight_path(start: Array, end: Array, rotation: Array, speed: float) -> list[Pose]:

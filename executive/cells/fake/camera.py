@@ -51,7 +51,7 @@ class FakeCamera(MountedCamera):
         """Return the result of `is_table_visible`."""
         return self.is_table_visible()
 
-    def displacement(self, frame: Frame) -> str:
+    def describe_displacement(self, frame: Frame) -> str:
         """Return the value of `displacement_message`."""
         del frame
         return self.displacement_message

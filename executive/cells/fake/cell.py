@@ -11,18 +11,18 @@ import numpy as np
 
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
-from executive.cell.protocols import LeastTimes, Routes
+from executive.cell.protocols import MinTimes, Routes
 from executive.cell.workcell import CellOptions, KeyPath
 from executive.cells.audit import FinalObject, audit_objects
 from executive.cells.fake.arm import FakeArm, FakeTool, find_places_out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
 from executive.cells.fake.command_log import FakeLog, restore_world
-from executive.cells.fake.least_times import FakeTimes
+from executive.cells.fake.min_times import FakeMinTimes
 from executive.cells.fake.visuals import FakeVisuals
 from executive.cells.fake.world import FakeObject, FakeWorld
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import Fault, InputError
-from executive.events import Emit, ignore
+from executive.events import Emit, discard_event
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
@@ -78,7 +78,7 @@ class FakeCell(CellWithoutHardware):
         *,
         seed: int = 0,
         routes: Routes = ROUTES,
-        emit: Emit = ignore,
+        emit: Emit = discard_event,
         options: CellOptions | None = None,
     ) -> None:
         config = config or load_empty_cell()
@@ -103,7 +103,7 @@ class FakeCell(CellWithoutHardware):
             epoch=lambda: self.ledger.epoch,
         )
         self.detectors = {
-            name: FakeDetector(name, detector, self.world, clock, self.camera.area)
+            name: FakeDetector(name, detector, self.world, clock, self.camera.get_view_box)
             for name, detector in config.detectors.items()
         }
         self.detector = next(iter(self.detectors.values()))
@@ -137,9 +137,9 @@ class FakeCell(CellWithoutHardware):
         return dict.fromkeys(config.detectors)
 
     @staticmethod
-    def least_times(config: CellConfig) -> LeastTimes:
+    def min_times(config: CellConfig) -> MinTimes:
         """Return the minimum times of the stages of a task in a cell of this configuration."""
-        return FakeTimes(config)
+        return FakeMinTimes(config)
 
     def log_to(self, path: Path) -> None:
         """Write the state of the world to a log file, now and after every control step."""

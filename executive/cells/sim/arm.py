@@ -16,7 +16,7 @@ from executive.cells.sim.contacts import Contacts
 from executive.cells.sim.rebuild import InterruptedArm
 from executive.cells.sim.world import World
 from executive.errors import Fault
-from executive.events import Emit, ignore
+from executive.events import Emit, discard_event
 from executive.geometry import Array, Pose
 from executive.motion.braking import brake
 from executive.motion.planner import Planner
@@ -60,7 +60,7 @@ class SimArm:
         config: CellConfig,
         clock: Clock,
         held: Callable[[], int | None] = lambda: None,
-        emit: Emit = ignore,
+        emit: Emit = discard_event,
         resumed: InterruptedArm | None = None,
     ) -> None:
         self.planner = planner
@@ -116,7 +116,7 @@ class SimArm:
         return self._motion is None
 
     @property
-    def met(self) -> str | None:
+    def collision(self) -> str | None:
         """Text of the collision that ended the last motion, or None."""
         return self._met
 
@@ -162,7 +162,7 @@ class SimArm:
             self._braking = list(brake(self._motion, self._time, self.planner.limits, STEP))
 
     def run_into(self, obstacle: str) -> None:
-        """Brake as after a collision, and set `met` to `obstacle`; does nothing if no motion runs."""
+        """Brake as after a collision, and set `collision` to `obstacle`; does nothing if no motion runs."""
         if self._motion is not None and self._braking is None:
             self._met = obstacle
             self.stop()

@@ -197,7 +197,7 @@ class SimCamera(MountedCamera):
         """Return True if the whole workspace is visible now, not hidden by the arm."""
         return self._shadow is None or self._shadow.sees_table(self.matrix, self._pose(), self._size)
 
-    def displacement(self, frame: Frame) -> str:
+    def describe_displacement(self, frame: Frame) -> str:
         """Return a text with the displacement of the camera from its declared pose in a frame; "" if none."""
         return describe_displacement(frame, self._bins)
 

@@ -14,7 +14,7 @@ from executive.cells.sim.audit import audit
 from executive.cells.sim.camera import SimCamera
 from executive.cells.sim.collision import PathClearance
 from executive.cells.sim.command_log import CommandLog, read_commands
-from executive.cells.sim.least_times import SimLeastTimes
+from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import find_missing_models, object_class_with_mass
 from executive.cells.sim.poses import find_places_out_of_reach, find_unfit_poses
 from executive.cells.sim.rebuild import InterruptedArm, rebuild
@@ -134,9 +134,9 @@ class SimCell(CellWithoutHardware):
         return find_known_labels(config.detectors, base)
 
     @staticmethod
-    def least_times(config: CellConfig) -> SimLeastTimes:
+    def min_times(config: CellConfig) -> SimMinTimes:
         """Return the lower bounds of the times of motions and skills."""
-        return SimLeastTimes(config)
+        return SimMinTimes(config)
 
     def log_to(self, path: Path) -> None:
         """Record all commands to the world in a file from now on."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.config import CellConfig, ObjectConfig
-from executive.cell.layout import object_class
+from executive.cell.layout import build_object_class
 from executive.cell.objects import ObjectClass
 from executive.cell.workcell import KeyPath
 from executive.cells.sim.model_files import find_mesh, find_model, read_numbers, read_obj, read_urdf
@@ -120,7 +120,7 @@ def mass_of(config: ObjectConfig) -> float:
 
 def object_class_with_mass(label: str, config: ObjectConfig) -> ObjectClass:
     """Return the object class of a section of a cell file, with the mass in simulation."""
-    return replace(object_class(label, config), mass=mass_of(config))
+    return replace(build_object_class(label, config), mass=mass_of(config))
 
 
 def find_missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.arm import Goal
 from executive.cell.clock import StepClock
 from executive.cell.config import CellConfig
-from executive.cell.layout import places_out_of_reach
+from executive.cell.layout import find_unreachable_places
 from executive.cell.workcell import KeyPath
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.camera import camera_pose
@@ -46,7 +46,7 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
                     ("arm", "poses_deg", name),
                     f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}',
                 )
-    yield from places_out_of_reach(config, require)
+    yield from find_unreachable_places(config, require)
 
 
 def find_unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

@@ -32,7 +32,7 @@ class _Grip:
 
     body: int
     constraint: int
-    bears: float
+    holding_force: float
     pull: Array = field(default_factory=lambda: np.zeros(3))
 
 
@@ -71,9 +71,9 @@ class SuctionTool:
         return self._grip is not None
 
     @property
-    def bears(self) -> float:
+    def holding_force(self) -> float:
         """Breakaway force of the seal, from the vacuum gauge [N]; 0 while nothing is held."""
-        return 0.0 if self._grip is None else self._grip.bears
+        return 0.0 if self._grip is None else self._grip.holding_force
 
     @property
     def held_body(self) -> int | None:
@@ -121,7 +121,7 @@ class SuctionTool:
         """Filter the pull on the seal, and break the seal if the pull exceeds the breakaway force."""
         force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
         grip.pull += PULL_SMOOTHING * (force - grip.pull)
-        if float(np.linalg.norm(grip.pull)) > grip.bears:
+        if float(np.linalg.norm(grip.pull)) > grip.holding_force:
             self.break_seal()
 
     def _seal(self) -> None:
@@ -134,10 +134,10 @@ class SuctionTool:
             return
         world, config = self._world, self._config
         seal = measure_contact(world.client, world.tool_pose(), movable, config.cup_radius, config.reach)
-        bears = breakaway_force(seal, config)
-        if seal is not None and bears >= config.min_force:
+        holding_force = breakaway_force(seal, config)
+        if seal is not None and holding_force >= config.min_force:
             self.fallen.discard(seal.body)
-            self._grip = _Grip(seal.body, self._attach(seal.body), bears)
+            self._grip = _Grip(seal.body, self._attach(seal.body), holding_force)
             # Cup and body overlap slightly; their contact forces would act against the constraint.
             self._set_collision(seal.body, False)
 

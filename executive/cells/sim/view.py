@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
-from executive.cell.layout import pile_height
+from executive.cell.layout import compute_max_pile_height
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.robot_models import ROBOT_MODELS
 from executive.geometry import Array, Pose
@@ -47,7 +47,7 @@ class ArmShadow:
         self._link_radius = ROBOT_MODELS[config.arm.urdf].link_radius
         self._load = max(kind.radius for kind in config.objects.values()) + MAX_LOAD_OFFSET
         self._top = max(kind.height for kind in config.objects.values())
-        top = pile_height(config)
+        top = compute_max_pile_height(config)
         self._corners = np.array(
             [(x, y, z) for x in config.table.x for y in config.table.y for z in (0.0, top)]
         )

@@ -16,7 +16,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.clock import STEP
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, bin_walls
+from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_walls
 from executive.cells.sim import command_log
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.model_files import find_model
@@ -209,7 +209,7 @@ def name_held(label: str) -> str:
 
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
     """Create a static body with floor and walls of a bin at its position, and return it."""
-    halves, places = map(list, zip(*bin_walls(bin.size), strict=True))
+    halves, places = map(list, zip(*list_bin_walls(bin.size), strict=True))
     shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(halves), "halfExtents": halves}
     return int(
         client.createMultiBody(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from executive.cell.config import CellConfig
-from executive.cell.protocols import LeastTimes
+from executive.cell.protocols import MinTimes
 from executive.mission.findings import alternatives
 from executive.mission.flow.analysis import Analysis
 from executive.mission.model.mission import Mission
@@ -40,7 +40,7 @@ class Case:
     control: ControlNodes
     cell: CellConfig | None
     labels: Mapping[str, tuple[str, ...] | None]
-    min_times: LeastTimes | None
+    min_times: MinTimes | None
 
     @cached_property
     def flow(self) -> Analysis:

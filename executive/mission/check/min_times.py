@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from executive.cell.protocols import LeastTimes
+from executive.cell.protocols import MinTimes
 from executive.mission.check.case import Case
 from executive.mission.model.instance import has_valid_constants, inspection_instance, node_of
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
@@ -48,19 +48,19 @@ def _skill(case: Case, node: SkillNode) -> float:
 class _FromAnywhere:
     """Least times of a cell for an arm that may be anywhere with its load."""
 
-    def __init__(self, least: LeastTimes) -> None:
+    def __init__(self, least: MinTimes) -> None:
         self._least = least
 
     @property
-    def descent(self) -> float:
+    def descent_time(self) -> float:
         """The guarded last part of an approach [s]."""
-        return self._least.descent
+        return self._least.descent_time
 
-    def carry(self, bin: str | None) -> float:
+    def get_transport_time(self, bin: str | None) -> float:
         """Nothing: it may be over the bin already."""
         del bin
         return 0.0
 
-    def answer(self, detector: str) -> float:
+    def get_answer_time(self, detector: str) -> float:
         """From a frame to the answer of a detector [s]."""
-        return self._least.answer(detector)
+        return self._least.get_answer_time(detector)

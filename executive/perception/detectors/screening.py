@@ -55,7 +55,7 @@ def screen(answer: Answer, frame: Frame, view: str, labels: Collection[str]) -> 
             f"{invalid.confidence:g} at {invalid.box}"
         )
     threshold = answer.error_rates.threshold
-    visible = [one for one in answer.found if frame.visible_share(one.box) >= MIN_VISIBLE_SHARE]
+    visible = [one for one in answer.found if frame.compute_visible_fraction(one.box) >= MIN_VISIBLE_SHARE]
     known = [one for one in visible if one.label in labels]
     return replace(
         answer,

@@ -211,7 +211,7 @@ def detect_targets(fake: FakeCell) -> tuple[Detections, list[Target]]:
     request = next(iter(fake.cell.detectors.values())).request(frame, view)
     while not request.ready:
         fake.advance()
-    detections = Detections(**vars(request.result()), frame=frame, view=view, area=camera.area(view))
+    detections = Detections(**vars(request.result()), frame=frame, view=view, area=camera.get_view_box(view))
     return detections, list(fake.ledger.observe(detections, fake.cell.localizer.localize(detections)))
 
 

@@ -11,8 +11,8 @@ from typing import Any, Literal
 import numpy as np
 
 from executive.cell.arm import Motion
+from executive.cell.json_values import round_values
 from executive.cell.objects import Item
-from executive.cell.plain import round_values
 from executive.cell.workcell import Workcell
 from executive.errors import InputError
 from executive.events import Emit, FaultInjected

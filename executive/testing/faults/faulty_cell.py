@@ -13,7 +13,7 @@ from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.errors import Fault, InputError
-from executive.events import Emit, NodeEnded, NodeStarted, TimedEvent, ignore
+from executive.events import Emit, NodeEnded, NodeStarted, TimedEvent, discard_event
 from executive.testing.faults.effect import TIME_TOLERANCE, FaultScene, Occurrence
 from executive.testing.faults.script import NodeActivations, ScheduledFault, TimeSpan
 from executive.testing.faults.world_access import WorldAccess, open_world
@@ -45,7 +45,7 @@ class FaultyCell(CellWrapper):
         self,
         inner: Workcell,
         faults: Sequence[ScheduledFault],
-        emit: Emit = ignore,
+        emit: Emit = discard_event,
         open_world: Callable[[Workcell], WorldAccess] = open_world,
         timeout: float = math.inf,
     ) -> None:
@@ -162,7 +162,7 @@ def with_faults(
         timeout: Time on the run's clock after which the run ends as a fault [s].
     """
 
-    def make_faulty_cell(*args: Any, emit: Emit = ignore, **options: Any) -> FaultyCell:
+    def make_faulty_cell(*args: Any, emit: Emit = discard_event, **options: Any) -> FaultyCell:
         return FaultyCell(make_cell(*args, emit=emit, **options), faults, emit, open_world, timeout)
 
     return make_faulty_cell

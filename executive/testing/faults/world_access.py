@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from executive.cell.cell_wrapper import innermost
+from executive.cell.cell_wrapper import find_innermost_cell
 from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.cells.fake.world import FakeObject
@@ -110,7 +110,7 @@ def open_world(workcell: Workcell) -> WorldAccess:
     Raises:
         InputError: The cell is neither fake nor simulated.
     """
-    inner = innermost(workcell)
+    inner = find_innermost_cell(workcell)
     if isinstance(inner, FakeCell):
         return FakeWorldAccess(inner)
     # Imported here, so that tests on a fake cell do not import the simulator.

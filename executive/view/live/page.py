@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 
-from executive.cell.frame import Frame, FrameTaken
+from executive.cell.frame import Frame, FrameCaptured
 from executive.cell.visuals import Visuals
 from executive.errors import InputError
 from executive.events import FrameSearched, InputRead, TimedEvent
@@ -119,7 +119,7 @@ class LivePage:
         """Send an event that changes the page."""
         event = timed.event
         with self._errors_noted():
-            if isinstance(event, FrameTaken):
+            if isinstance(event, FrameCaptured):
                 # The page does not show the depth, which is three times as large as the rest.
                 self._last_frame = replace(event.frame, depth=None)
             elif isinstance(event, FrameSearched) and self._last_frame is not None:

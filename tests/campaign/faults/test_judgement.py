@@ -18,7 +18,7 @@ from executive.campaign.faults.judgement import (
     count_hidden,
     describe_other_reason,
 )
-from executive.cell.frame import FrameTaken
+from executive.cell.frame import FrameCaptured
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, RunEnded
 from executive.mission.flow.endings import Ending
@@ -168,7 +168,7 @@ def test_an_object_is_out_of_sight_if_no_look_since_the_last_fall_shows_its_plac
     seen, beside = (TrueObject(body, "cube", np.array(place)) for body, place in enumerate(PLACES[:2]))
     inside = TrueObject(2, "cube", np.array(PLACES[2]))
     fall = at(10, item_changed("cube-1", "dropped"))
-    look = at(20, FrameTaken(camera.capture()))
+    look = at(20, FrameCaptured(camera.capture()))
     before = at(5, look.event)
     things = [seen, beside, inside]
     assert count_hidden(things, bins, [fall, look]) == HiddenCounts(1, 0)

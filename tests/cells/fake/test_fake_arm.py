@@ -142,13 +142,15 @@ def test_what_is_pressed_into_the_table_can_be_lifted_and_not_be_pressed_deeper(
 def test_a_load_that_the_plan_did_not_know_of_stops_the_arm_where_it_touches(fake: FakeCell) -> None:
     hold_cube(fake)
     places = go(fake, Goal((0.5, 0.0, 0.02)))
-    assert fake.arm.met is not None
-    assert fake.arm.met.startswith("the held cube ran into the table, with the tool at (0.500, 0.000, 0.04")
+    assert fake.arm.collision is not None
+    assert fake.arm.collision.startswith(
+        "the held cube ran into the table, with the tool at (0.500, 0.000, 0.04"
+    )
     assert places[:, 2].min() == pytest.approx(0.05, abs=MAX_TOOL_SPEED * STEP)
     assert places[:, 2].min() >= 0.05
     assert fake.arm.commands == ["start", "stop"]
     go(fake, Goal((0.5, 0.0, 0.1)))
-    assert fake.arm.met is None
+    assert fake.arm.collision is None
 
 
 def test_it_goes_to_a_named_pose_straight_or_else_over_the_wall(fake: FakeCell) -> None:
@@ -171,10 +173,10 @@ def test_a_motion_that_runs_into_something_ends_half_way_and_the_next_does_not(f
     places = go(fake, "aside")
     aside = fake.arm.poses["aside"].position
     assert np.linalg.norm(places[-1] - start) == pytest.approx(np.linalg.norm(aside - start) / 2, rel=0.05)
-    assert fake.arm.met == "a hand"
+    assert fake.arm.collision == "a hand"
     assert np.allclose(fake.arm.destination, places[-1]), "where it stands now"
     assert np.allclose(go(fake, "aside")[-1], aside)
-    assert fake.arm.met is None
+    assert fake.arm.collision is None
 
 
 def test_it_follows_one_motion_at_a_time_and_none_of_another_arm(fake: FakeCell) -> None:

@@ -9,7 +9,7 @@ import pytest
 from rig import Rig
 
 from executive.cell.arm import Goal, Task
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, object_class
+from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, build_object_class
 from executive.cell.objects import Load
 from executive.geometry import Array
 from executive.motion.trajectory import Trajectory
@@ -43,15 +43,15 @@ def bump(rig: Rig, motion: Trajectory, earliest: float = 0.0) -> str:
     Before the path time `earliest` [s] nothing may be met.
     """
     rig.arm.start(motion)
-    while rig.arm.met is None:
+    while rig.arm.collision is None:
         assert not rig.arm.at_rest, "it ran into nothing"
         s = rig.arm._time
         rig.step()
-    assert s >= earliest, rig.arm.met
+    assert s >= earliest, rig.arm.collision
     assert rig.run() <= 120
     assert measure_distance(rig.arm._command, motion) < 1e-9
-    assert rig.arm.met is not None
-    return rig.arm.met
+    assert rig.arm.collision is not None
+    return rig.arm.collision
 
 
 def test_an_object_in_the_way_of_the_tool_makes_the_arm_brake_along_its_path(rig: Rig) -> None:
@@ -66,7 +66,7 @@ def test_an_object_in_the_way_of_the_tool_makes_the_arm_brake_along_its_path(rig
     assert rig.arm.destination == pytest.approx(rig.arm.tool_pose.position, abs=1e-4)
     rig.world.remove_object(body)
     rig.go(RIGHT)
-    assert rig.arm.met is None, "the next motion begins where the bump left the arm, and forgets it"
+    assert rig.arm.collision is None, "the next motion begins where the bump left the arm, and forgets it"
     assert rig.arm.tool_pose.position == pytest.approx(RIGHT.position, abs=1e-4)
 
 
@@ -86,9 +86,9 @@ def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_tabl
     rig.touch_down(Goal((0.5, 0.1, 0.045), guarded=0.012, speed=0.035))
     rig.tool.close()
     assert rig.tool.held_body == held
-    task = Task(Load(object_class("cube", rig.config.objects["cube"]), rig.tool.bears))
+    task = Task(Load(build_object_class("cube", rig.config.objects["cube"]), rig.tool.holding_force))
     rig.go(LEFT, task)
-    assert rig.arm.met is None
+    assert rig.arm.collision is None
     motion = rig.planned(RIGHT, task)
     # So light that the seal does not break, so heavy that it is felt.
     float_at(rig, "sphere", tool_at(rig, motion, 0.5) - (0, 0, 0.06), mass=0.02)

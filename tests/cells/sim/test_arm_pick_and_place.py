@@ -7,7 +7,7 @@ import pytest
 from rig import Rig
 
 from executive.cell.arm import Goal, Task
-from executive.cell.layout import as_bin, object_class
+from executive.cell.layout import build_bin, build_object_class
 from executive.cell.objects import Load
 from executive.geometry import Pose
 
@@ -29,7 +29,7 @@ def test_an_object_is_picked_carried_without_slip_and_placed(
     rig: Rig, label: str, bin: str, x: float, y: float
 ) -> None:
     config, arm, tool = rig.config, rig.arm, rig.tool
-    kind, box = object_class(label, config.objects[label]), as_bin(bin, config.bins[bin])
+    kind, box = build_object_class(label, config.objects[label]), build_bin(bin, config.bins[bin])
     body = rig.add(label, x + AIM[label], y)
     rig.step(120)
     over = Goal((*box.slots[0], float(box.position[2]) + kind.height + DROP))
@@ -39,7 +39,7 @@ def test_an_object_is_picked_carried_without_slip_and_placed(
     rig.touch_down(down)
     tool.close()
     assert tool.held_body == body
-    carry = Task(Load(kind, tool.bears))
+    carry = Task(Load(kind, tool.holding_force))
     arm.plan_ahead(over, carry)
     rig.step(24)
 
@@ -52,9 +52,9 @@ def test_an_object_is_picked_carried_without_slip_and_placed(
         slips.append(float(np.linalg.norm(in_tool(rig, body).position - hung.position)))
         pulls.append(tool.pull)
     assert tool.holding
-    assert arm.met is None
+    assert arm.collision is None
     assert max(slips) < 0.001
-    assert max(pulls) < tool.bears / 2
+    assert max(pulls) < tool.holding_force / 2
     assert arm.tool_pose.position == pytest.approx(over.position, abs=1e-4)
 
     arm.plan_ahead("home")
@@ -64,7 +64,7 @@ def test_an_object_is_picked_carried_without_slip_and_placed(
     assert home.ready
     arm.start(home.result())
     rig.run()
-    assert arm.met is None
+    assert arm.collision is None
     rig.step(120)
     lies = rig.world.object_pose(body).position
     assert lies[:2] == pytest.approx(box.slots[0], abs=0.03)

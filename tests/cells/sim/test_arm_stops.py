@@ -11,7 +11,7 @@ from rig import Rig
 from executive.cell.arm import Goal, Task
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
-from executive.cell.layout import object_class
+from executive.cell.layout import build_object_class
 from executive.cell.objects import Load
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
@@ -49,7 +49,7 @@ def test_a_stop_is_short_stays_on_the_path_and_keeps_the_stop_limits(
         motion = rig.planned(PICK)
     else:
         rig.go(ON_A_CUBE)
-        motion = rig.planned(IN_A_BIN, Task(Load(object_class("cube", overhead.objects["cube"]), 7.0)))
+        motion = rig.planned(IN_A_BIN, Task(Load(build_object_class("cube", overhead.objects["cube"]), 7.0)))
     steps = stopped(rig, motion, share)
     assert steps <= 120
     assert measure_distance(rig.arm._command, motion) < 1e-9
@@ -83,7 +83,7 @@ def test_a_guarded_descent_rests_within_a_millimetre_of_where_it_felt_something(
     assert felt[2] == pytest.approx(top, abs=0.0012)
     assert np.linalg.norm(rig.arm.tool_pose.position - felt) < 0.001
     assert rig.tool.touching
-    assert rig.arm.met is None
+    assert rig.arm.collision is None
     assert pressed < 1.0, "the weight of the object [N]"
     assert rig.world.object_pose(body).position == pytest.approx(lay, abs=2e-4)
     rig.tool.close()

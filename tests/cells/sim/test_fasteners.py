@@ -11,7 +11,7 @@ import pytest
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.cell import SimCell
-from executive.events import ignore
+from executive.events import discard_event
 from executive.mission.parse.cell_file import load_cell
 from executive.skill import Skill
 from executive.testing.oracle import make_oracle_kind
@@ -37,7 +37,7 @@ def with_one(missions: Path, request: pytest.FixtureRequest) -> Callable[..., Si
         config = config.model_copy(update={"objects": {label: config.objects[label]}})
         options = CellOptions(SilentOperator(), base=path.parent)
         made = make_oracle_kind()(
-            config, seed=seed, routes={label: ROUTES[label]}, emit=ignore, options=options
+            config, seed=seed, routes={label: ROUTES[label]}, emit=discard_event, options=options
         )
         request.addfinalizer(made.close)
         return made

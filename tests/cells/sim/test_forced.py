@@ -6,7 +6,7 @@ import pytest
 from rig import Rig
 
 from executive.cell.arm import Goal, Task
-from executive.cell.layout import object_class
+from executive.cell.layout import build_object_class
 from executive.cell.objects import Load
 
 CUBE = (0.5, 0.1)
@@ -22,7 +22,10 @@ def held(rig: Rig) -> int:
     rig.touch_down(ONTO)
     rig.tool.close()
     assert rig.tool.held_body == body
-    rig.go(OVER, Task(load=Load(object_class("cube", rig.config.objects["cube"]), rig.tool.bears)))
+    rig.go(
+        OVER,
+        Task(load=Load(build_object_class("cube", rig.config.objects["cube"]), rig.tool.holding_force)),
+    )
     return body
 
 
@@ -51,14 +54,14 @@ def test_an_arm_that_runs_into_something_brakes_and_says_what(rig: Rig) -> None:
     rig.arm.run_into("a hand")
     assert not rig.arm.at_rest
     assert rig.run() <= 120
-    assert rig.arm.met == "a hand"
+    assert rig.arm.collision == "a hand"
     rig.go("home")
-    assert rig.arm.met is None
+    assert rig.arm.collision is None
     rig.arm.run_into("a hand")
-    assert (rig.arm.met, rig.arm.at_rest) == (None, True), "at rest or braking it runs into nothing"
+    assert (rig.arm.collision, rig.arm.at_rest) == (None, True), "at rest or braking it runs into nothing"
     rig.arm.start(rig.planned(OVER))
     rig.step(60)
     rig.arm.stop()
     rig.arm.run_into("a hand")
     rig.run()
-    assert rig.arm.met is None
+    assert rig.arm.collision is None

@@ -15,7 +15,7 @@ from executive.cell.workcell import CellOptions, ResumePoint
 from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.command_log import JOINTS_TO, CommandLog
-from executive.events import ignore
+from executive.events import discard_event
 from executive.geometry import Array
 from executive.mission.load import load_mission
 from executive.motion.limits import JointLimits
@@ -91,7 +91,7 @@ def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
 def rebuilt(mission, log: Path) -> SimCell:
     options = CellOptions(SilentOperator(), base=mission.cell_path.parent, resume=ResumePoint(log))
     return make_oracle_kind()(
-        mission.cell_config, seed=SEED, routes=mission.routes, emit=ignore, options=options
+        mission.cell_config, seed=SEED, routes=mission.routes, emit=discard_event, options=options
     )
 
 

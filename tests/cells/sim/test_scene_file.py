@@ -28,7 +28,7 @@ from executive.cells.sim.scenes import SceneRenderer
 from executive.cells.sim.spawn import first_world
 from executive.cells.sim.world import World
 from executive.errors import InputError
-from executive.events import ignore
+from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.findings import MissionError
 from executive.perception.camera_model import compute_calibration, project
@@ -57,7 +57,7 @@ def cell(overhead: CellConfig, tmp_path: Path, request: pytest.FixtureRequest) -
         path.write_text(yaml.safe_dump({"scene": "changed", **sections}))
         options = CellOptions(SilentOperator(), base=tmp_path, scene=path)
         make = make_oracle_kind(box_std=0.0, renders_images=True)
-        made = make(config, seed=SEED, routes=ROUTES, emit=ignore, options=options)
+        made = make(config, seed=SEED, routes=ROUTES, emit=discard_event, options=options)
         request.addfinalizer(made.close)
         return made
 

@@ -14,7 +14,7 @@ from executive.cell.detection import Detections
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import ROUTES, SilentOperator
 from executive.cells.sim.cell import SimCell
-from executive.events import ignore
+from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
 from executive.testing.oracle import TrueFrame, make_oracle_kind
@@ -30,7 +30,9 @@ def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
         path = missions / "cells" / f"{name}.yaml"
         config = load_cell(path).model_copy(update=changes)
         options = CellOptions(SilentOperator(), base=path.parent)
-        made = make_oracle_kind(box_std=0.0)(config, seed=seed, routes=ROUTES, emit=ignore, options=options)
+        made = make_oracle_kind(box_std=0.0)(
+            config, seed=seed, routes=ROUTES, emit=discard_event, options=options
+        )
         request.addfinalizer(made.close)
         return made
 
@@ -50,7 +52,9 @@ def look(made: SimCell) -> None:
     request = cell.detectors["embedded"].request(frame, "full")
     while not request.ready:
         made.advance()
-    detections = Detections(**vars(request.result()), frame=frame, view="full", area=cell.camera.area("full"))
+    detections = Detections(
+        **vars(request.result()), frame=frame, view="full", area=cell.camera.get_view_box("full")
+    )
     cell.ledger.observe(detections, cell.localizer.localize(detections))
 
 
@@ -141,7 +145,7 @@ def test_the_table_is_hidden_while_the_arm_is_over_it(build_cell: Build) -> None
         made.advance()
     assert not cell.camera.sees_table()
     frame = cell.camera.capture()
-    left, top, right, bottom = (int(side) for side in cell.camera.area("table"))
+    left, top, right, bottom = (int(side) for side in cell.camera.get_view_box("table"))
     hidden = ~frame.visible[top:bottom, left:right]
     assert 0.05 < hidden.mean() < 0.9
     x, y, z = frame.matrix @ frame.X_WC.inverse().apply(cell.arm.tool_pose.position)

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cell.layout import travel_height
+from executive.cell.layout import compute_travel_height
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SilentOperator
-from executive.cells.sim.least_times import SimLeastTimes
+from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.spawn import PartSeeds, first_world, spawn
 from executive.cells.sim.world import World
 from executive.errors import InputError
-from executive.events import ignore
+from executive.events import discard_event
 from executive.testing.oracle import make_oracle_kind
 
 Build = Callable[[CellConfig], World]
@@ -103,16 +103,16 @@ def test_too_many_objects_are_refused_with_what_to_change(build: Build, overhead
 def test_a_load_travels_over_stacks_and_starts_from_their_tops(overhead: CellConfig) -> None:
     stacks = with_stacks(overhead, 0.3)
     tallest = max(kind.height for kind in overhead.objects.values())
-    over_stack = travel_height(stacks) - tallest - overhead.motion.clearance
+    over_stack = compute_travel_height(stacks) - tallest - overhead.motion.clearance
     assert over_stack == pytest.approx(2 * tallest)
     guarded = {"motion": overhead.motion.model_copy(update={"descent": 0.1})}
-    one, two = (SimLeastTimes(config.model_copy(update=guarded)).descent for config in (overhead, stacks))
+    one, two = (SimMinTimes(config.model_copy(update=guarded)).descent_time for config in (overhead, stacks))
     assert one - two == pytest.approx(tallest / overhead.motion.descent_speed)
 
 
 def test_the_first_world_is_the_one_that_a_cell_of_the_same_seed_begins_with(overhead: CellConfig) -> None:
     options = CellOptions(SilentOperator(), base=Path("."))
-    cell = make_oracle_kind()(overhead, seed=9, routes={}, emit=ignore, options=options)
+    cell = make_oracle_kind()(overhead, seed=9, routes={}, emit=discard_event, options=options)
     world = first_world(overhead, 9)
     assert (world.bodies, world.stood) == (cell._world.bodies, {})
     for body in world.bodies:

@@ -128,15 +128,15 @@ def test_a_held_object_keeps_the_pose_it_had_at_contact_and_pulls_with_its_weigh
 
 
 def test_the_gauge_tells_what_the_seal_bears_until_nothing_is_held(bench: Bench) -> None:
-    assert bench.tool.bears == 0.0
+    assert bench.tool.holding_force == 0.0
     bench.hang()
-    bears = bench.tool.bears
-    assert bears == pytest.approx(bench.config.force, rel=0.2)
+    force = bench.tool.holding_force
+    assert force == pytest.approx(bench.config.force, rel=0.2)
     weight = 0.1 * 9.81
-    bench.steps(60, pull=0.95 * bears - weight)
-    assert bench.tool.bears == bears
-    bench.steps(60, pull=1.05 * bears - weight)
-    assert (bench.tool.holding, bench.tool.bears) == (False, 0.0)
+    bench.steps(60, pull=0.95 * force - weight)
+    assert bench.tool.holding_force == force
+    bench.steps(60, pull=1.05 * force - weight)
+    assert (bench.tool.holding, bench.tool.holding_force) == (False, 0.0)
 
 
 def test_a_blow_of_a_single_step_does_not_break_the_seal(bench: Bench) -> None:

@@ -174,7 +174,7 @@ class LoopsWithoutYield(Pause):
         yield
         while cell.ledger.epoch > 0:
             try:
-                cell.camera.area("table")
+                cell.camera.get_view_box("table")
             except Exception:
                 return
 
@@ -261,8 +261,8 @@ class RunsOnWhenHalted(Push):
         cell.arm.start(motion)
         while not cell.arm.at_rest:
             yield
-        if cell.arm.met:
-            raise self.failure("blocked", cell.arm.met)
+        if cell.arm.collision:
+            raise self.failure("blocked", cell.arm.collision)
 
 
 class WaitsInFinally(Pause):
@@ -284,7 +284,7 @@ class DependsOnChance(Pause):
 class CallsByChance(Pause):
     def run(self, cell: Cell) -> Steps:
         yield
-        cell.camera.area(str(random.random()))
+        cell.camera.get_view_box(str(random.random()))
 
 
 class WaitsByChance(Pause):

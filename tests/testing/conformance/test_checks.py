@@ -142,7 +142,8 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         f"{EMPTY}, in two equal runs, it set its outputs to different values. {CHANCE}",
     ]),
     ("is_deterministic", faulty.CallsByChance, [
-        f"{EMPTY}, in two equal runs, it called camera.area at tick 1 with different arguments. {CHANCE}",
+        f"{EMPTY}, in two equal runs, it called camera.get_view_box at tick 1 with different arguments. "
+        f"{CHANCE}",
     ]),
     ("is_deterministic", faulty.WaitsByChance, [
         f"{EMPTY}, in two equal runs, it ended as SUCCESS after 1 ticks and then as SUCCESS after 0. "

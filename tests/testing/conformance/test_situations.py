@@ -133,7 +133,7 @@ class Patient(faulty.Pause):
         """Wait."""
         for step in range(400):
             if step == 201:
-                cell.camera.area("table")
+                cell.camera.get_view_box("table")
             yield
 
 

@@ -179,7 +179,7 @@ def test_it_happens_so_far_on_the_way(name: str, share: float) -> None:
         assert cell.fake.world.objects[0].position[2] == pytest.approx(0.025)
     else:
         assert cell.fake.tool.holding and cell.cell.arm.at_rest
-        assert cell.cell.arm.met == "the arm ran into something"
+        assert cell.cell.arm.collision == "the arm ran into something"
 
 
 def test_a_seal_breaks_at_once_only_where_something_is_held() -> None:

@@ -15,7 +15,7 @@ from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import FakeCell, SilentOperator, load_empty_cell
 from executive.errors import InputError
-from executive.events import FaultInjected, FrameSearched, NodeEnded, ToolCommanded, ignore
+from executive.events import FaultInjected, FrameSearched, NodeEnded, ToolCommanded, discard_event
 from executive.testing import faults as effects
 from executive.testing.faults import (
     FaultyCell,
@@ -144,7 +144,7 @@ def test_a_kind_of_cell_has_faults_in_one_run_after_the_other() -> None:
     kind = with_faults(FakeCell, [after(0.0, effects.table_bumped())])
     options = CellOptions(SilentOperator(), base=Path())
     for _ in range(2):
-        cell = kind(load_empty_cell(), seed=0, routes={}, emit=ignore, options=options)
+        cell = kind(load_empty_cell(), seed=0, routes={}, emit=discard_event, options=options)
         cell.advance()
         assert cell.cell.ledger.epoch == 1
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from events import at, frame_searched
 
-from executive.cell.frame import Frame, FrameTaken
+from executive.cell.frame import Frame, FrameCaptured
 from executive.cells.fake.cell import FakeCell
 from executive.events import RunEnded
 from executive.geometry import Pose
@@ -171,7 +171,7 @@ def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(
     image = np.zeros((480, 640, 3), np.uint8)
     frame = Frame(1, "overhead", image, None, np.eye(3), Pose.identity(), 0.0, None, 0)
     for tick in range(200):
-        page(at(tick, FrameTaken(frame)))
+        page(at(tick, FrameCaptured(frame)))
         page(at(tick, frame_searched()))
     assert page._queue.qsize() <= MAX_QUEUED_MESSAGES
     page.finish(RESULT)
@@ -182,7 +182,7 @@ def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
     page = LivePage()
     try:
         for page._watchers in (0, 1, 1):
-            page(at(1, FrameTaken(object())))
+            page(at(1, FrameCaptured(object())))
             page(at(1, frame_searched()))
         assert page.problem == (
             "not all was shown on the page: TypeError: replace() should be called on dataclass instances"

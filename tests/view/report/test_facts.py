@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from events import at, run_ended
 
-from executive.cell.plain import plain
+from executive.cell.json_values import to_json
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import Event, FaultInjected, RequestGiven, RunResumed
@@ -34,7 +34,7 @@ def without_end(run: Path) -> None:
 
 def test_a_run_that_ended_is_told_by_its_result(failed):
     facts = ReportFacts(failed)
-    assert plain(facts.result) == json.loads((failed / "result.json").read_text())
+    assert to_json(facts.result) == json.loads((failed / "result.json").read_text())
     assert (facts.status, facts.timeline.clock) == ("FAILURE", facts.result.robot_time_s)
     assert facts.resume == ""
     assert {each.item for each in facts.pictures if not each.reason} == {"sphere-1"}
@@ -71,7 +71,7 @@ def test_a_run_whose_end_the_disk_did_not_take_is_told_by_its_result(failed, cop
     result = json.loads((run / "result.json").read_text()) | {"status": "FAULT"}
     (run / "result.json").write_text(json.dumps(result))
     facts = ReportFacts(run)
-    assert (facts.status, plain(facts.result)) == ("FAULT", result)
+    assert (facts.status, to_json(facts.result)) == ("FAULT", result)
 
 
 @pytest.mark.parametrize("content", ["", "[1]", "{}", '{"status": "ODD"}', "\ud800"])

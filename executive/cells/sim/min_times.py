@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from executive.cell.config import CellConfig
-from executive.cell.layout import as_bin, pile_height
-from executive.cells.least_times import CellLeastTimes
+from executive.cell.layout import build_bin, compute_max_pile_height
+from executive.cells.min_times import CellMinTimes
 from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
@@ -19,8 +19,8 @@ SAFETY_FACTOR = 0.8
 """Share of the minimum time found for a carry; other configurations and heights may take less time."""
 
 
-class SimLeastTimes(CellLeastTimes):
-    """Lower bounds of motion times for any planner; implements `executive.cell.protocols.LeastTimes`.
+class SimMinTimes(CellMinTimes):
+    """Lower bounds of motion times for any planner; implements `executive.cell.protocols.MinTimes`.
 
     A carry begins at rest on an object and ends at rest over the bin. On any path, each joint needs at least
     the time of its rest-to-rest motion. The bound is the minimum over all configurations; the last joint need
@@ -31,7 +31,7 @@ class SimLeastTimes(CellLeastTimes):
     """
 
     def __init__(self, config: CellConfig) -> None:
-        self._highest = pile_height(config)
+        self._highest = compute_max_pile_height(config)
         lowest = min(kind.height for kind in config.objects.values())
         super().__init__(config, TOUCH_DISTANCE, self._highest - lowest)
         self._limits = JointLimits.of(config.arm.limits)
@@ -40,7 +40,7 @@ class SimLeastTimes(CellLeastTimes):
 
     def _compute_min_transport_time(self, bin: str) -> float:
         if bin not in self._carries:
-            slots = as_bin(bin, self._config.bins[bin]).slots
+            slots = build_bin(bin, self._config.bins[bin]).slots
             low, high = np.transpose([self._config.table.x, self._config.table.y])
             places = np.clip(slots, low, high), np.broadcast_to(self._config.safe_place[:2], slots.shape)
             try:

@@ -22,7 +22,7 @@ MAX_INTEGER_BITS = 2048
 """Length of the largest integer that stays a number [bit]; Python guarantees to read 640 digits."""
 
 
-def plain(value: Any) -> Any:
+def to_json(value: Any) -> Any:
     """Return `value` as plain JSON: floats rounded to `DIGITS` places, a frame by its number.
 
     Values that JSON lacks become text: infinities, NaN, integers beyond `MAX_INTEGER_BITS`, and lone
@@ -31,13 +31,13 @@ def plain(value: Any) -> Any:
     return _rule(value.__class__)(value)
 
 
-def plain_or_type(value: Any) -> Any:
+def to_json_or_type_name(value: Any) -> Any:
     """Return `value` as plain JSON, or the name of its type if it cannot be converted.
 
     Skills set outputs of any type; an output that cannot be converted must not end the run.
     """
     try:
-        return plain(value)
+        return to_json(value)
     except Exception:
         return type(value).__name__
 
@@ -60,18 +60,18 @@ def _number(value: Any) -> float | str:
 
 
 _RULES: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
-    (Enum, lambda value: plain(value.value)),
+    (Enum, lambda value: to_json(value.value)),
     (str, _text),
     (int, lambda value: value if value.bit_length() <= MAX_INTEGER_BITS else hex(value)),
     (type(None), lambda value: value),
     ((float, np.floating), _number),
-    (np.generic, lambda value: plain(value.item())),
-    (np.ndarray, lambda value: plain(value.tolist())),
+    (np.generic, lambda value: to_json(value.item())),
+    (np.ndarray, lambda value: to_json(value.tolist())),
     (Frame, lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _number(frame.stamp)}),
     (Pose, lambda pose: pose.to_rounded_list(DIGITS)),
-    (Mapping, lambda mapping: {_text(str(key)): plain(value) for key, value in mapping.items()}),
-    ((list, tuple), lambda values: [plain(value) for value in values]),
-    ((set, frozenset), lambda values: sorted((plain(value) for value in values), key=repr)),
+    (Mapping, lambda mapping: {_text(str(key)): to_json(value) for key, value in mapping.items()}),
+    ((list, tuple), lambda values: [to_json(value) for value in values]),
+    ((set, frozenset), lambda values: sorted((to_json(value) for value in values), key=repr)),
     (PurePath, lambda path: _text(str(path))),
 )
 """Types, and functions that make values of these types plain; the first matching type counts."""
@@ -84,6 +84,6 @@ def _rule(kind: type) -> Callable[[Any], Any]:
         return rule
     if dataclasses.is_dataclass(kind):
         names = [field.name for field in dataclasses.fields(kind)]
-        return lambda value: {name: plain(getattr(value, name)) for name in names}
+        return lambda value: {name: to_json(getattr(value, name)) for name in names}
     # The default `repr` contains a memory address, which differs between equal runs.
     return lambda _: kind.__name__

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from executive.cell.detection import Detection
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
-from executive.cell.plain import MAX_INTEGER_BITS, plain, plain_or_type
+from executive.cell.json_values import MAX_INTEGER_BITS, to_json, to_json_or_type_name
 from executive.geometry import Pose
 
 
@@ -70,13 +70,13 @@ DUCK = {"label": "duck", "confidence": 0.6, "box": [1, 2.5, 3.0, 4], "rival": 0.
     ],
 )  # fmt: skip
 def test_becomes_plain(value, kept):
-    assert plain(value) == kept
-    assert repr(plain(value)) == repr(kept)
+    assert to_json(value) == kept
+    assert repr(to_json(value)) == repr(kept)
 
 
 @given(st.recursive(st.floats() | st.integers() | st.text(), lambda inner: st.lists(inner, max_size=3)))
 def test_everything_plain_is_json(value):
-    json.dumps(plain(value), allow_nan=False)
+    json.dumps(to_json(value), allow_nan=False)
 
 
 class Shy(Mapping):
@@ -97,4 +97,4 @@ DEEP = reduce(lambda inner, number: [inner] if number % 2 else {"a": inner}, ran
     ("value", "kept"), [(Shy(), "Shy"), (ENDLESS, "list"), (DEEP, "list"), (1 / 3, 0.333333)]
 )
 def test_a_value_without_a_plain_form_is_named_by_its_type(value, kept):
-    assert plain_or_type(value) == kept
+    assert to_json_or_type_name(value) == kept

@@ -5,8 +5,8 @@ from __future__ import annotations
 from executive.cell.config import CellConfig
 
 
-class CellLeastTimes:
-    """Base class of the minimum times of a cell, which implement `executive.cell.protocols.LeastTimes`.
+class CellMinTimes:
+    """Base class of the minimum times of a cell, which implement `executive.cell.protocols.MinTimes`.
 
     Args:
         config: The cell file.
@@ -19,12 +19,12 @@ class CellLeastTimes:
         self._max_saved_distance = touch_distance + max_excess_height
 
     @property
-    def descent(self) -> float:
+    def descent_time(self) -> float:
         """Minimum time of a guarded descent [s]; it ends early at an object above its expected height."""
         motion = self._config.motion
         return max(0.0, motion.descent - self._max_saved_distance) / motion.descent_speed
 
-    def carry(self, bin: str | None) -> float:
+    def get_transport_time(self, bin: str | None) -> float:
         """Return the minimum time of the transport of an object to a bin [s]; None: to the nearest bin.
 
         The time is 0 for a bin that the cell lacks or that the arm does not reach.
@@ -32,7 +32,7 @@ class CellLeastTimes:
         names = self._config.bins if bin is None else {bin} & set(self._config.bins)
         return min(map(self._compute_min_transport_time, names), default=0.0)
 
-    def answer(self, detector: str) -> float:
+    def get_answer_time(self, detector: str) -> float:
         """Return the latency of a detector [s]; "": of the first one; 0 if the cell lacks the detector."""
         detectors = self._config.detectors
         config = detectors.get(detector or next(iter(detectors)))
