@@ -14,7 +14,7 @@ from executive.events import DetectedObject, NodeEnded, TargetSelected, TimedEve
 from executive.geometry import Pose
 from executive.record import picture_recorder as module
 from executive.record.picture_recorder import MAX_LOOKS, PictureRecorder, find_picture
-from executive.record.pictures.drawer import Drawer
+from executive.record.pictures.drawer import PictureDrawer
 
 CUBE = detected("cube")
 NEAR = detected("cube", box=[90, 40, 120, 70], position=[0.5, -0.1, 0.02])
@@ -58,11 +58,11 @@ def drawn(monkeypatch):
     """The scenes that would be drawn, by file, without a process."""
     scenes = {}
 
-    def draw(self, name, scene):
+    def queue(self, name, scene):
         scenes[name] = scene
         return True
 
-    monkeypatch.setattr(Drawer, "draw", draw)
+    monkeypatch.setattr(PictureDrawer, "queue", queue)
     return scenes
 
 
@@ -148,7 +148,7 @@ def test_an_earlier_look_is_found_again_and_old_ones_are_forgotten(tmp_path, dra
     looks = [look(number, CUBE) for number in range(MAX_LOOKS + 1)]
     frames = shown(tmp_path, *looks, decision(frame=1), decision(frame=0, tick=13))
     assert list(drawn) == ["000012_cube-1.jpg"]
-    assert frames.problem == f"pictures left out: 1 of a look before the last {MAX_LOOKS}"
+    assert frames.problem == f"missing pictures: 1 of looks before the last {MAX_LOOKS}"
 
 
 def test_what_the_last_decision_rests_on_is_kept(tmp_path, drawn):
@@ -162,10 +162,10 @@ def test_a_long_run_keeps_its_first_pictures_and_says_what_it_left_out(tmp_path,
     monkeypatch.setattr(module, "MAX_PICTURES", 3)
     frames = shown(tmp_path, look(1, CUBE), *(decision(tick=tick) for tick in range(5)))
     assert list(drawn) == ["000000_cube-1.jpg", "000001_cube-1.jpg", "000002_cube-1.jpg"]
-    assert frames.problem == "pictures left out: 2 beyond the 3 that a run keeps"
-    monkeypatch.setattr(Drawer, "draw", lambda self, name, scene: False)
+    assert frames.problem == "missing pictures: 2 after the first 3"
+    monkeypatch.setattr(PictureDrawer, "queue", lambda self, name, scene: False)
     frames = shown(tmp_path, look(1, CUBE), decision())
-    assert frames.problem == "pictures left out: 1 that came faster than they can be drawn"
+    assert frames.problem == "missing pictures: 1 because of a full queue"
 
 
 def test_pictures_that_cannot_be_written_are_told_and_break_nothing(tmp_path):

@@ -1,28 +1,28 @@
-"""Colours of pictures, as hexadecimal RGB."""
+"""Colours of pictures in hexadecimal RGB."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 PALETTE = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00")
-"""Colours of classes, which colour-blind people can distinguish and on which black text is legible.
+"""Colours of classes: colour-blind people can distinguish them, and black text on them is legible.
 
-Okabe and Ito, "Color Universal Design", 2008, without black.
+Source: Okabe and Ito, "Color Universal Design", 2008, without black.
 """
 
-GROUND, INK, FAINT, WARNING = "#20262B", "#FFFFFF", "#A9B4BC", "#FF8A65"
-"""Colours of the strip: background, text, minor text and failures."""
+BACKGROUND, TEXT, SECONDARY_TEXT, FAILURE_TEXT = "#20262B", "#FFFFFF", "#A9B4BC", "#FF8A65"
+"""Colours in the status bar below an image: background, text, secondary text, and text about a failure."""
 
-RIM = "#000000"
-"""Colour of the rim around the selected box, which contrasts with any image."""
-
-
-def class_colour(label: str, classes: Sequence[str]) -> str:
-    """Return the colour of a class by its index in `classes`; unknown classes have the colour of text."""
-    return PALETTE[classes.index(label) % len(PALETTE)] if label in classes else INK
+OUTLINE = "#000000"
+"""Colour of the outline of the selected box."""
 
 
-def bgr(colour: str) -> tuple[int, int, int]:
-    """Return a colour as blue, green and red, 0 to 255."""
+def choose_class_colour(label: str, classes: Sequence[str]) -> str:
+    """Return the colour of the class `label` by its index in `classes`, or `TEXT` for other classes."""
+    return PALETTE[classes.index(label) % len(PALETTE)] if label in classes else TEXT
+
+
+def to_bgr(colour: str) -> tuple[int, int, int]:
+    """Return the blue, green and red component of a hexadecimal colour, each 0 to 255."""
     red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return blue, green, red

@@ -1,4 +1,4 @@
-"""Content of a picture."""
+"""Content of a picture: an image with its detections, and the state of the run."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from executive.cell.detection import Detection
 
 @dataclass(frozen=True, eq=False)
 class PictureScene:
-    """Camera image with its detections and the state of a run, at one moment.
+    """Camera image with its detections, and the state of the run at the time of the picture.
 
     Attributes:
-        image: `(H, W, 3)` uint8, RGB.
-        visible: `(H, W)` bool, False for pixels on which the arm hides the scene; None if unknown.
+        image: Camera image `(H, W, 3)`, RGB, 0 to 255.
+        visible: Mask `(H, W)`, False for pixels in which the arm occludes the scene; None if unknown.
         detections: All detections in the image.
-        selected: Index of the detection of `item`, or None.
+        selected: Index in `detections` of the detection of `item`, or None.
         mission: Name of the mission.
         clock: Time on the clock of the run [s].
         camera: Name of the camera.
         detector: Name of the detector.
-        age: Time since the image was taken [s].
-        phase: Names of the running skills.
+        age: Time since the capture of the image [s].
+        phase: Names of the running skills, joined by ` + `.
         item: Name of the selected item, or "".
         bin: Name of the destination of the item, or "".
         attempts: Number of failed attempts to pick the item.
-        failure: Skill and reason of the failure (`Grasp.missed`), or "".
+        failure: Name of the failed skill and reason of the failure (`Grasp.missed`), or "".
         message: Message of the failure, or "".
-        outcomes: Names of items by bin, or by state (`in the tool`, `rejected`, ...).
-        classes: Detected classes; the index of a class determines its colour.
+        outcomes: Names of items by their bin, or by their state (`in the tool`, `rejected`, ...).
+        classes: Classes that were detected; the index of a class determines its colour.
     """
 
     image: NDArray[np.uint8]

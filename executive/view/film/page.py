@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from executive.events import RunEnded
-from executive.record.pictures.strip import HEIGHT as STATUS_BAR_HEIGHT
+from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT
 from executive.record.result import Result
 from executive.view.film import panel
 from executive.view.film.run_state import FilmRunState

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from executive.cell.detection import Detection
-from executive.record.pictures.draw import WIDTH, captions, draw
-from executive.record.pictures.palette import GROUND, PALETTE, bgr, class_colour
+from executive.record.pictures.draw import PICTURE_WIDTH, draw_picture, make_captions
+from executive.record.pictures.palette import BACKGROUND, PALETTE, choose_class_colour, to_bgr
 from executive.record.pictures.scene import PictureScene
-from executive.record.pictures.strip import HEIGHT
+from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT
 
 GREY = 150
 CUBE = Detection("cube", 0.9, (100.0, 200.0, 160.0, 260.0))
@@ -25,7 +25,7 @@ def scene(*seen: Detection, height: int = 480, width: int = 640, **more) -> Pict
 
 
 def rgb(colour: str) -> tuple[int, ...]:
-    return bgr(colour)[::-1]
+    return to_bgr(colour)[::-1]
 
 
 def edge(picture: np.ndarray, row: int, column: int) -> list[tuple[int, ...]]:
@@ -34,7 +34,7 @@ def edge(picture: np.ndarray, row: int, column: int) -> list[tuple[int, ...]]:
 
 
 def test_the_chosen_box_is_thick_and_rimmed_the_others_are_thin():
-    picture = draw(scene(CUBE, DUCK, selected=0))
+    picture = draw_picture(scene(CUBE, DUCK, selected=0))
     chosen, other = edge(picture, 230, 100), edge(picture, 120, 300)
     assert chosen[5] == rgb(PALETTE[0]) and other[5] == rgb(PALETTE[1])
     assert chosen.count(chosen[5]) > other.count(other[5])
@@ -45,57 +45,57 @@ def test_the_chosen_box_is_thick_and_rimmed_the_others_are_thin():
 def test_the_strip_is_below_the_image_with_a_close_up_of_the_choice():
     image = np.full((480, 640, 3), GREY, np.uint8)
     image[200:260, 100:160] = (200, 30, 30)
-    picture = draw(replace(scene(CUBE, selected=0), image=image))
-    assert picture.shape == (480 + HEIGHT, WIDTH, 3)
-    assert tuple(picture[480 + HEIGHT // 2, HEIGHT // 2]) == (200, 30, 30)
-    assert tuple(picture[480 + HEIGHT // 8, HEIGHT // 8]) == (GREY,) * 3
+    picture = draw_picture(replace(scene(CUBE, selected=0), image=image))
+    assert picture.shape == (480 + STATUS_BAR_HEIGHT, PICTURE_WIDTH, 3)
+    assert tuple(picture[480 + STATUS_BAR_HEIGHT // 2, STATUS_BAR_HEIGHT // 2]) == (200, 30, 30)
+    assert tuple(picture[480 + STATUS_BAR_HEIGHT // 8, STATUS_BAR_HEIGHT // 8]) == (GREY,) * 3
     assert tuple(picture[480, 0]) == rgb(PALETTE[0])
-    assert tuple(picture[-1, -1]) == rgb(GROUND)
+    assert tuple(picture[-1, -1]) == rgb(BACKGROUND)
 
 
 def test_without_a_choice_every_box_is_thin_and_there_is_no_close_up():
-    picture = draw(scene(CUBE))
+    picture = draw_picture(scene(CUBE))
     assert set(edge(picture, 230, 100)) == {(GREY,) * 3, rgb(PALETTE[0])}
-    assert tuple(picture[480 + HEIGHT // 2, 1]) == rgb(GROUND)
+    assert tuple(picture[480 + STATUS_BAR_HEIGHT // 2, 1]) == rgb(BACKGROUND)
 
 
 def test_a_choice_at_the_edge_of_an_image_is_drawn_and_the_image_left_alone():
     cut_off = replace(CUBE, box=(-10.0, 460.0, 20.0, 490.0))
     drawn = scene(cut_off, selected=0, visible=np.zeros((480, 640), bool))
-    assert draw(drawn).shape == (480 + HEIGHT, WIDTH, 3)
+    assert draw_picture(drawn).shape == (480 + STATUS_BAR_HEIGHT, PICTURE_WIDTH, 3)
     assert (drawn.image == GREY).all()
 
 
 def test_what_the_strip_says_is_written_on_it():
-    silent, told = (draw(scene(mission=mission))[480:] for mission in ("", "sort"))
+    silent, told = (draw_picture(scene(mission=mission))[480:] for mission in ("", "sort"))
     assert np.any(silent != told)
 
 
 def test_hidden_parts_are_darker():
     visible = np.ones((480, 640), bool)
     visible[:, :320] = False
-    picture = draw(scene(visible=visible))
+    picture = draw_picture(scene(visible=visible))
     assert picture[100, 100].max() < GREY - 20
     assert tuple(picture[100, 500]) == (GREY,) * 3
 
 
 @pytest.mark.parametrize("width", [160, 1280])
 def test_every_picture_is_as_wide_and_its_boxes_go_with_it(width):
-    scale = width / WIDTH
+    scale = width / PICTURE_WIDTH
     small = replace(CUBE, box=tuple(edge * scale for edge in CUBE.box))
-    picture = draw(scene(small, height=round(480 * scale), width=width))
-    assert picture.shape == (480 + HEIGHT, WIDTH, 3)
+    picture = draw_picture(scene(small, height=round(480 * scale), width=width))
+    assert picture.shape == (480 + STATUS_BAR_HEIGHT, PICTURE_WIDTH, 3)
     assert tuple(picture[230, 100]) == rgb(PALETTE[0])
 
 
 def test_a_label_says_the_class_and_the_confidence_that_of_the_choice_the_item():
-    assert captions(scene(CUBE, DUCK, selected=1, item="duck-3")) == ["cube 0.90", "duck-3 0.70"]
-    assert captions(scene(CUBE, selected=0)) == ["cube 0.90"]
+    assert make_captions(scene(CUBE, DUCK, selected=1, item="duck-3")) == ["cube 0.90", "duck-3 0.70"]
+    assert make_captions(scene(CUBE, selected=0)) == ["cube 0.90"]
 
 
 def test_the_labels_of_boxes_side_by_side_do_not_cover_each_other():
     beside = replace(CUBE, label="duck", box=(104.0, 200.0, 164.0, 260.0))
-    apart, close = (draw(scene(CUBE, other))[:480] for other in (DUCK, beside))
+    apart, close = (draw_picture(scene(CUBE, other))[:480] for other in (DUCK, beside))
     for colour in (rgb(PALETTE[0]), rgb(PALETTE[1])):
         labels = [(picture == colour).all(axis=-1).sum() for picture in (apart, close)]
         assert labels[1] > 0.6 * labels[0]
@@ -103,6 +103,6 @@ def test_the_labels_of_boxes_side_by_side_do_not_cover_each_other():
 
 def test_colours_of_classes_come_again_when_there_are_no_more():
     classes = [f"class {number}" for number in range(len(PALETTE) + 1)]
-    colours = [class_colour(label, classes) for label in classes]
+    colours = [choose_class_colour(label, classes) for label in classes]
     assert len(set(colours)) == len(PALETTE)
     assert colours[-1] == colours[0]

@@ -9,7 +9,7 @@ import numpy as np
 
 from executive.cell.detection import Detection
 from executive.record.pictures import drawer as module
-from executive.record.pictures.drawer import MAX_WAITING, Drawer
+from executive.record.pictures.drawer import MAX_QUEUED_PICTURES, PictureDrawer
 from executive.record.pictures.scene import PictureScene
 
 SCENE = PictureScene(
@@ -22,10 +22,10 @@ SCENE = PictureScene(
 
 def test_a_scene_becomes_a_small_file(tmp_path):
     noisy = PictureScene(np.random.default_rng(0).integers(120, 140, (480, 640, 3)).astype(np.uint8))
-    drawer = Drawer(tmp_path / "frames")
+    drawer = PictureDrawer(tmp_path / "frames")
     assert not (tmp_path / "frames").exists()
-    assert drawer.draw("a.jpg", SCENE)
-    assert drawer.draw("b.jpg", noisy)
+    assert drawer.queue("a.jpg", SCENE)
+    assert drawer.queue("b.jpg", noisy)
     drawer.close()
     assert drawer.problem == ""
     blue, _, red = cv2.imread(str(tmp_path / "frames" / "a.jpg"))[230, 100]
@@ -35,9 +35,9 @@ def test_a_scene_becomes_a_small_file(tmp_path):
 
 def test_a_picture_that_cannot_be_written_is_a_problem_and_the_others_are_drawn(tmp_path):
     (tmp_path / "b.jpg").mkdir()
-    drawer = Drawer(tmp_path)
+    drawer = PictureDrawer(tmp_path)
     for name in ("b.jpg", "a.jpg"):
-        drawer.draw(name, SCENE)
+        drawer.queue(name, SCENE)
     drawer.close()
     reason = f'cannot write the picture "{tmp_path}/b.jpg": is a directory'
     assert drawer.problem == f"not every picture was drawn: {reason}"
@@ -46,19 +46,21 @@ def test_a_picture_that_cannot_be_written_is_a_problem_and_the_others_are_drawn(
 
 def test_no_more_pictures_wait_than_the_memory_holds(tmp_path, monkeypatch):
     release = threading.Event()
-    monkeypatch.setattr(module, "save", lambda path, scene: release.wait())
-    drawer = Drawer(tmp_path)
-    assert [drawer.draw("a.jpg", SCENE) for _ in range(MAX_WAITING + 1)] == [True] * MAX_WAITING + [False]
+    monkeypatch.setattr(module, "save_picture", lambda path, scene: release.wait())
+    drawer = PictureDrawer(tmp_path)
+    assert [drawer.queue("a.jpg", SCENE) for _ in range(MAX_QUEUED_PICTURES + 1)] == [
+        True
+    ] * MAX_QUEUED_PICTURES + [False]
     release.set()
     drawer.close()
 
 
 def test_a_run_that_is_ended_by_force_waits_for_no_picture(tmp_path, monkeypatch):
     release, drawn = threading.Event(), []
-    monkeypatch.setattr(module, "save", lambda path, scene: drawn.append(path.name) or release.wait())
-    drawer = Drawer(tmp_path)
+    monkeypatch.setattr(module, "save_picture", lambda path, scene: drawn.append(path.name) or release.wait())
+    drawer = PictureDrawer(tmp_path)
     for name in ("a.jpg", "b.jpg"):
-        drawer.draw(name, SCENE)
+        drawer.queue(name, SCENE)
     drawer.close(wait=False)
     release.set()
     assert drawn in ([], ["a.jpg"])
@@ -66,10 +68,10 @@ def test_a_run_that_is_ended_by_force_waits_for_no_picture(tmp_path, monkeypatch
 
 def test_pictures_that_do_not_end_are_given_up(tmp_path, monkeypatch):
     release = threading.Event()
-    monkeypatch.setattr(module, "save", lambda path, scene: release.wait())
+    monkeypatch.setattr(module, "save_picture", lambda path, scene: release.wait())
     monkeypatch.setattr(module, "CLOSE_TIMEOUT", 0.0)
-    drawer = Drawer(tmp_path)
-    drawer.draw("a.jpg", SCENE)
+    drawer = PictureDrawer(tmp_path)
+    drawer.queue("a.jpg", SCENE)
     drawer.close()
     release.set()
     assert drawer.problem == "1 pictures were not drawn within 0 s"

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from executive.record.pictures.scene import PictureScene
-from executive.record.pictures.strip import HEIGHT, ROWS, draw_strip, join_last, shorten, strip_text, wrap
+from executive.record.pictures.status_bar import (
+    ROW_COUNT,
+    STATUS_BAR_HEIGHT,
+    draw_status_bar,
+    join_last_names,
+    make_status_bar_text,
+    truncate,
+    wrap_text,
+)
 
 IMAGE = np.zeros((48, 64, 3), np.uint8)
 
@@ -28,7 +36,7 @@ def at_most(count: int):
 )  # fmt: skip
 def test_a_decision_is_told_with_its_bin_and_a_failure_with_its_reason(scene, title, lines):
     fates = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
-    said = strip_text(PictureScene(IMAGE, outcomes=fates, **scene))
+    said = make_status_bar_text(PictureScene(IMAGE, outcomes=fates, **scene))
     assert (said.title, said.lines) == (title, lines)
     assert said.outcomes == (("red_bin", ("cube-1", "cube-2")), ("rejected", ("duck-1",)))
 
@@ -36,9 +44,12 @@ def test_a_decision_is_told_with_its_bin_and_a_failure_with_its_reason(scene, ti
 def test_the_strip_says_where_and_when():
     hidden = np.zeros((48, 64), bool)
     look = {"camera": "overhead", "detector": "embedded", "age": 0.05}
-    said = strip_text(PictureScene(IMAGE, hidden, mission="sort", clock=3.4, **look))
-    assert said.notes == ("sort   3.40 s   shaded: behind the arm", "overhead by embedded, 0.05 s old")
-    assert strip_text(PictureScene(IMAGE, ~hidden, camera="wrist")).notes == ("0.00 s", "wrist, 0.00 s old")
+    said = make_status_bar_text(PictureScene(IMAGE, hidden, mission="sort", clock=3.4, **look))
+    assert said.notes == ("sort   3.40 s   shaded: occluded by the arm", "overhead by embedded, 0.05 s old")
+    assert make_status_bar_text(PictureScene(IMAGE, ~hidden, camera="wrist")).notes == (
+        "0.00 s",
+        "wrist, 0.00 s old",
+    )
 
 
 @pytest.mark.parametrize(
@@ -46,21 +57,21 @@ def test_the_strip_says_where_and_when():
     [(30, "a-1, a-2, a-3, a-4"), (17, "a-2, a-3, a-4 +1"), (12, "a-3, a-4 +2"), (7, "a-4 +3"), (3, "4")],
 )
 def test_a_long_list_keeps_its_newest(room, expected):
-    assert join_last(["a-1", "a-2", "a-3", "a-4"], at_most(room)) == expected
-    assert join_last([], at_most(room)) == ""
+    assert join_last_names(["a-1", "a-2", "a-3", "a-4"], at_most(room)) == expected
+    assert join_last_names([], at_most(room)) == ""
 
 
 def test_a_text_is_wrapped_between_words_and_cut_where_it_must():
-    assert wrap("no seal on cube-1", at_most(8)) == ["no seal", "on", "cube-1"]
-    assert wrap("unreachable", at_most(8)) == ["unrea..."]
-    assert shorten("short", at_most(8)) == "short"
+    assert wrap_text("no seal on cube-1", at_most(8)) == ["no seal", "on", "cube-1"]
+    assert wrap_text("unreachable", at_most(8)) == ["unrea..."]
+    assert truncate("short", at_most(8)) == "short"
 
 
 @pytest.mark.parametrize("width", [640, 320])
 def test_whatever_is_said_there_is_room_for_it(width):
-    many = {f"bin_{number}_with_a_long_name": [f"cube-{number}"] * 40 for number in range(ROWS + 3)}
+    many = {f"bin_{number}_with_a_long_name": [f"cube-{number}"] * 40 for number in range(ROW_COUNT + 3)}
     long = {"item": "cube-1" * 20, "bin": "red", "message": "word " * 100, "camera": "c" * 90}
-    strip = draw_strip(PictureScene(IMAGE, outcomes=many, **long), width)
-    assert strip.shape == (HEIGHT, width, 3)
+    strip = draw_status_bar(PictureScene(IMAGE, outcomes=many, **long), width)
+    assert strip.shape == (STATUS_BAR_HEIGHT, width, 3)
     edges = (strip[:3], strip[-3:], strip[:, -3:])
     assert all(len(np.unique(edge.reshape(-1, 3), axis=0)) == 1 for edge in edges)  # Nothing is cut off.
