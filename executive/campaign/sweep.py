@@ -64,14 +64,14 @@ def run_job(job: Job) -> Result:
     from executive.plugins import discover
     from executive.record.recorded_run import RecordOptions, record_run
     from executive.run.assembly import RunOptions
-    from executive.view.report.page import leave_report
+    from executive.view.report.page import try_write_report
 
     skills = discover()
     loaded = load_mission(job.mission, skills, job.overrides)
     options = RunOptions(job.seed, scene=job.scene)
     result = record_run(loaded, skills, options, job.runs, RecordOptions(saves_pictures=job.frames))
     # A failure to write the report does not change the result.
-    leave_report(result.run)
+    try_write_report(result.run)
     return result
 
 

@@ -91,7 +91,7 @@ def command(
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import bar, report_polygons
         from executive.training.evaluation.misses import WorstMisses
-        from executive.view.figures.detector import print_figures
+        from executive.view.figures.detector import print_metrics
 
         worst, scenes = WorstMisses(), evaluation.SceneSettings(images, seed, varied, view, workers, scene)
         cell_names = cells or (() if dataset else ("overhead",))
@@ -106,7 +106,7 @@ def command(
             result = evaluation.measure(
                 tested, dataset, scenes, threshold=threshold, worst_misses=worst, progress=bar
             )
-            print_figures(measurement, tested.name, result)
+            print_metrics(measurement, tested.name, result)
             kind = tested.configs[tested.name].kind
             measured[measurement] = {"detector": tested.name, "kind": kind, **result.as_dict()}
             if stored and tested.cell is not None:

@@ -57,7 +57,7 @@ def command(
         from executive.campaign.faults.trial import record_trial
         from executive.campaign.subject import load_subject
         from executive.cli.progress import bar, print_halting
-        from executive.view.figures.fault import as_plain, fault_text, trial_as_plain, trial_text
+        from executive.view.figures.fault import format_results, format_trial, results_to_json, trial_to_json
 
         subject = load_subject(mission, overrides, oracle, seed)
         with bar("tried", quiet=as_json or is_list or numbers is not None) as progress:
@@ -69,11 +69,11 @@ def command(
                 text, code = "\n".join(f"{fault['fault']:4} {fault['description']}" for fault in plain), 0
             elif numbers is not None:
                 trial, path = record_trial(subject, campaign.rehearsal, campaign.select(numbers), runs)
-                plain = {**trial_as_plain(trial), "run": str(path)}
-                text, code = f"{trial_text(trial)}\n{path}", int(bool(trial.problems))
+                plain = {**trial_to_json(trial), "run": str(path)}
+                text, code = f"{format_trial(trial)}\n{path}", int(bool(trial.problems))
             else:
                 figures = campaign.try_pairs(pairs) if pairs else campaign.try_singles()
-                plain, text = as_plain(figures), fault_text(figures)
-                code = int(bool(figures.failed)) if figures.complete else 130
+                plain, text = results_to_json(figures), format_results(figures)
+                code = int(bool(figures.failed_trials)) if figures.complete else 130
     print_json(plain) if as_json else click.echo(text)
     ctx.exit(code)

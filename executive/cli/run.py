@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from executive.record.result import Result
     from executive.run.assembly import RunOptions
     from executive.view.live.page import LivePage
-    from executive.view.terminal.lines import Lines
-    from executive.view.terminal.screen import Terminal
+    from executive.view.terminal.lines import LineView
+    from executive.view.terminal.screen import TerminalView
 
 
 @click.command(name="run")
@@ -85,8 +85,8 @@ def command(
         from executive.record.result import describe_disagreement, find_exit_code
         from executive.record.run_directory import RunDirectory
         from executive.run.assembly import RunOptions
-        from executive.view.report.page import leave_report
-        from executive.view.terminal.summary import repeat_command, summary, verdict
+        from executive.view.report.page import try_write_report
+        from executive.view.terminal.summary import describe_end, format_repeat_command, format_summary
 
         terminal_view = None if quiet else _make_view()
         with _serve_page(live) as page:
@@ -105,8 +105,8 @@ def command(
                 origin = mission, seed, overrides
             # The command that repeats the run makes the same requests as the operator.
             used_requests, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
-            repeat = repeat_command(*origin, used_requests, used_scene)
-            report, problem = leave_report(result.run)
+            repeat = format_repeat_command(*origin, used_requests, used_scene)
+            report, problem = try_write_report(result.run)
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
                 problem = "; ".join(filter(None, (problem, page.problem)))
@@ -115,12 +115,12 @@ def command(
             click.echo(f"note: {problem}", err=True)
         if terminal_view is not None:
             click.echo(
-                summary(result, terminal_view.timeline.items.now(), repeat, report), err=True, nl=False
+                format_summary(result, terminal_view.timeline.items.now(), repeat, report), err=True, nl=False
             )
         elif result.story is not None:
             click.echo("\n".join(diagnosis_lines(result.story, result.run, repeat, report)), err=True)
         elif result.status == "INCOMPLETE" or describe_disagreement(result):
-            ended = verdict(result.status, result.reason, result.node, result.message)
+            ended = describe_end(result.status, result.reason, result.node, result.message)
             click.echo("\n".join(filter(None, (describe_disagreement(result), ended))), err=True)
     if as_json:
         print_json(to_json(result))
@@ -175,14 +175,14 @@ def _serve_page(is_enabled: bool) -> Iterator[LivePage | None]:
         page.finish()
 
 
-def _make_view() -> Lines | Terminal:
+def _make_view() -> LineView | TerminalView:
     """Return the live view if stderr is a terminal, else a view that prints lines."""
     from rich.console import Console
 
-    from executive.view.terminal.lines import Lines
-    from executive.view.terminal.screen import Terminal
+    from executive.view.terminal.lines import LineView
+    from executive.view.terminal.screen import TerminalView
 
     console = Console(file=open_unescaped_stderr())
     if not console.is_terminal or console.is_dumb_terminal:
-        return Lines(sys.stderr)
-    return Terminal(console, sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)
+        return LineView(sys.stderr)
+    return TerminalView(console, sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)

@@ -62,16 +62,16 @@ def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool
     for name, skill in skills.items():
         with stdout_kept_clean():
             from executive.testing.conformance import list_conformance_checks
-            from executive.view.figures.conformance import conformance_lines, conformance_total
+            from executive.view.figures.conformance import format_verdict_counts, format_verdicts
 
             skill_verdicts = [check.run() for check in list_conformance_checks(skill, name=name)]
         if not as_json:
-            click.echo("\n".join(conformance_lines(skill_verdicts)))
+            click.echo("\n".join(format_verdicts(skill_verdicts)))
         verdicts += skill_verdicts
     if as_json:
         print_json([asdict(verdict) for verdict in verdicts])
     else:
-        click.echo(conformance_total(verdicts))
+        click.echo(format_verdict_counts(verdicts))
     return all(verdict.status == "ok" for verdict in verdicts)
 
 

@@ -75,7 +75,7 @@ def command(
 
 def _describe(figures: dict[str, Any]) -> str:
     """Return the figures of a sweep as lines of text."""
-    from executive.view.terminal.summary import verdict
+    from executive.view.terminal.summary import describe_end
 
     done, succeeded = figures["runs"], figures["succeeded"]
     headline = f"{succeeded} of {done} runs succeeded"
@@ -113,5 +113,5 @@ def _describe(figures: dict[str, Any]) -> str:
     for entry in figures["failures"]:
         # A run whose process crashed, or that could not create its directory, has no directory.
         where = entry["run"] and f"; {entry['run']}"
-        lines.append(f"  seed {entry['seed']}: {verdict(*map(entry.get, keys))}{where}")
+        lines.append(f"  seed {entry['seed']}: {describe_end(*map(entry.get, keys))}{where}")
     return "\n".join(lines)

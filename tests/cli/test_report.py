@@ -107,7 +107,7 @@ def test_what_has_no_report_is_refused_with_what_helps(run: Path) -> None:
     (run / "report.html").mkdir()
     assert refused(str(run), "--json") == (
         f'cannot write the report "{run / "report.html"}": is a directory; copy the run directory to a '
-        "writable folder, and make the report of the copy\n"
+        "writable folder, and write the report of the copy\n"
     )
     (run / "tree.json").unlink()
     assert refused(str(run)) == (

@@ -18,7 +18,7 @@ GRAMMAR = {("mission/model/grammar.py", SEQUENCE), ("mission/model/grammar.py", 
 
 OTHER_MEANINGS = {
     ("record/diagnosis/text.py", "repeat"),  # label before the command that repeats a run
-    ("view/report/shares.py", "retry"),  # activity: time of attempts that failed
+    ("view/report/activity_times.py", "retry"),  # activity: time of attempts that failed
 }
 """Strings that equal a word and mean something else."""
 

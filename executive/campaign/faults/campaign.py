@@ -83,8 +83,8 @@ class Campaign:
         complete = True
         while complete and (untried := self._list_untried(trials)):
             done, complete = self._try_all(untried, len(trials))
-            trials |= {trial.numbers: trial for trial in done}
-        ordered = sorted(trials.values(), key=lambda trial: (trial.numbers[-1], trial.numbers))
+            trials |= {trial.fault_numbers: trial for trial in done}
+        ordered = sorted(trials.values(), key=lambda trial: (trial.fault_numbers[-1], trial.fault_numbers))
         return self._figures(ordered, complete, pairs=False)
 
     def try_pairs(self, count: int) -> FaultFigures:
@@ -128,10 +128,10 @@ class Campaign:
     def _find_triggers(self, trials: Iterable[Trial]) -> dict[str, Numbers]:
         """Return for each node that ran the smallest set of faults before it, and of equal ones the first."""
         triggers: dict[str, Numbers] = {}
-        for trial in sorted(trials, key=lambda trial: (len(trial.numbers), trial.numbers)):
-            if not self.faults[trial.numbers[-1] - 1].ends_run:
-                for path in trial.entered:
-                    triggers.setdefault(path, trial.numbers)
+        for trial in sorted(trials, key=lambda trial: (len(trial.fault_numbers), trial.fault_numbers)):
+            if not self.faults[trial.fault_numbers[-1] - 1].ends_run:
+                for path in trial.entered_paths:
+                    triggers.setdefault(path, trial.fault_numbers)
         return triggers
 
     def _try_all(self, combinations: Sequence[Numbers], offset: int) -> tuple[list[Trial], bool]:
@@ -146,7 +146,7 @@ class Campaign:
         trials = run_jobs(
             jobs, work, _fail_job, workers=self._workers, progress=report, halting=self._halting
         )
-        done = [trial for trial in trials if trial is not None and not trial.cut]
+        done = [trial for trial in trials if trial is not None and not trial.is_halted_by_user]
         return done, len(done) == len(combinations)
 
 
@@ -161,7 +161,7 @@ def find_branches(tree: Node, trials: Iterable[Trial]) -> tuple[Branch, ...]:
 
     A branch of a subtree that is used twice has two nodes.
     """
-    entered = [trial.entered for trial in trials]
+    entered = [trial.entered_paths for trial in trials]
     found: dict[tuple[str, int, int, str], list[str]] = {}
     for mark, what, node in _walk_branches(tree):
         found.setdefault((mark.source.path, mark.line, mark.col, what), []).append(_find_path(node))

@@ -20,13 +20,13 @@ from executive.testing.faults.script import ScheduledFault, after, between, duri
 SHORT, LONG = 0.5, 5.0
 """Durations of detector faults [s]; the longer one is the deadline of requests."""
 QUARTER_SHARES: tuple[tuple[When, float], ...] = (("first", 0.25), ("middle", 0.5), ("late", 0.75))
-"""Shares of a run without a fault, or of a motion, at which faults of objects occur."""
+"""Fractions of a run without a fault, or of a motion, at which faults of objects occur."""
 LASTING = tuple(range(1, 21))
 """Numbers of the activations with a lasting fault that no real cause would repeat for ever."""
 TRANSPORT_SHARES: tuple[tuple[When, float], ...] = (
     ("first", 0.1), ("first", 0.3), ("middle", 0.5), ("late", 0.7), ("late", 0.9),
 )  # fmt: skip
-"""Shares of a transport at which the seal breaks."""
+"""Fractions of a transport at which the seal breaks."""
 
 
 @dataclass(frozen=True)

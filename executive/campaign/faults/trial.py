@@ -29,7 +29,7 @@ from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults import FaultyCell, with_faults
 from executive.view.figures.fault import Trial
-from executive.view.report.page import leave_report
+from executive.view.report.page import try_write_report
 
 Numbered = Mapping[int, PlannedFault]
 """Faults by their numbers; the last fault is the tested one."""
@@ -55,7 +55,7 @@ def record_trial(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs:
         directory = make_run_directory(trial_run.run, loaded, trial_run.options, runs)
         recording = Recording(trial_run.run, loaded, subject.skills, directory, Recorder(directory), ())
         result = recording.execute(subject.seed, start)
-        leave_report(result.run)
+        try_write_report(result.run)
         return trial_run.judge(trial_run.outcome), directory.path
 
 
@@ -114,7 +114,7 @@ class _TrialRun:
             empty_trial(self._faults),
             happened=all(map(self._has_happened, faults)),
             raised=self._has_raised(faults[-1]),
-            cut=outcome.status == "HALTED" and not self._stopped,
+            is_halted_by_user=outcome.status == "HALTED" and not self._stopped,
             status=outcome.status,
             reason=outcome.reason,
             message=outcome.message,
@@ -123,7 +123,7 @@ class _TrialRun:
             items=items,
             audit=audit,
             robot_time=outcome.robot_time,
-            entered=frozenset(self._activations.counts),
+            entered_paths=frozenset(self._activations.counts),
             problems=tuple(problems),
             remark=judgement.describe_other_reason(outcome, faults),
         )

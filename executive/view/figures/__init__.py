@@ -1,1 +1,1 @@
-"""Results of measurements, as text and as plain data."""
+"""Results of measurements, as text and as JSON values."""

@@ -1,4 +1,4 @@
-"""Results of the conformance checks of skills, as one line per check."""
+"""Results of the conformance checks of skills, as text with one line per check."""
 
 from __future__ import annotations
 
@@ -8,22 +8,21 @@ from collections.abc import Iterator, Sequence
 from executive.testing.conformance.check import Verdict
 
 
-def conformance_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
-    """Yield a line per check: its status, its skill, and the first problem."""
+def format_verdicts(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    """Yield a line per check: its status, the skill, the name of the check, and the first problem."""
     for verdict in verdicts:
         line = f"{verdict.status:7}  {verdict.skill}.{verdict.check}"
-        # The reason why the skill could not be run is stated once.
+        # The cause for which a check was not run is not repeated on its line.
         if verdict.status == "failed":
-            more = len(verdict.problems) - 1
-            line += f": {verdict.problems[0]}" + (f" (and {more} more)" if more else "")
+            other_count = len(verdict.problems) - 1
+            line += f": {verdict.problems[0]}" + (f" (and {other_count} more)" if other_count else "")
         yield line
 
 
-def conformance_total(verdicts: Sequence[Verdict]) -> str:
-    """Return the number of checks by status as text."""
+def format_verdict_counts(verdicts: Sequence[Verdict]) -> str:
+    """Return a text with the number of checks by status."""
     counts = Counter(verdict.status for verdict in verdicts)
-    skills = len({verdict.skill for verdict in verdicts})
-    counted = ", ".join(
-        f"{counts[status]} {status}" for status in ("ok", "failed", "not run") if counts[status]
-    )
-    return f"{len(verdicts)} checks of {skills} skill{'s' if skills != 1 else ''}: {counted}"
+    skill_count = len({verdict.skill for verdict in verdicts})
+    statuses = (status for status in ("ok", "failed", "not run") if counts[status])
+    counts_text = ", ".join(f"{counts[status]} {status}" for status in statuses)
+    return f"{len(verdicts)} checks of {skill_count} skill{'s' if skill_count != 1 else ''}: {counts_text}"

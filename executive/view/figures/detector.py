@@ -1,4 +1,4 @@
-"""Tables with the measured accuracy of a detector."""
+"""Text and tables with the measured accuracy of a detector."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from rich.table import Table
 from executive.training.evaluation.figures import NOTHING, Evaluation
 
 
-def print_figures(source: str, detector: str, evaluation: Evaluation) -> None:
-    """Print the accuracy of a detector, measured on the images of `source`, to stderr."""
+def print_metrics(source: str, detector: str, evaluation: Evaluation) -> None:
+    """Print the accuracy of the detector with the name `detector`, measured on `source`, to stderr."""
     console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
     console.print(f"{source}, detector {detector}")
     for part in _list_parts(detector, evaluation):
@@ -22,8 +22,8 @@ def print_figures(source: str, detector: str, evaluation: Evaluation) -> None:
 def _list_parts(detector: str, evaluation: Evaluation) -> Iterator[RenderableType]:
     yield f"  {evaluation.objects} objects on {evaluation.images} images, threshold {evaluation.threshold:g}"
     if evaluation.unavailable:
-        share = evaluation.unavailable / evaluation.images
-        count = f"{evaluation.unavailable} of {evaluation.images} images ({share:.1%})"
+        fraction = evaluation.unavailable / evaluation.images
+        count = f"{evaluation.unavailable} of {evaluation.images} images ({fraction:.1%})"
         yield f"  unavailable for {count}, last reason: {evaluation.why}"
     if not evaluation.answered_by:
         return
@@ -40,35 +40,35 @@ def _list_parts(detector: str, evaluation: Evaluation) -> Iterator[RenderableTyp
         yield _make_confusion_table(evaluation)
     yield _make_error_table(evaluation)
     if evaluation.reliability is not None:
-        yield "  error rates for the ledger (of shares and counts the upper 95 % bound):"
+        yield "  error rates for the ledger (fractions and counts: upper 95 % confidence bound):"
         yield "  " + ", ".join(f"{name} {value:g}" for name, value in evaluation.reliability.rates)
         yield ""
 
 
 def _make_class_table(evaluation: Evaluation) -> Table:
-    """Return precision and recall of every class."""
+    """Return a table with the precision and recall of every class."""
     table = _make_table("class", "objects", "precision", "recall")
-    for label, figures in evaluation.by_class.items():
-        table.add_row(label, f"{figures.objects}", f"{figures.precision:.2%}", f"{figures.recall:.2%}")
+    for label, metrics in evaluation.by_class.items():
+        table.add_row(label, f"{metrics.objects}", f"{metrics.precision:.2%}", f"{metrics.recall:.2%}")
     return table
 
 
 def _make_confusion_table(evaluation: Evaluation) -> Table:
-    """Return the number of objects by true and detected class."""
-    table = _make_table("taken for", *next(iter(evaluation.confusion.values())))
+    """Return a table with the number of objects by true class (rows) and detected class (columns)."""
+    table = _make_table("true \\ detected", *next(iter(evaluation.confusion.values())))
     for label, row in evaluation.confusion.items():
-        table.add_row(label, *("" if label == found == NOTHING else f"{row[found]}" for found in row))
+        table.add_row(label, *("" if label == other == NOTHING else f"{row[other]}" for other in row))
     return table
 
 
 def _make_error_table(evaluation: Evaluation) -> Table:
-    """Return median and percentiles of position errors and latency."""
+    """Return a table with the median, percentiles and maximum of the position errors and the latency."""
     table = _make_table("", "median", "95 %", "99 %", "worst")
     for quantity, distribution in (
-        ("centre of the box off by [px]", evaluation.centre),
-        ("that at the object's height [mm]", evaluation.position),
-        ("localized off by [mm]", evaluation.localized),
-        ("frame to detections [ms]", evaluation.latency),
+        ("box centre error [px]", evaluation.centre),
+        ("box centre error at the object's height [mm]", evaluation.position),
+        ("localization error [mm]", evaluation.localized),
+        ("time from frame to detections [ms]", evaluation.latency),
     ):
         if distribution is not None:
             values = (distribution.median, distribution.p95, distribution.p99, distribution.worst)
@@ -77,7 +77,7 @@ def _make_error_table(evaluation: Evaluation) -> Table:
 
 
 def _make_table(first: str, *headings: str) -> Table:
-    """Return an empty table with a left-aligned first column and right-aligned others."""
+    """Return an empty table whose first column is aligned left, and the others right."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 1))
     table.add_column(first)
     for heading in headings:

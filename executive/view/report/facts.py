@@ -1,4 +1,4 @@
-"""Facts about a run for its report, read from the run directory."""
+"""Facts about a run for its report, read from its run directory."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from executive.record.recorded_mission import read_tree
 from executive.record.result import FINAL_STATUSES, list_requests, read_result
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
+from executive.view.report.activity_times import compute_activity_times
 from executive.view.report.pictures import collect_pictures
-from executive.view.report.shares import compute_shares
-from executive.view.terminal.summary import repeat_command
+from executive.view.terminal.summary import format_repeat_command
 
 CUT_OFF = "CUT OFF"
-"""Status of a run whose record has no end: the run was killed, or is still running."""
+"""Status of a run whose journal has no end: the run was killed, or is still running."""
 
 
 class ReportFacts:
-    """Facts about a run.
+    """Facts about a run for its report.
 
     Args:
         path: The run directory.
 
     Attributes:
         path: The run directory.
-        start: Start of the run.
-        result: Content of `result.json`, or None if it does not belong to the journal.
-        end: The result, else the end in the journal, else None.
+        start: Event of the start of the run.
+        result: Content of `result.json`; None if the file is missing or belongs to another run.
+        end: The result; without it, the event of the end of the run; None if neither exists.
         status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `CUT OFF`.
-        nodes: The tree.
+        nodes: Nodes of the tree.
         timeline: Timeline of the run.
-        objects: Last change of each item, without phantoms.
-        shares: Time by object and activity.
+        objects: Last change of each item that is not a phantom.
+        activity_times: Time of the run by object and activity.
         pictures: Pictures of decisions and failures.
-        requests: Requests of the operator.
-        repeat: The command that repeats the run.
-        resume: The command that resumes the run, or "" if the run cannot be resumed.
-        replay: The command that replays the run.
+        requests: Requests of the operator, in order.
+        repeat_command: Command that repeats the run.
+        resume_command: Command that resumes the run, or "" if the run cannot be resumed.
+        replay_command: Command that replays the run.
 
     Raises:
         InputError: The directory lacks the journal or the tree, or the run never started.
@@ -58,12 +58,12 @@ class ReportFacts:
         self.timeline = Timeline.of(events)
         items = self.timeline.items.now()
         self.objects = [item for item in items if item.state != "phantom"]
-        self.shares = compute_shares(self.timeline, self.nodes)
+        self.activity_times = compute_activity_times(self.timeline, self.nodes)
         self.pictures = collect_pictures(directory.pictures, [item.item for item in items])
         self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
         mission = file.stem if file.parent == shipped_folder() else str(file)
-        origin = mission, self.start.seed, self.start.overrides
-        self.repeat = repeat_command(*origin, self.requests, directory.scene)
-        self.resume = "" if self.status in FINAL_STATUSES else resume_command(str(path))
-        self.replay = shlex.join(["executive", "replay", str(path)])
+        options = mission, self.start.seed, self.start.overrides
+        self.repeat_command = format_repeat_command(*options, self.requests, directory.scene)
+        self.resume_command = "" if self.status in FINAL_STATUSES else resume_command(str(path))
+        self.replay_command = shlex.join(["executive", "replay", str(path)])

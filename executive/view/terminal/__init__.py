@@ -1,1 +1,1 @@
-"""Views of a run on a terminal: live screen, plain lines, keys, and summary."""
+"""Views of a run on a terminal: live screen, plain lines, key commands, and summary."""

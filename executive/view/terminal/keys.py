@@ -1,4 +1,4 @@
-"""Keys that control a run from its terminal: pause, continue, one step."""
+"""Keys that control a run from its terminal: pause, continue, and one step."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ from typing import Any
 from executive.run.run_control import RunControl
 
 POLL_PERIOD = 0.1
-"""Longest time until the reading thread notices its end [s]."""
-PAUSE, STEP = "p ", "s"
+"""Maximum time until the reading thread notices that it must end [s]."""
+PAUSE_KEYS, STEP_KEY = "p ", "s"
+"""Keys that pause or continue a run, and key that runs one control step."""
 HELP = "p pause, s step, Ctrl-C stop"
-HELP_PAUSED = "paused: p go on, s step, Ctrl-C stop"
+"""Text about the keys while the run is not paused."""
+HELP_PAUSED = "paused: p continue, s step, Ctrl-C stop"
+"""Text about the keys while the run is paused."""
 
 
-class Keys:
-    """Reads single keys in a thread; Ctrl-C stays a signal.
+class KeyReader:
+    """Reads single keys of a terminal in a thread, and controls a run; Ctrl-C still sends a signal.
 
     Args:
         file: File descriptor of the terminal.
@@ -30,31 +33,31 @@ class Keys:
         self._file = file
         self._control = control
         self._saved_attributes: list[Any] | None = None
-        self._stopped = threading.Event()
+        self._must_stop = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def listen(self) -> None:
-        """Begin to read keys; do nothing if keys are already read."""
+    def start(self) -> None:
+        """Start to read keys, if the thread does not run yet."""
         if self._thread is not None:
             return
         self._saved_attributes = termios.tcgetattr(self._file)
         tty.setcbreak(self._file)
-        self._stopped.clear()
+        self._must_stop.clear()
         self._thread = threading.Thread(target=self._read, name="keys", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop reading keys, and restore the line mode of the terminal."""
+        """Stop the thread, and restore the line mode of the terminal."""
         if self._thread is None:
             return
-        self._stopped.set()
+        self._must_stop.set()
         self._thread.join()
         self._thread = None
         assert self._saved_attributes is not None
         termios.tcsetattr(self._file, termios.TCSADRAIN, self._saved_attributes)
 
     def _read(self) -> None:
-        while not self._stopped.is_set():
+        while not self._must_stop.is_set():
             if select.select([self._file], [], [], POLL_PERIOD)[0]:
                 try:
                     key = os.read(self._file, 1).decode("ascii", "ignore")
@@ -62,10 +65,10 @@ class Keys:
                     return
                 if not key:
                     return
-                self._apply(key)
+                self._handle_key(key)
 
-    def _apply(self, key: str) -> None:
-        if key in PAUSE:
+    def _handle_key(self, key: str) -> None:
+        if key in PAUSE_KEYS:
             (self._control.resume if self._control.is_paused else self._control.pause)()
-        elif key in STEP:
+        elif key == STEP_KEY:
             self._control.step()

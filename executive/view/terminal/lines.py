@@ -1,4 +1,4 @@
-"""Plain lines about a run, for logs and pipes."""
+"""View of a run as plain lines of text, for logs and pipes."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from executive.view.tree.outline import find_skill_names
 if TYPE_CHECKING:
     from executive.run.run import Run
 
-ENDS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
-"""Words for the status of a node that has ended."""
+STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
+"""Texts for the status of a node that has ended."""
 
 
-class Lines:
-    """Writes a line when a skill starts or ends, a control node decides, or an item's state changes.
+class LineView:
+    """Writes a line when a skill starts or ends, a control node decides, or the state of an item changes.
 
-    Starts and ends of control nodes follow from those of their skills.
+    Starts and ends of control nodes are not written, because they follow from the lines of their skills.
 
     Attributes:
         timeline: Timeline of the run.
@@ -27,15 +27,15 @@ class Lines:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._names: dict[str, str] = {}
-        self._skills: dict[str, str] = {}
+        self._names_by_path: dict[str, str] = {}
+        self._skill_names_by_path: dict[str, str] = {}
         self.timeline = Timeline(history=False)
 
     def open(self, run: Run) -> None:
-        """Read the names of the nodes."""
+        """Store the names of the nodes of a run."""
         nodes = outline(run.root)
-        self._names = {node.path: node.name for node in nodes}
-        self._skills = find_skill_names(nodes)
+        self._names_by_path = {node.path: node.name for node in nodes}
+        self._skill_names_by_path = find_skill_names(nodes)
 
     def __call__(self, timed: events.TimedEvent) -> None:
         """Write the line of an event, if it has one."""
@@ -48,7 +48,7 @@ class Lines:
         """Do nothing: every line is already flushed."""
 
     def note(self, sentence: str) -> None:
-        """Write `sentence` on a line of its own."""
+        """Write a note about the record of the run on a separate line."""
         self._stream.write(f"note: {sentence}\n")
 
     def _describe(self, event: events.Event) -> str:
@@ -62,11 +62,11 @@ class Lines:
             case events.NodeStarted() if event.skill:
                 return f"{self._name_skill(event)} ..."
             case events.NodeEnded() if event.skill:
-                why = "".join(f": {text}" for text in (event.reason, event.message) if text)
-                return f"{self._name_skill(event)} {ENDS[event.status]}{why}"
+                details = "".join(f": {text}" for text in (event.reason, event.message) if text)
+                return f"{self._name_skill(event)} {STATUS_TEXTS[event.status]}{details}"
             case events.BranchChosen():
                 after = f", after {event.reason}" if event.reason else ""
-                return f"{self._names[event.node]}: {event.choice}{after}"
+                return f"{self._names_by_path[event.node]}: {event.choice}{after}"
             case events.RequestGiven():
                 return f"request: {event.wanted}"
             case events.ItemChanged():
@@ -74,16 +74,16 @@ class Lines:
         return ""
 
     def _name_skill(self, event: events.NodeStarted | events.NodeEnded) -> str:
-        return self._skills[event.node] + (f" [{event.item}]" if event.item else "")
+        return self._skill_names_by_path[event.node] + (f" [{event.item}]" if event.item else "")
 
-    def _describe_change(self, now: events.ItemChanged) -> str:
-        """Return the line of a changed item; "" if only its position or its counts changed."""
-        known = self.timeline.items.by_name.get(now.item)
-        if known is not None and _visible_fields(known.now) == _visible_fields(now):
+    def _describe_change(self, change: events.ItemChanged) -> str:
+        """Return the text about a changed item; "" if only its position or its counts changed."""
+        item = self.timeline.items.by_name.get(change.item)
+        if item is not None and _get_described_fields(item.now) == _get_described_fields(change):
             return ""
-        where = f" in {now.bin}" if now.state == "placed" and now.bin else ""
-        return f"{now.item} {now.state}{where}" + (f": {now.why}" if now.why else "")
+        bin_text = f" in {change.bin}" if change.state == "placed" and change.bin else ""
+        return f"{change.item} {change.state}{bin_text}" + (f": {change.why}" if change.why else "")
 
 
-def _visible_fields(item: events.ItemChanged) -> tuple[str, ...]:
-    return item.label, item.state, item.bin, item.why
+def _get_described_fields(change: events.ItemChanged) -> tuple[str, ...]:
+    return change.label, change.state, change.bin, change.why

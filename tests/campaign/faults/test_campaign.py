@@ -68,12 +68,12 @@ def one_after_the_other(
 
 
 def test_every_fault_is_tried_once_in_the_order_of_the_list(figures: FaultFigures, small: Subject) -> None:
-    last = [trial.numbers[-1] for trial in figures.trials]
+    last = [trial.fault_numbers[-1] for trial in figures.trials]
     assert last == sorted(set(last))
     faults = Campaign(small).faults
     left_out = {number for number in range(1, len(faults) + 1) if number not in last}
     # Only what the cell brought about already is not said by the skill, too.
-    raised = {trial.numbers[-1] for trial in figures.trials if trial.raised}
+    raised = {trial.fault_numbers[-1] for trial in figures.trials if trial.raised}
     assert left_out
     assert all(faults[number - 1].replaced in raised for number in left_out)
     assert (figures.complete, figures.listed) == (True, len(faults))
@@ -85,9 +85,9 @@ def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: F
         ("finally", "18"), ("choice 2", "10"), ("catch on Grasp.missed", "15"),
         ("catch on Approach.blocked", "17"),
     ]  # fmt: skip
-    assert figures.unentered == ()
+    assert figures.unentered_branches == ()
     behind = next(trial for trial in figures.trials if trial.name == "RejectTarget")
-    assert (len(behind.numbers), behind.descriptions[0].rpartition("/")[2]) == (
+    assert (len(behind.fault_numbers), behind.descriptions[0].rpartition("/")[2]) == (
         2, "Grasp missed, first: nothing seals",
     )  # fmt: skip
 
@@ -107,7 +107,7 @@ def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_
     two = Campaign(small, workers=2).try_pairs(3)
     monkeypatch.setattr("executive.campaign.faults.campaign.run_jobs", one_after_the_other)
     one, other = Campaign(small).try_pairs(3), Campaign(replace(small, seed=3)).try_pairs(3)
-    assert (one, [len(trial.numbers) for trial in one.trials]) == (two, [2] * 3)
+    assert (one, [len(trial.fault_numbers) for trial in one.trials]) == (two, [2] * 3)
     assert [trial.label for trial in one.trials] != [trial.label for trial in other.trials]
 
 

@@ -82,7 +82,7 @@ def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campai
     assert (alone.verdict, alone.status) == ("-", "SUCCESS")
     both = tried(campaign, number_of(campaign, "Transit", "unreachable"), behind)
     assert (both.verdict, both.raised, both.problems) == ("ok", True, ())
-    assert campaign.faults[behind - 1].affected in both.entered
+    assert campaign.faults[behind - 1].affected in both.entered_paths
     assert both.label.endswith(f"+{behind}")
 
 

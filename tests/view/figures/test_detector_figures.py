@@ -8,7 +8,7 @@ import pytest
 
 from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates
 from executive.training.evaluation.figures import ClassFigures, Evaluation, Spread
-from executive.view.figures.detector import print_figures
+from executive.view.figures.detector import print_metrics
 
 MEASURED = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,
@@ -28,7 +28,7 @@ def printed(capsys):
     """A function that prints figures and returns the lines, their inner space collapsed."""
 
     def lines(evaluation):
-        print_figures("overhead", "eye", evaluation)
+        print_metrics("overhead", "eye", evaluation)
         captured = capsys.readouterr()
         assert captured.out == ""
         return [" ".join(line.split()) for line in captured.err.splitlines()]
@@ -42,8 +42,8 @@ def test_rates_classes_confusions_who_answered_and_the_rates_for_the_ledger_are_
     assert set(lines) >= {
         "900 objects on 300 images, threshold 0.5",
         "precision 99.10%, recall 98.00%, mAP50 0.9950, mAP50-95 0.8000",
-        "cube 900 99.10% 98.00%", "taken for cube nothing", "cube 882 18", "nothing 8",
-        "frame to detections [ms] 15.00 16.00 17.00 18.00",
+        "cube 900 99.10% 98.00%", "true \\ detected cube nothing", "cube 882 18", "nothing 8",
+        "time from frame to detections [ms] 15.00 16.00 17.00 18.00",
         "miss_rate 0.0079, confusion_rate 0.0038, false_detections 0.049, "
         "jitter 0.5, repeated 0.8, bias 0.001",
     }  # fmt: skip

@@ -4,21 +4,30 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from executive.view.figures.fault import Branch, FaultFigures, Trial, as_plain, fault_text, trial_text
+from executive.view.figures.fault import (
+    Branch,
+    FaultFigures,
+    Trial,
+    format_results,
+    format_trial,
+    results_to_json,
+)
 
 MISSED = Trial(
     (1,), ("tree/Grasp missed, first: nothing seals",), "Grasp", "sort.yaml:7", "missed", "first",
     happened=True, status="SUCCESS",
 )  # fmt: skip
-LASTING = replace(MISSED, numbers=(2,), when="lasting", missing=3)
-AGAIN = replace(MISSED, numbers=(3,), missing=0)
+LASTING = replace(MISSED, fault_numbers=(2,), when="lasting", missing=3)
+AGAIN = replace(MISSED, fault_numbers=(3,), missing=0)
 STUCK = replace(
-    MISSED, numbers=(4,), name="Release", place="sort.yaml:9", what="stuck", status="FAILURE",
+    MISSED, fault_numbers=(4,), name="Release", place="sort.yaml:9", what="stuck", status="FAILURE",
     reason="Release.stuck", message="it hangs", node="tree/Release",
 )  # fmt: skip
-NOWHERE = replace(MISSED, numbers=(1, 5), name="Wait", place="sort.yaml:9", what="raises", happened=False)
+NOWHERE = replace(
+    MISSED, fault_numbers=(1, 5), name="Wait", place="sort.yaml:9", what="raises", happened=False
+)
 WRONG = replace(
-    STUCK, numbers=(6,), problems=("the arm is not at rest",), remark="it says Release.stuck",
+    STUCK, fault_numbers=(6,), problems=("the arm is not at rest",), remark="it says Release.stuck",
     name="object", place="", what="taken", when="late", descriptions=("object taken, late: from 8.00 s on",),
 )  # fmt: skip
 BRANCHES = (
@@ -30,8 +39,8 @@ FIGURES = FaultFigures("sort", "fake", 3, 11.5, 6, TRIALS, BRANCHES, True)
 
 
 def test_the_matrix_has_a_row_per_node_and_fault_and_a_column_per_occasion() -> None:
-    assert fault_text(FIGURES).splitlines()[:8] == [
-        "sort (fake), seed 3: 6 runs with faults; undisturbed it takes 11.5 s",
+    assert format_results(FIGURES).splitlines()[:8] == [
+        "sort (fake), seed 3: 6 runs with faults; a run without faults takes 11.5 s",
         "",
         "  node     place        fault   first                  middle  late  lasting",
         "  Grasp    sort.yaml:7  missed  ok 2/2                               ok -3",
@@ -44,7 +53,7 @@ def test_the_matrix_has_a_row_per_node_and_fault_and_a_column_per_occasion() -> 
 
 def test_a_cell_of_several_runs_tells_how_many_were_ok_and_the_worst_of_the_others() -> None:
     def cell(*trials: Trial) -> str:
-        row = fault_text(replace(FIGURES, trials=trials)).splitlines()[3]
+        row = format_results(replace(FIGURES, trials=trials)).splitlines()[3]
         return row.removeprefix("  Grasp  sort.yaml:7  missed  ")
 
     failed = replace(MISSED, status="FAILURE", reason="Grasp.missed")
@@ -55,15 +64,15 @@ def test_a_cell_of_several_runs_tells_how_many_were_ok_and_the_worst_of_the_othe
 
 
 def test_what_went_wrong_and_what_was_never_entered_is_told_with_its_place() -> None:
-    assert fault_text(FIGURES).splitlines()[8:] == [
-        "  as undisturbed: 2; fewer objects sorted: 1; failed: 1; ended as FAULT: 0; "
+    assert format_results(FIGURES).splitlines()[8:] == [
+        "  as without faults: 2; fewer objects sorted: 1; failed: 1; ended as FAULT: 0; "
         "fault did not occur: 1; wrong: 1",
         "  failures: Release.stuck 1",
         "  runs with a problem: 1",
         "    fault 6: object taken, late: from 8.00 s on",
         "      FAILURE Release.stuck at tree/Release: it hangs",
         "      wrong: the arm is not at rest",
-        "  failed for another reason than the injected one:",
+        "  failed with another reason than the injected fault should cause:",
         "    it says Release.stuck: fault 6",
         "  branches after a failure: 1 of 2 entered",
         "    never entered: sort.yaml:14: recover",
@@ -72,18 +81,18 @@ def test_what_went_wrong_and_what_was_never_entered_is_told_with_its_place() -> 
 
 def test_pairs_have_no_matrix_a_campaign_cut_short_says_so_and_one_run_is_a_few_lines() -> None:
     lines = ["fault 1+5: tree/Grasp missed, first: nothing seals", "  the fault did not occur", "  SUCCESS"]
-    assert trial_text(NOWHERE).splitlines() == lines
-    lines = fault_text(replace(FIGURES, pairs=True, complete=False, trials=(NOWHERE,))).splitlines()
+    assert format_trial(NOWHERE).splitlines() == lines
+    lines = format_results(replace(FIGURES, pairs=True, complete=False, trials=(NOWHERE,))).splitlines()
     assert lines[:3] == [
-        "sort (fake), seed 3: 1 runs with pairs of faults; undisturbed it takes 11.5 s",
+        "sort (fake), seed 3: 1 runs with pairs of faults; a run without faults takes 11.5 s",
         "  ended by the user before the last run",
-        "  as undisturbed: 0; fewer objects sorted: 0; failed: 0; ended as FAULT: 0; "
+        "  as without faults: 0; fewer objects sorted: 0; failed: 0; ended as FAULT: 0; "
         "fault did not occur: 1; wrong: 0",
     ]
 
 
 def test_as_plain_values_nothing_is_left_out() -> None:
-    plain = as_plain(FIGURES)
+    plain = results_to_json(FIGURES)
     assert (plain["runs"], plain["failed"], plain["listed"], plain["complete"]) == (6, 1, 6, True)
     assert [trial["verdict"] for trial in plain["trials"]] == [
         "ok", "ok -3", "ok", "FAILURE Release.stuck", "-", "!!",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html.parser import HTMLParser
 
-SECTIONS = ("story", "again", "objects", "timeline", "tree", "made-with")
+SECTIONS = ("story", "commands", "objects", "timeline", "tree", "inputs")
 EMPTY = {"meta", "link", "img"}
 
 

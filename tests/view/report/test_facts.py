@@ -36,7 +36,7 @@ def test_a_run_that_ended_is_told_by_its_result(failed):
     facts = ReportFacts(failed)
     assert to_json(facts.result) == json.loads((failed / "result.json").read_text())
     assert (facts.status, facts.timeline.clock) == ("FAILURE", facts.result.robot_time_s)
-    assert facts.resume == ""
+    assert facts.resume_command == ""
     assert {each.item for each in facts.pictures if not each.reason} == {"sphere-1"}
     assert {one.node for one in facts.timeline.activations} <= {node.path for node in facts.nodes}
 
@@ -47,11 +47,13 @@ def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
     assert ReportFacts(run).status == CUT_OFF
     resume_run(run, discover(), RunOptions(3, kind=FakeCell), RecordOptions(saves_pictures=False))
     facts = ReportFacts(run)
-    assert (facts.status, facts.resume) == ("SUCCESS", "")
+    assert (facts.status, facts.resume_command) == ("SUCCESS", "")
     transits = [one for one in facts.timeline.activations if one.node.endswith("/Transit")]
     assert [one.status for one in transits] == ["INVALID", "SUCCESS"]
     assert transits[0].end <= transits[1].start
-    assert sum(sum(row.values()) for row in facts.shares.rows.values()) == pytest.approx(facts.timeline.clock)
+    assert sum(sum(row.values()) for row in facts.activity_times.times_by_item.values()) == pytest.approx(
+        facts.timeline.clock
+    )
 
 
 def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, copy):
@@ -62,7 +64,7 @@ def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, 
     append(run, 400, run_ended("HALTED", reason="halted", message="halted by the user", ticks=400))
     facts = ReportFacts(run)
     assert (facts.status, facts.end.message) == ("HALTED", "halted by the user")
-    assert facts.resume == shlex.join(["executive", "run", "--resume", str(run)])
+    assert facts.resume_command == shlex.join(["executive", "run", "--resume", str(run)])
 
 
 def test_a_run_whose_end_the_disk_did_not_take_is_told_by_its_result(failed, copy):
@@ -92,8 +94,8 @@ def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(d
     append(run, 420, RequestGiven("apple"))
     append(run, 432, FaultInjected("object removed", "", "", "", []))
     facts = ReportFacts(run)
-    assert facts.repeat == "executive run sort_fruit --seed 3 --request apple"
-    assert facts.replay == shlex.join(["executive", "replay", str(run)])
+    assert facts.repeat_command == "executive run sort_fruit --seed 3 --request apple"
+    assert facts.replay_command == shlex.join(["executive", "replay", str(run)])
     assert (facts.requests, facts.timeline.faults) == (["apple"], [(1.8, "object removed")])
 
 

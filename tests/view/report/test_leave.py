@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from executive.view.report.page import leave_report
+from executive.view.report.page import try_write_report
 
 
 def test_a_run_that_ended_leaves_its_report(done, copy):
     run = copy(done)
-    assert leave_report(str(run)) == (str(run / "report.html"), "")
+    assert try_write_report(str(run)) == (str(run / "report.html"), "")
     assert (run / "report.html").read_text().startswith("<!doctype html>")
 
 
@@ -29,7 +29,7 @@ def test_why_there_is_none_is_told(done, copy, file: str, content: str | None, s
         (run / file).mkdir()
     else:
         (run / file).write_text(content)
-    left, problem = leave_report(str(run))
+    left, problem = try_write_report(str(run))
     assert left == ""
     assert problem.startswith("no report was written: " + sentence.format(run=run))
     assert not (run / "report.html").is_file()
@@ -38,6 +38,6 @@ def test_why_there_is_none_is_told(done, copy, file: str, content: str | None, s
 @pytest.mark.parametrize("run", ["", "/nowhere"])
 def test_a_result_that_leads_nowhere_raises_nothing(run: str, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    file, problem = leave_report(run)
+    file, problem = try_write_report(run)
     assert file == ""
     assert problem.startswith("no report was written: ")

@@ -89,31 +89,31 @@ def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed, co
     for run in (failed, done, killed, braked):
         facts = ReportFacts(run)
         rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", render_report(facts))
-        assert len(rows) == len(facts.shares.rows)
+        assert len(rows) == len(facts.activity_times.times_by_item)
         assert sum(map(float, rows)) == pytest.approx(facts.timeline.clock, abs=0.01 * len(rows))
 
 
 def test_params_versions_and_the_commands_that_repeat_it_are_there(failed):
     found = page(failed)
-    made, again = found.texts["made-with"], found.texts["again"]
+    made, commands = found.texts["inputs"], found.texts["commands"]
     assert "attempts: 2 note: größer" in made
     assert "cell.table.objects=[2, 2]" in made
     assert "python 3." in made
     start = find_start(read_journal(failed / "journal.jsonl"), failed, "")
     repeat = ["executive", "run", start.file, "--seed", "3"]
     repeat += ["--set", "cell.kind=fake", "--set", "cell.table.objects=[2, 2]"]
-    assert f"repeat {shlex.join(repeat)} replay" in again
-    assert f"executive replay {shlex.quote(str(failed))}" in again
-    assert "resume" not in again
+    assert f"repeat {shlex.join(repeat)} replay" in commands
+    assert f"executive replay {shlex.quote(str(failed))}" in commands
+    assert "resume" not in commands
 
 
 def test_a_run_that_was_killed_is_told_as_far_as_it_came_with_the_command_that_goes_on(killed):
     assert not (killed / "result.json").exists()
     found = page(killed)
     assert found.texts["header"].startswith(
-        "CUT OFF The record has no end: the run was killed, or is still running."
+        "CUT OFF The journal has no end: the run was killed, or is still running."
     )
-    assert f"resume executive run --resume {shlex.quote(str(killed))}" in found.texts["again"]
+    assert f"resume executive run --resume {shlex.quote(str(killed))}" in found.texts["commands"]
     assert "Transit Transit of sphere-1: RUNNING" in found.texts["timeline"]
     assert "sphere-1 held" in found.texts["objects"]
     assert "1 under way" in found.texts["tree"]
@@ -126,7 +126,7 @@ def test_a_run_whose_result_is_gone_has_the_verdict_of_its_journal(failed, done,
     change(
         run / "journal.jsonl", lambda entry: entry | ({"message": ""} if entry["kind"] == "RunEnded" else {})
     )
-    assert "The run ended, but there is no result.json of it." in page(run).texts["header"]
+    assert "The run ended, but its result.json is missing." in page(run).texts["header"]
 
 
 def test_the_time_and_the_pictures_of_what_was_no_object_are_shown_all_the_same(failed, copy):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import pytest
 
 from executive.run.run_control import RunControl
-from executive.view.terminal.keys import Keys
+from executive.view.terminal.keys import KeyReader
 
 PATIENCE = 10.0
 
@@ -26,7 +26,7 @@ class Keyboard:
     master: int
     file: int
     control: RunControl
-    keys: Keys
+    keys: KeyReader
 
     def press(self, text: str, paused: bool) -> None:
         """Press keys, and wait until the run is paused or goes on."""
@@ -45,8 +45,8 @@ class Keyboard:
 def keyboard() -> Iterator[Keyboard]:
     master, file = pty.openpty()
     control = RunControl()
-    keys = Keys(file, control)
-    keys.listen()
+    keys = KeyReader(file, control)
+    keys.start()
     yield Keyboard(master, file, control, keys)
     keys.stop()
     os.close(master)
@@ -74,5 +74,5 @@ def test_the_keyboard_is_given_back_as_it_was(keyboard: Keyboard) -> None:
     keyboard.keys.stop()
     assert keyboard.reads_lines
     keyboard.keys.stop()
-    keyboard.keys.listen()
+    keyboard.keys.start()
     keyboard.press("p", True)

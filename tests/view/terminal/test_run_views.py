@@ -17,9 +17,9 @@ from executive.events import BranchChosen, NodeEnded, NodeStarted, TimedEvent
 from executive.mission.outline import outline
 from executive.record.result import Result
 from executive.run.run_control import RunControl
-from executive.view.terminal.lines import Lines
-from executive.view.terminal.screen import Terminal
-from executive.view.terminal.summary import repeat_command, summary
+from executive.view.terminal.lines import LineView
+from executive.view.terminal.screen import TerminalView
+from executive.view.terminal.summary import format_repeat_command, format_summary
 from executive.view.tree.outline import find_skill_names, select_running
 
 GRASP = "tree/sort/repeat/Grasp"
@@ -83,14 +83,14 @@ AGAIN = BranchChosen("tree/sort/repeat", "attempt 2 of 3", "Grasp.missed")
 )  # fmt: skip
 def test_there_is_a_line_for_all_that_is_news(events, shown):
     stream = io.StringIO()
-    view = Lines(stream)
+    view = LineView(stream)
     view.open(RUN)
     for event in events:
         view(event)
     assert stream.getvalue().splitlines() == shown
 
 
-def page(view: Terminal) -> str:
+def page(view: TerminalView) -> str:
     """Return what a screen shows."""
     console = Console(file=io.StringIO(), width=100)
     console.print(view.render())
@@ -98,7 +98,7 @@ def page(view: Terminal) -> str:
 
 
 def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
-    view = Terminal(Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None))
+    view = TerminalView(Console(file=io.StringIO(), force_terminal=True, width=100, color_system=None))
     view.open(RUN)
     for event in (
         at(0, run_started(mission="sort", seed=7)), started("tree/sort"), started("tree/sort/repeat"),
@@ -114,9 +114,9 @@ def test_the_live_view_shows_the_running_path_the_items_and_the_clock():
 
 def test_the_live_view_redraws_ten_times_a_second(monkeypatch):
     renders = []
-    render = Terminal.render
-    monkeypatch.setattr(Terminal, "render", lambda self: renders.append(self) or render(self))
-    view = Terminal(Console(file=io.StringIO(), force_terminal=True, width=100))
+    render = TerminalView.render
+    monkeypatch.setattr(TerminalView, "render", lambda self: renders.append(self) or render(self))
+    view = TerminalView(Console(file=io.StringIO(), force_terminal=True, width=100))
     view.open(RUN)
     for tick in range(300):
         view(at(tick, skill_started("tree/sort/repeat/Detect")))
@@ -136,7 +136,7 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
         item_changed("cube-1", "placed", bin="red_bin"), item_changed("cube-2", "placed", bin="red_bin"),
         item_changed("duck-1", "rejected", position=[0.5, 0.1, 0.0], why="three misses"),
     ]  # fmt: skip
-    repeat = repeat_command("my mission.yaml", 7, {"attempts": "a b"}, ["cube"])
+    repeat = format_repeat_command("my mission.yaml", 7, {"attempts": "a b"}, ["cube"])
     lines = [
         "FAILURE Transit.dropped at sort/0/3: lost at 1.2 m/s",
         "34.2 s on the robot's clock, 6.8 s by the wall clock",
@@ -144,18 +144,18 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
         "  red_bin: cube-1, cube-2",
         "  rejected: duck-1 (x 0.50 m, y 0.10 m: three misses)",
     ]
-    assert summary(RESULT, items, repeat).splitlines() == lines
+    assert format_summary(RESULT, items, repeat).splitlines() == lines
     result = replace(RESULT, status="SUCCESS", reason="", node="", message="")
-    shown = summary(result, [], repeat, "runs/x/report.html").splitlines()
+    shown = format_summary(result, [], repeat, "runs/x/report.html").splitlines()
     assert shown == ["SUCCESS", *lines[1:3], "report: runs/x/report.html"]
 
 
 def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypatch):
-    keys = SimpleNamespace(listen=lambda: None, stop=lambda: None)
-    monkeypatch.setattr("executive.view.terminal.screen.Keys", lambda file, control: keys)
-    view, control = Terminal(Console(file=io.StringIO(), force_terminal=True), keyboard=0), RunControl()
+    keys = SimpleNamespace(start=lambda: None, stop=lambda: None)
+    monkeypatch.setattr("executive.view.terminal.screen.KeyReader", lambda file, control: keys)
+    view, control = TerminalView(Console(file=io.StringIO(), force_terminal=True), keyboard=0), RunControl()
     view.open(SimpleNamespace(root=TREE, control=control))
-    for words in ("p pause, s step, Ctrl-C stop", "paused: p go on, s step, Ctrl-C stop"):
+    for words in ("p pause, s step, Ctrl-C stop", "paused: p continue, s step, Ctrl-C stop"):
         assert page(view).splitlines()[0].rstrip() == f"  0.0 s   {words}"
         control.pause()
     view.close()

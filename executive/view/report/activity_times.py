@@ -1,4 +1,4 @@
-"""Time of a run by object: every instant belongs to one object and one activity."""
+"""Time of a run by object and activity: every instant belongs to one object and one activity."""
 
 from __future__ import annotations
 
@@ -13,37 +13,38 @@ from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 
 LOOK, RETRY, WAITING = "look", "retry", "waiting"
-"""Activities besides the skills: search for the next object; failed attempts and the preparation of the next
+"""Activities that are not skills: search for the next object; failed attempts with the looks before the next
 attempt; all other time."""
 
 Interval = tuple[float, float, list[Activation]]
-"""Start and end of an interval [s], and its running skills in the order of their start."""
+"""Start and end of an interval [s], and the skills that run in it, in the order of their starts."""
 
 NO_OBJECT = ""
-"""Row of the time that led to no object, such as the last look at an empty table."""
+"""Name under which time is counted that belongs to no object, such as the last look at an empty table."""
 
 
 @dataclass(frozen=True)
-class Shares:
+class ActivityTimes:
     """Time of a run by object and activity [s].
 
     Attributes:
-        activities: Activities that took time, in the order of a pick.
-        rows: Time by object, then by activity; `NO_OBJECT` is last. The sum is the duration of the run.
+        activities: Activities that took time: look, skills in the order of their first use, retry, waiting.
+        times_by_item: Time by object, then by activity; `NO_OBJECT` is last. The sum of all times is the
+            duration of the run.
     """
 
     activities: tuple[str, ...]
-    rows: Mapping[str, Mapping[str, float]]
+    times_by_item: Mapping[str, Mapping[str, float]]
 
 
-def compute_shares(timeline: Timeline, nodes: Sequence[OutlineNode]) -> Shares:
-    """Return the shares of the time from the start of a run to the last event of its timeline.
+def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> ActivityTimes:
+    """Return the time by object and activity, from the start of a run to the last event of its timeline.
 
-    Time of concurrent skills belongs to the skill that started first among those with an object.
+    Time of concurrent skills belongs to the skill with an object that started first.
 
     Args:
         timeline: Timeline of the run, with its history.
-        nodes: The tree.
+        nodes: Nodes of the tree.
     """
     skills = {node.path: node for node in nodes if node.kind == "skill"}
     activations = [activation for activation in timeline.activations if activation.node in skills]
@@ -57,40 +58,41 @@ def compute_shares(timeline: Timeline, nodes: Sequence[OutlineNode]) -> Shares:
             item, activity = main.item, skills[main.node].skill.lower()
         else:
             item, activity = _find_next_item(decisions, end), _classify_pause(running, skills)
-        first, last = retries.get(item, (0.0, 0.0))
-        if first <= start and end <= last:
+        retry_start, retry_end = retries.get(item, (0.0, 0.0))
+        if retry_start <= start and end <= retry_end:
             activity = RETRY
         elif main is not None:
             skill_activities[activity] = None
         times[item][activity] += end - start
-    # A skill may have the name of another activity.
+    # A skill may have the name of another activity; `dict.fromkeys` removes duplicates.
     names = dict.fromkeys([LOOK, *skill_activities, RETRY, WAITING])
-    used = {activity for row in times.values() for activity in row}
-    order = sorted(times, key=lambda item: item == NO_OBJECT)
-    return Shares(tuple(name for name in names if name in used), {item: dict(times[item]) for item in order})
+    used_names = {activity for row in times.values() for activity in row}
+    items = sorted(times, key=lambda item: item == NO_OBJECT)
+    activities = tuple(name for name in names if name in used_names)
+    return ActivityTimes(activities, {item: dict(times[item]) for item in items})
 
 
-def _split_time(activations: Sequence[Activation], end: float) -> Iterator[Interval]:
-    """Yield the intervals between successive starts and ends of skills, until the end of the run [s]."""
+def _split_time(activations: Sequence[Activation], end_time: float) -> Iterator[Interval]:
+    """Yield the intervals between successive starts and ends of skills, from 0 to `end_time` [s]."""
     lasting = [activation for activation in activations if activation.end > activation.start]
-    waiting = deque(sorted(lasting, key=lambda activation: activation.start))
-    times = sorted({0.0, end, *(time for each in activations for time in (each.start, each.end))})
+    upcoming = deque(sorted(lasting, key=lambda activation: activation.start))
+    times = sorted({0.0, end_time, *(time for each in activations for time in (each.start, each.end))})
     running: list[Activation] = []
-    for start, stop in pairwise(times):
+    for start, end in pairwise(times):
         running = [activation for activation in running if activation.end > start]
-        while waiting and waiting[0].start <= start:
-            running.append(waiting.popleft())
-        yield start, stop, running
+        while upcoming and upcoming[0].start <= start:
+            running.append(upcoming.popleft())
+        yield start, end, running
 
 
 def _classify_pause(running: Sequence[Activation], skills: Mapping[str, OutlineNode]) -> str:
-    """Return the activity of running skills without an object."""
+    """Return the activity, LOOK or WAITING, of an interval whose running skills have no object."""
     nodes = [skills[activation.node] for activation in running]
     return LOOK if any(node.senses or "arm" in node.uses for node in nodes) else WAITING
 
 
 def _find_next_item(decisions: Sequence[tuple[float, str]], time: float) -> str:
-    """Return the object of the first decision from a time [s] on, or `NO_OBJECT`."""
+    """Return the object of the first decision at or after a time [s], or `NO_OBJECT`."""
     index = bisect_left(decisions, (time, ""))
     return decisions[index][1] if index < len(decisions) else NO_OBJECT
 
@@ -100,7 +102,7 @@ def _find_retries(
     skills: Mapping[str, OutlineNode],
     decisions: Sequence[tuple[float, str]],
 ) -> dict[str, tuple[float, float]]:
-    """Return start and end of the failed attempts [s] of each object with a failed attempt."""
+    """Return, for each object with a failed attempt, the start and the end of its failed attempts [s]."""
     last_failures = {
         activation.item: activation.end
         for activation in activations
@@ -108,9 +110,9 @@ def _find_retries(
         if skills[activation.node].uses and not skills[activation.node].senses
     }
     retries = {}
-    for item, last in last_failures.items():
-        decided = [time for time, name in decisions if name == item]
-        first = min(decided, default=min(each.start for each in activations if each.item == item))
+    for item, last_failure in last_failures.items():
+        decision_times = [time for time, name in decisions if name == item]
+        start = min(decision_times, default=min(each.start for each in activations if each.item == item))
         # Looks before the next attempt count as part of the failed attempt.
-        retries[item] = first, next((time for time in decided if time > last), last)
+        retries[item] = start, next((time for time in decision_times if time > last_failure), last_failure)
     return retries

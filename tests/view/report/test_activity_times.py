@@ -12,16 +12,23 @@ from made_up_runs import TREE, ran, skill
 from executive.mission.outline import OutlineNode
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
-from executive.view.report.shares import LOOK, NO_OBJECT, RETRY, WAITING, Shares, compute_shares
+from executive.view.report.activity_times import (
+    LOOK,
+    NO_OBJECT,
+    RETRY,
+    WAITING,
+    ActivityTimes,
+    compute_activity_times,
+)
 
 ITEMS = ("cube-1", "duck-1", "big_duck-2")
 
 
-def shares(
+def times_of(
     course: list[Activation], nodes: Sequence[OutlineNode], decisions: list[tuple[float, str]], end: float
-) -> Shares:
-    """Return the shares of activations and selections up to a time."""
-    return compute_shares(Timeline(activations=course, selections=decisions, clock=end), nodes)
+) -> ActivityTimes:
+    """Return the times of activations and selections up to a time."""
+    return compute_activity_times(Timeline(activations=course, selections=decisions, clock=end), nodes)
 
 
 def near(row: dict[str, float]) -> object:
@@ -39,13 +46,15 @@ def test_a_failed_attempt_a_look_ahead_and_a_wait_are_told_apart():
         ran("Transit", 6.1, 7.0, "duck-1"), ran("Release", 7.0, 7.1, "duck-1"),
         ran("Wait", 7.1, 8.1), ran("Detect", 8.1, 8.2),
     ]  # fmt: skip
-    times = shares(course, TREE, [(1.1, "cube-1"), (2.3, "cube-1"), (4.1, "duck-1")], 8.5)
-    assert list(times.rows) == ["cube-1", "duck-1", NO_OBJECT]
-    assert times.rows["cube-1"] == near(
+    times = times_of(course, TREE, [(1.1, "cube-1"), (2.3, "cube-1"), (4.1, "duck-1")], 8.5)
+    assert list(times.times_by_item) == ["cube-1", "duck-1", NO_OBJECT]
+    assert times.times_by_item["cube-1"] == near(
         {LOOK: 1.1, RETRY: 1.2, "approach": 0.7, "grasp": 0.1, "transit": 1.9, "release": 0.1}
     )
-    assert times.rows["duck-1"] == near({"approach": 0.9, "grasp": 0.1, "transit": 0.9, "release": 0.1})
-    assert times.rows[NO_OBJECT] == near({WAITING: 1.3, LOOK: 0.1})
+    assert times.times_by_item["duck-1"] == near(
+        {"approach": 0.9, "grasp": 0.1, "transit": 0.9, "release": 0.1}
+    )
+    assert times.times_by_item[NO_OBJECT] == near({WAITING: 1.3, LOOK: 0.1})
     assert times.activities == (LOOK, "approach", "grasp", "transit", "release", RETRY, WAITING)
 
 
@@ -53,9 +62,9 @@ def test_what_runs_at_the_same_time_is_the_time_of_what_began_first_and_is_about
     course = [
         ran("Wait", 0.0, 4.0), ran("Transit", 1.0, 3.0, "cube-1"), ran("Approach", 2.0, 4.0, "duck-1"),
     ]  # fmt: skip
-    times = shares(course, TREE, [(1.0, "cube-1"), (2.0, "duck-1")], 4.0)
-    assert times.rows["cube-1"] == near({WAITING: 1.0, "transit": 2.0})
-    assert times.rows["duck-1"] == near({"approach": 1.0})
+    times = times_of(course, TREE, [(1.0, "cube-1"), (2.0, "duck-1")], 4.0)
+    assert times.times_by_item["cube-1"] == near({WAITING: 1.0, "transit": 2.0})
+    assert times.times_by_item["duck-1"] == near({"approach": 1.0})
 
 
 def test_an_attempt_that_was_the_last_was_in_vain_up_to_its_end():
@@ -63,13 +72,13 @@ def test_an_attempt_that_was_the_last_was_in_vain_up_to_its_end():
         ran("Approach", 0.5, 1.0, "cube-1"), ran("Grasp", 1.0, 1.2, "cube-1", "FAILURE"),
         ran("Detect", 1.2, 1.3),
     ]  # fmt: skip
-    times = shares(course, TREE, [(0.5, "cube-1")], 1.3)
-    assert times.rows == {"cube-1": near({WAITING: 0.5, RETRY: 0.7}), NO_OBJECT: near({LOOK: 0.1})}
+    times = times_of(course, TREE, [(0.5, "cube-1")], 1.3)
+    assert times.times_by_item == {"cube-1": near({WAITING: 0.5, RETRY: 0.7}), NO_OBJECT: near({LOOK: 0.1})}
 
 
 def test_the_time_before_the_first_skill_and_after_the_last_belongs_to_the_run():
-    times = shares([ran("Transit", 1.0, 2.0, "cube-1", "INVALID")], TREE, [(1.0, "cube-1")], 2.4)
-    assert times.rows == {
+    times = times_of([ran("Transit", 1.0, 2.0, "cube-1", "INVALID")], TREE, [(1.0, "cube-1")], 2.4)
+    assert times.times_by_item == {
         "cube-1": near({WAITING: 1.0, "transit": 1.0}),
         NO_OBJECT: near({WAITING: 0.4}),
     }
@@ -77,9 +86,9 @@ def test_the_time_before_the_first_skill_and_after_the_last_belongs_to_the_run()
 
 def test_a_skill_that_is_called_like_another_activity_has_no_column_of_its_own():
     tree = [*TREE, skill("Look", "arm")]
-    times = shares([ran("Look", 0.0, 1.0, "cube-1"), ran("Detect", 1.0, 2.0)], tree, [], 2.0)
+    times = times_of([ran("Look", 0.0, 1.0, "cube-1"), ran("Detect", 1.0, 2.0)], tree, [], 2.0)
     assert times.activities == (LOOK,)
-    assert times.rows == {"cube-1": near({LOOK: 1.0}), NO_OBJECT: near({LOOK: 1.0})}
+    assert times.times_by_item == {"cube-1": near({LOOK: 1.0}), NO_OBJECT: near({LOOK: 1.0})}
 
 
 TIMES = st.integers(0, 240).map(lambda ticks: ticks / 24)
@@ -101,14 +110,14 @@ def spans(draw: st.DrawFn) -> Activation:
 def test_every_instant_belongs_to_one_object_and_one_activity(course, decisions, after):
     course.sort(key=lambda span: span.start)
     end = max((span.end for span in course), default=0.0) + after
-    times = shares(course, TREE, decisions, end)
-    spent = [seconds for row in times.rows.values() for seconds in row.values()]
+    times = times_of(course, TREE, decisions, end)
+    spent = [seconds for row in times.times_by_item.values() for seconds in row.values()]
     assert sum(spent) == pytest.approx(end)
     assert all(seconds > 0 for seconds in spent)
     assert list(times.activities) == list(dict.fromkeys(times.activities))
-    assert {activity for row in times.rows.values() for activity in row} == set(times.activities)
-    assert NO_OBJECT not in list(times.rows)[:-1]
-    for item, row in times.rows.items():
+    assert {activity for row in times.times_by_item.values() for activity in row} == set(times.activities)
+    assert NO_OBJECT not in list(times.times_by_item)[:-1]
+    for item, row in times.times_by_item.items():
         # Nobody's time is spent on an object that was never decided for nor handled.
         assert item == NO_OBJECT or item in {span.item for span in course} | {name for _, name in decisions}
         assert RETRY not in row or any(span.item == item and span.status == "FAILURE" for span in course)
