@@ -49,12 +49,8 @@ class Bins:
     def find_bin(self, observation: Observation, bias_std: float, records: Collection[Record]) -> str | None:
         """Return the name of the bin in which an observed object lies, or None.
 
-        Bins that contain items are enlarged by the measurement error.
-
-        Args:
-            observation: Observation of the object.
-            bias_std: Standard deviation of the systematic error of the position along each axis [m].
-            records: All items.
+        Bins that contain items are enlarged by the measurement error; `bias_std` is the standard deviation of
+        its systematic part along each axis [m].
         """
         error = MAX_STANDARD_DEVIATIONS * math.hypot(observation.std, bias_std)
         for name, bin in self.bins.items():

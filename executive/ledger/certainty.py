@@ -1,4 +1,7 @@
-"""Rules for items that are certain enough to be sorted, and for items that are rejected as uncertain."""
+"""Rules for items that are certain enough to be sorted, and for items that are rejected as uncertain.
+
+A look is an image with its detections.
+"""
 
 from __future__ import annotations
 
@@ -33,8 +36,6 @@ MAX_UNCERTAIN_LOOKS = 10
 @dataclass(frozen=True)
 class Certainty:
     """Decides which items are certain enough to be sorted, and which are rejected.
-
-    A look is an image with its detections.
 
     Attributes:
         config: Thresholds of the ledger, from the cell file.

@@ -92,12 +92,9 @@ class Coverage:
             self._last_full_looks[is_visible] = self._full_look_count
 
     def reset_near(self, centre: Array, radius: float, change: int) -> None:
-        """Reset the points in a circle, because a change of the table may have put objects there.
+        """Reset the points within `radius` [m] of `centre` `(3,)` [m], to which objects may have been moved.
 
-        Args:
-            centre: Centre of the circle `(3,)` [m].
-            radius: Radius of the circle [m]; infinite for the whole table.
-            change: Number of the change, from 1.
+        `change` is the number of the change of the table that may have moved the objects.
         """
         near = self._find_distances(centre) <= radius
         self._miss_probabilities[near], self._last_changes[near] = self._reset_values[near], change

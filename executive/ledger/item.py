@@ -178,11 +178,8 @@ class Record:
     def observe(self, observation: Observation, frame: Frame, bias_std: float, *, is_settled: bool) -> None:
         """Update the position with an observation, and record the frame of the last detection.
 
-        Args:
-            observation: Observation of the item.
-            frame: Frame of the observation.
-            bias_std: Standard deviation of the systematic error of the detector's positions [m].
-            is_settled: True if the item cannot have moved since its last detection.
+        `bias_std` is the standard deviation of the systematic error along each axis [m]; `is_settled` is True
+        if the item cannot have moved since its last detection.
         """
         self.update_position(observation.position, observation.std, is_settled=is_settled)
         self.bias_std, self.confidence = bias_std, observation.detection.confidence

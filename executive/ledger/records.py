@@ -44,14 +44,10 @@ class Records:
     def add(
         self, belief: Belief, position: Array, change_count: int, stamp: float, *, appeared_during_run: bool
     ) -> Record:
-        """Add an item with the name `<class>-<number>`, and return its record.
+        """Add an item with the name `<class>-<number>` at a position `(3,)` [m], and return its record.
 
-        Args:
-            belief: Existence and class of the item.
-            position: Position of the item `(3,)` [m].
-            change_count: Number of changes of the table before the detection.
-            stamp: Capture time of the detection [s].
-            appeared_during_run: True if earlier looks had found the position empty.
+        `change_count` is the number of changes of the table before the first detection, `stamp` the time of
+        the detection [s]; `appeared_during_run` is True if earlier looks had found the position empty.
         """
         label = belief.first_label
         self._name_counts[label] += 1

@@ -18,7 +18,7 @@ class Staleness:
 
     def __init__(self) -> None:
         self._changes: list[tuple[Array, float]] = []
-        """Centre `(3,)` [m] and radius [m] of the circle in which each change may have moved objects."""
+        """Centre `(3,)` [m] and radius [m] of each change; the radius is infinite for the whole table."""
 
     @property
     def change_count(self) -> int:
@@ -26,10 +26,7 @@ class Staleness:
         return len(self._changes)
 
     def record_change(self, centre: Array, radius: float) -> None:
-        """Record that objects within `radius` [m] of `centre` `(3,)` [m] may have been moved.
-
-        An infinite radius stands for the whole table.
-        """
+        """Record that objects within `radius` [m] of `centre` `(3,)` [m] may have been moved."""
         self._changes.append((centre, radius))
 
     def is_settled(self, record: Record) -> bool:
@@ -41,10 +38,7 @@ class Staleness:
         return self.find_change(position, change_count) is None
 
     def find_change(self, position: Array, change_count: int) -> int | None:
-        """Return the number of the first change after `change_count` that may have moved an object, or None.
-
-        `position` `(3,)` [m] is the position of the object.
-        """
+        """Return the number of the first change after `change_count` near `position` `(3,)` [m], or None."""
         for number, (centre, radius) in enumerate(self._changes[change_count:], change_count + 1):
             if float(np.linalg.norm(centre[:2] - position[:2])) <= radius:
                 return number

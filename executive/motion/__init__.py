@@ -1,1 +1,1 @@
-"""From a goal to a motion of the arm: kinematics, what stands around, the search, the seal, braking."""
+"""Motion planning of the arm: kinematics, obstacles, search, optimization, payload limits and braking."""

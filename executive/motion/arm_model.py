@@ -1,4 +1,4 @@
-"""Kinematics that the planner needs from an arm, with any number of joints."""
+"""Protocol of the kinematics that the planner needs from an arm, with any number of joints."""
 
 from __future__ import annotations
 
@@ -11,71 +11,69 @@ from numpy.typing import ArrayLike
 from executive.geometry import Array, Pose
 from executive.motion.limits import JointRange
 
-Configuration = tuple[float, ...]
-"""Key of one of the inverse-kinematics solutions of a tool pose.
+BranchKey = tuple[float, ...]
+"""Key of a branch of the inverse kinematics.
 
-Only the kinematics that returned a key knows the meaning of its numbers. Along a short path of the tool, the
-solutions with the same key are continuous.
+A tool pose has at most one solution in each branch. Along a short path of the tool, the solutions in one
+branch are continuous. The meaning of the numbers depends on the arm.
 """
 
 
 class Solutions(NamedTuple):
-    """Inverse-kinematics solutions of one tool pose, `N` of them.
+    """Inverse-kinematics solutions of one tool pose in `N` branches.
 
     Attributes:
-        qs: Joint positions `(N, n)` [rad], not limited to the joint range; NaN in the row of a configuration
-            that does not reach the pose.
-        configurations: Key of each row.
+        qs: Joint positions `(N, n)` [rad], not limited to the joint range; NaN in the row of a branch without
+            a solution.
+        branches: Branch of each row.
     """
 
     qs: Array
-    configurations: Sequence[Configuration]
+    branches: Sequence[BranchKey]
 
 
 class Kinematics(Protocol):
-    """Kinematics of an arm with `n` joints, at the world's origin, and of the tool on its flange.
+    """Kinematics of an arm with `n` joints, whose base is the world frame, and of the tool on its flange.
 
-    The tool axis is the axis of the last joint: a turn of the last joint turns the tool about the tool axis.
+    The tool axis is the axis of the last joint.
     """
 
     @property
     def joint_range(self) -> JointRange:
-        """Joint positions at which no joint limit is exceeded and no link touches the next one."""
+        """Range in which no joint limit is exceeded and no link touches the next link."""
 
-    def forward(self, q: ArrayLike) -> Pose:
+    def compute_tool_pose(self, q: ArrayLike) -> Pose:
         """Return the tool pose `X_WT` at the joint positions `q` `(n,)` [rad]."""
 
-    def flange(self, q: ArrayLike) -> Pose:
+    def compute_flange_pose(self, q: ArrayLike) -> Pose:
         """Return the flange pose `X_WF` at `q` `(n,)` [rad]."""
 
-    def joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
+    def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
         """Return the frame of each joint at `q` `(n,)` [rad]; its origin is the centre of the joint."""
 
-    def tips(self, qs: Array) -> tuple[Array, Array]:
-        """Return the tool centre points `(N, 3)` [m] and the tool axes `(N, 3)` at `qs` `(N, n)` [rad]."""
+    def compute_tips_and_axes(self, qs: Array) -> tuple[Array, Array]:
+        """Return tool centre points `(N, 3)` [m] and tool axes `(N, 3)` at joint positions `(N, n)` [rad]."""
 
-    def configuration(self, q: ArrayLike) -> Configuration:
-        """Return the key of the configuration of `q` `(n,)` [rad]."""
+    def find_branch(self, q: ArrayLike) -> BranchKey:
+        """Return the branch of the joint positions `q` `(n,)` [rad]."""
 
-    def solve(self, X_WT: Pose, configuration: Configuration) -> Array:
-        """Return the joint positions `(n,)` [rad] of a tool pose in one configuration.
-
-        The joint range is not checked.
+    def solve(self, X_WT: Pose, branch: BranchKey) -> Array:
+        """Return the joint positions `(n,)` [rad] of a tool pose in one branch, not limited to the range.
 
         Raises:
             Unreachable: The pose is too near to the arm or too far from the arm.
         """
 
-    def solve_all(self, X_WT: Pose, near: ArrayLike, spacing: float) -> Solutions:
-        """Return the solutions of a tool pose in all configurations.
+    def solve_all(self, X_WT: Pose, q_near: ArrayLike, spacing: float) -> Solutions:
+        """Return the solutions of a tool pose in all branches.
 
-        Calls with the same `near` and `spacing` return the same configurations in the same order.
+        A redundant arm has infinitely many branches; the function samples the redundancy angle evenly. Calls
+        with the same `q_near` and `spacing` return the same branches in the same order.
 
         Args:
             X_WT: Tool pose.
-            near: Joint positions `(n,)` [rad] whose redundancy angle is among the returned ones.
-            spacing: Distance between the redundancy angles that are returned [rad]; an arm without redundancy
-                ignores it.
+            q_near: Joint positions `(n,)` [rad] whose redundancy angle is one of the samples.
+            spacing: Distance between the samples of the redundancy angle [rad], unused without redundancy.
 
         Raises:
             Unreachable: The pose is too near to the arm or too far from the arm.
@@ -83,5 +81,5 @@ class Kinematics(Protocol):
 
 
 def wrap_angles(angles: Array) -> Array:
-    """Return `angles` [rad], changed by full turns, in [-π, π)."""
+    """Return the equivalent angles [rad] in [-π, π)."""
     return (angles + math.pi) % (2 * math.pi) - math.pi

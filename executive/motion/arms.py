@@ -10,24 +10,27 @@ from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import SAMPLING_MARGIN
 from executive.motion.iiwa14_kinematics import IIWA14_JOINT_COUNT, Iiwa14
 from executive.motion.limits import JointLimits, JointRange
-from executive.motion.planner import Check, Planner
+from executive.motion.planner import CollisionCheck, Planner
 
 KinematicsFactory = Callable[[float, JointRange, float | None], Kinematics]
-"""Builds kinematics from the tool length [m], the joint range, and the minimum distance between links [m]."""
+"""Function that builds kinematics from tool length [m], joint range, and minimum distance of links [m]."""
 
-ARMS: Mapping[str, tuple[int, KinematicsFactory]] = {"kuka_iiwa/model.urdf": (IIWA14_JOINT_COUNT, Iiwa14)}
-"""Number of joints and kinematics of each supported arm, by the value of `arm.urdf` in a cell file."""
+ARMS_BY_URDF: Mapping[str, tuple[int, KinematicsFactory]] = {
+    "kuka_iiwa/model.urdf": (IIWA14_JOINT_COUNT, Iiwa14)
+}
+"""Number of joints and kinematics of each supported arm, by the key `arm.urdf` of cell files."""
 
 
 def find_unsupported_arm(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message if the arm of a cell file, or the number of its limits, is not supported."""
-    if config.arm.urdf not in ARMS:
+    """Yield a key and a message if the arm of a cell file has no kinematics or another number of joints."""
+    if config.arm.urdf not in ARMS_BY_URDF:
         yield (
             ("arm", "urdf"),
-            f'the arm model "{config.arm.urdf}" has no kinematics; supported: {", ".join(sorted(ARMS))}',
+            f'the arm model "{config.arm.urdf}" has no kinematics; '
+            f"supported: {', '.join(sorted(ARMS_BY_URDF))}",
         )
         return
-    joint_count, _ = ARMS[config.arm.urdf]
+    joint_count, _ = ARMS_BY_URDF[config.arm.urdf]
     if config.arm.joint_count != joint_count:
         yield (
             ("arm", "limits"),
@@ -36,15 +39,15 @@ def find_unsupported_arm(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
         )
 
 
-def build_kinematics(config: CellConfig, link_distance: float | None = None) -> Kinematics:
+def build_kinematics(config: CellConfig, min_link_distance: float | None = None) -> Kinematics:
     """Return the kinematics of the arm of a cell file.
 
-    `link_distance` is the minimum distance between links of the arm [m]; None: not limited.
+    `min_link_distance` is the minimum distance between links of the arm [m], or None for no minimum.
     """
-    _, build = ARMS[config.arm.urdf]
-    return build(config.tool.length, JointLimits.of(config.arm.limits).position, link_distance)
+    _, build = ARMS_BY_URDF[config.arm.urdf]
+    return build(config.tool.length, JointLimits.from_config(config.arm.limits).position, min_link_distance)
 
 
-def build_planner(config: CellConfig, check: Check | None = None) -> Planner:
-    """Return the planner for the arm of a cell file; `check` as for `Planner`."""
+def build_planner(config: CellConfig, check: CollisionCheck | None = None) -> Planner:
+    """Return the planner for the arm of a cell file; `check` is an additional collision check, or None."""
     return Planner(config, build_kinematics(config, config.motion.margin + SAMPLING_MARGIN), check)

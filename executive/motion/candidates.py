@@ -1,4 +1,4 @@
-"""Candidates for the end of a motion, in the order of their minimum durations."""
+"""Candidates for the end of a motion: joint positions and straight arrivals that reach the goal."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ import numpy as np
 
 from executive.cell.arm import Goal
 from executive.geometry import Array
-from executive.motion.arm_model import Configuration, Kinematics
-from executive.motion.cartesian_line import CHAIN_LENGTH, CartesianLine
-from executive.motion.limits import JointLimits, min_time
-from executive.motion.postures import find_postures, solve_vertical_line
+from executive.motion.arm_model import BranchKey, Kinematics
+from executive.motion.cartesian_line import WAYPOINT_COUNT, CartesianLine
+from executive.motion.configurations import find_configuration_pairs, solve_vertical_waypoints
+from executive.motion.limits import JointLimits, compute_min_time
 from executive.motion.state import JointState
 
 MIN_JOINT_DIFFERENCE = 0.2
-"""Minimum difference of a joint between two candidates [rad]."""
+"""Two candidates differ by more than this in at least one joint [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A candidate for the end of a motion.
+    """A candidate for the end of a motion, which consists of a free part and a straight arrival.
 
     Attributes:
         min_duration: Minimum duration of the free part [s].
-        entry: State at the end of the free part.
-        arrival: Straight motion down from `entry`, or None.
-        configuration: Configuration at the end, or None for given joint positions.
+        entry: Joint state at the end of the free part.
+        arrival: Straight motion of the tool downwards from `entry`, or None.
+        branch: Branch of the inverse kinematics at the end, or None for given joint positions.
     """
 
     min_duration: float
     entry: JointState
     arrival: CartesianLine | None
-    configuration: Configuration | None
+    branch: BranchKey | None
 
     @property
     def arrival_duration(self) -> float:
@@ -44,25 +44,24 @@ class Candidate:
 def find_candidates(
     kinematics: Kinematics, limits: JointLimits, start: JointState, goal: Goal, length: float
 ) -> Iterator[Candidate]:
-    """Yield candidates for motions to a goal whose last `length` [m] is straight.
+    """Yield candidates for motions from `start` to a goal, in the order of their minimum durations.
 
-    Each candidate differs from all earlier ones by more than `MIN_JOINT_DIFFERENCE`.
+    The last `length` [m] of each motion is straight.
 
     Raises:
-        Unreachable: No posture of the arm reaches the goal.
+        Unreachable: No joint configuration reaches the goal.
     """
-    postures = find_postures(kinematics, goal, length, start.q)
-    durations = min_time(postures.high - start.q, limits)
+    pairs = find_configuration_pairs(kinematics, goal, length, start.q)
+    durations = compute_min_time(pairs.high - start.q, limits)
     earlier: list[Array] = []
-    for number in np.argsort(durations, kind="stable"):
-        low = postures.low[number]
+    for index in np.argsort(durations, kind="stable"):
+        low, branch = pairs.low[index], pairs.branches[index]
         if any(np.max(np.abs(low - other)) <= MIN_JOINT_DIFFERENCE for other in earlier):
             continue
         earlier.append(low)
-        configuration = postures.configurations[number]
-        arrival, entry = None, JointState.rest(low)
+        arrival, entry = None, JointState.at_rest(low)
         if length > 0:
-            chain = solve_vertical_line(kinematics, low, length, CHAIN_LENGTH, configuration)[::-1]
-            arrival = CartesianLine(chain, length, limits, goal.speed, starts_in_motion=True)
-            entry = arrival.at(0.0)
-        yield Candidate(float(durations[number]), entry, arrival, configuration)
+            waypoints = solve_vertical_waypoints(kinematics, low, length, WAYPOINT_COUNT, branch)[::-1]
+            arrival = CartesianLine(waypoints, length, limits, goal.speed, starts_in_motion=True)
+            entry = arrival.state_at(0.0)
+        yield Candidate(float(durations[index]), entry, arrival, branch)

@@ -1,7 +1,7 @@
-"""Straight motion of the tool: up or down in one configuration of the arm.
+"""Straight motion of the tool, up or down, in one branch of the inverse kinematics.
 
-The joint path is a spline through inverse-kinematics solutions; its parameter `s` is the path length of the
-tool. With speed `v`, acceleration `a` and jerk `j` of the tool, the chain rule gives the joint motion
+The joint path `q(s)` is a spline through inverse-kinematics solutions; its parameter `s` is the distance that
+the tool has moved. With speed `v`, acceleration `a` and jerk `j` of the tool, the chain rule gives
 
     q' = q_s v,  q'' = q_s a + q_ss v²,  q''' = q_s j + 3 q_ss v a + q_sss v³.
 
@@ -21,27 +21,27 @@ from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.state import JointState
 
-CHAIN_LENGTH = 4
+WAYPOINT_COUNT = 4
 """Number of inverse-kinematics solutions along a line."""
-MAX_CURVATURE_SHARE = 0.5
-"""Maximum share of a joint's acceleration and jerk limits for the terms with the curvature of its path."""
-_LIMIT_SAMPLES = np.linspace(0.0, 1.0, 33)  # shares of the length at which joint limits are evaluated
-_EPSILON = 1e-9  # [rad/m], [rad/m²], [rad/m³]: a joint at rest sets no limit
+MAX_CURVATURE_FRACTION = 0.5
+"""Maximum fraction of a joint's acceleration and jerk limits that the terms with q_ss and q_sss may use."""
+_LIMIT_FRACTIONS = np.linspace(0.0, 1.0, 33)  # fractions of the length at which joint limits are evaluated
+_EPSILON = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for a joint that does not move
 
 
 class CartesianLine:
-    """A straight motion of the tool; implements `executive.motion.state.Piece`.
+    """A straight motion of the tool; implements `executive.motion.state.MotionPiece`.
 
-    If the tool moves at one end, it has the largest speed from which it can stop at the other end.
+    At an end where the tool moves, its speed is the largest from which it can stop within the line.
 
     Args:
-        chain: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line, `N` > 3.
+        waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line, `N` > 3.
         length: Length of the line [m].
         limits: Joint limits.
         speed: Maximum speed of the tool [m/s].
         acceleration: Maximum acceleration of the tool [m/s²].
         starts_in_motion: True if the tool moves at the start.
-        ends_in_motion: True if the tool moves at the end; only one of both.
+        ends_in_motion: True if the tool moves at the end; at most one of these two arguments may be True.
 
     Attributes:
         duration: Duration [s].
@@ -50,7 +50,7 @@ class CartesianLine:
 
     def __init__(
         self,
-        chain: Array,
+        waypoints: Array,
         length: float,
         limits: JointLimits,
         speed: float = math.inf,
@@ -59,7 +59,7 @@ class CartesianLine:
         starts_in_motion: bool = False,
         ends_in_motion: bool = False,
     ) -> None:
-        self._spline = CubicSpline(np.linspace(0.0, length, len(chain)), chain)
+        self._spline = CubicSpline(np.linspace(0.0, length, len(waypoints)), waypoints)
         self._derivatives = [self._spline.derivative(order) for order in (1, 2)]
         max_speed, joint_acceleration, jerk = self._tool_limits(limits, speed, length)
         self.acceleration = acceleration = min(acceleration, joint_acceleration)
@@ -73,35 +73,35 @@ class CartesianLine:
         Ruckig(1).calculate(inputs, self._profile)
         self.duration: float = self._profile.duration
 
-    def at(self, s: float) -> JointState:
-        """Return the state at time `s`, 0 to `duration` [s]."""
-        (distance,), (speed,), (acceleration,) = self._profile.at_time(s)
+    def state_at(self, time: float) -> JointState:
+        """Return the state at `time`, 0 to `duration` [s]."""
+        (distance,), (speed,), (acceleration,) = self._profile.at_time(time)
         q_s, q_ss = (derivative(distance) for derivative in self._derivatives)
         return JointState(self._spline(distance), q_s * speed, q_s * acceleration + q_ss * speed**2)
 
-    def over(self, times: Array) -> JointState:
+    def sample(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
-        profile = np.array([self._profile.at_time(s) for s in times.tolist()])[:, :, 0].T
-        distance, (speed, acceleration) = profile[0], profile[1:, :, None]
+        samples = np.array([self._profile.at_time(time) for time in times.tolist()])[:, :, 0].T
+        distance, (speed, acceleration) = samples[0], samples[1:, :, None]
         q_s, q_ss = (derivative(distance) for derivative in self._derivatives)
         return JointState(self._spline(distance), q_s * speed, q_s * acceleration + q_ss * speed**2)
 
     def _tool_limits(self, limits: JointLimits, speed: float, length: float) -> tuple[float, float, float]:
-        """Return the maximum speed [m/s], acceleration [m/s²] and jerk [m/s³] of the tool."""
+        """Return the maximum speed [m/s], acceleration [m/s²] and jerk [m/s³] of the tool on the line."""
         q_s, q_ss, q_sss = (
-            np.abs(self._spline(_LIMIT_SAMPLES * length, order)).max(axis=0) for order in (1, 2, 3)
+            np.abs(self._spline(_LIMIT_FRACTIONS * length, order)).max(axis=0) for order in (1, 2, 3)
         )
         speeds = (
             limits.velocity / (q_s + _EPSILON),
-            # The tool cannot become faster on a line of this length.
+            # Speed that the tool reaches with its maximum acceleration on the whole line.
             math.sqrt(2 * length * np.min(limits.acceleration / (q_s + _EPSILON))),
-            np.sqrt(MAX_CURVATURE_SHARE * limits.acceleration / (q_ss + _EPSILON)),
-            np.cbrt(MAX_CURVATURE_SHARE / 2 * limits.jerk / (q_sss + _EPSILON)),
+            np.sqrt(MAX_CURVATURE_FRACTION * limits.acceleration / (q_ss + _EPSILON)),
+            np.cbrt(MAX_CURVATURE_FRACTION / 2 * limits.jerk / (q_sss + _EPSILON)),
         )
         max_speed = min(speed, *(float(np.min(values)) for values in speeds))
         accelerations = (
             (limits.acceleration - q_ss * max_speed**2) / (q_s + _EPSILON),
-            MAX_CURVATURE_SHARE / 2 * limits.jerk / (3 * q_ss * max_speed + _EPSILON),
+            MAX_CURVATURE_FRACTION / 2 * limits.jerk / (3 * q_ss * max_speed + _EPSILON),
         )
         acceleration = float(np.min(accelerations))
         jerks = limits.jerk - 3 * q_ss * max_speed * acceleration - q_sss * max_speed**3

@@ -1,14 +1,14 @@
 """Forward and analytic inverse kinematics of the KUKA LBR iiwa 14.
 
 The seven joints form a shoulder, an elbow and a wrist (S-R-S): the axes of joints 1 to 3 intersect in the
-shoulder, and those of joints 5 to 7 in the wrist:
+shoulder, and the axes of joints 5 to 7 in the wrist:
 
     R_WT = Rz(q1) Ry(q2) Rz(q3) Ry(-q4) Rz(q5) Ry(q6) Rz(q7).
 
 A tool pose determines the position of the wrist, and the triangle of shoulder, elbow and wrist determines
 joint 4. The elbow is free to rotate about the line from the shoulder to the wrist; the angle of this rotation
-is the redundancy angle. Each redundancy angle has eight solutions (branches): shoulder, elbow and wrist can
-each be flipped, `(a, b, c) -> (a + π, -b, c + π)`. A configuration is `(branch, redundancy angle)`.
+is the redundancy angle. Each redundancy angle has eight solutions (flips): shoulder, elbow and wrist can each
+be flipped, `(a, b, c) -> (a + π, -b, c + π)`. A branch is `(index of the flip, redundancy angle)`.
 """
 
 from __future__ import annotations
@@ -21,39 +21,40 @@ from numpy.typing import ArrayLike
 
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
-from executive.motion.arm_model import Configuration, Solutions, wrap_angles
+from executive.motion.arm_model import BranchKey, Solutions, wrap_angles
 from executive.motion.limits import JointRange
 
 IIWA14_JOINT_COUNT = 7
+"""Number of joints."""
 FLANGE_OFFSET = 0.045
 """Distance from the origin of link 7 to the outer face of the flange, along the z axis of the link [m]."""
 
 SHOULDER_HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.36, 0.42, 0.40, 0.081 + FLANGE_OFFSET
 """Dimensions of the arm [m], from pybullet_data kuka_iiwa/model.urdf."""
 
-BRANCHES = np.array([[s, e, w] for s in (1, -1) for e in (1, -1) for w in (1, -1)])
-"""Signs of joints 2, 4 and 6 in the eight solutions of one redundancy angle, `(8, 3)`."""
+FLIPS = np.array([[s, e, w] for s in (1, -1) for e in (1, -1) for w in (1, -1)])
+"""Signs of joints 2, 4 and 6 in the eight solutions of one redundancy angle `(8, 3)`."""
 
 _JOINT_6_ANGLES = 120.0, 115.0, 110.0, 105.0, 100.0, 95.0, 90.0  # [degree]
 _LINK_DISTANCES = -0.0132, -0.0059, 0.0012, 0.0079, 0.0141, 0.0195, 0.0237  # [m]
 
 _FLIP_OFFSETS = np.zeros((8, 7))
-_FLIP_OFFSETS[:, [0, 2]] += (BRANCHES[:, :1] < 0) * math.pi
-_FLIP_OFFSETS[:, [2, 4]] += (BRANCHES[:, 1:2] < 0) * math.pi
-_FLIP_OFFSETS[:, [4, 6]] += (BRANCHES[:, 2:] < 0) * math.pi
+_FLIP_OFFSETS[:, [0, 2]] += (FLIPS[:, :1] < 0) * math.pi
+_FLIP_OFFSETS[:, [2, 4]] += (FLIPS[:, 1:2] < 0) * math.pi
+_FLIP_OFFSETS[:, [4, 6]] += (FLIPS[:, 2:] < 0) * math.pi
 _FLIP_SIGNS = np.ones((8, 7))
-_FLIP_SIGNS[:, [1, 3, 5]] = BRANCHES
+_FLIP_SIGNS[:, [1, 3, 5]] = FLIPS
 _TURNS_ABOUT_Z = (True, False, True, False, True, False, True)
 _ROUNDING_ERROR = 1e-9  # [m]
 
 
-def max_wrist_angle(link_distance: float) -> float:
-    """Return the maximum angle of joint 6 [rad] at which links 5 and 7 are `link_distance` [m] apart.
+def find_max_wrist_angle(min_link_distance: float) -> float:
+    """Return the maximum angle of joint 6 [rad] at which links 5 and 7 keep a minimum distance [m].
 
-    The distance of these links depends on joint 6 alone, with an error of up to 0.3 mm. The table is measured
+    The distance of these links depends only on joint 6, with an error of up to 0.3 mm. The table was measured
     on the collision shapes of pybullet_data kuka_iiwa/model.urdf. Angles up to 90 degrees are always allowed.
     """
-    return math.radians(float(np.interp(link_distance, _LINK_DISTANCES, _JOINT_6_ANGLES)))
+    return math.radians(float(np.interp(min_link_distance, _LINK_DISTANCES, _JOINT_6_ANGLES)))
 
 
 class Iiwa14:
@@ -61,45 +62,45 @@ class Iiwa14:
 
     Args:
         tool_length: Distance from the flange to the tool centre point [m].
-        joint_range: Range of the joint positions by the data sheet, `n` = 7.
-        link_distance: Minimum distance between links 5 and 7 [m], which limits joint 6; None: not limited.
+        joint_range: Range of the joint positions according to the data sheet, `n` = 7.
+        min_link_distance: Minimum distance between links 5 and 7 [m], which limits joint 6, or None.
 
     Attributes:
-        joint_range: Range of the joint positions, with joint 6 limited.
+        joint_range: Range of the joint positions with the limit of joint 6.
     """
 
     def __init__(
-        self, tool_length: float, joint_range: JointRange, link_distance: float | None = None
+        self, tool_length: float, joint_range: JointRange, min_link_distance: float | None = None
     ) -> None:
         lower, upper = joint_range.lower.copy(), joint_range.upper.copy()
-        if link_distance is not None:
-            wrist = max_wrist_angle(link_distance)
-            lower[5], upper[5] = max(lower[5], -wrist), min(upper[5], wrist)
+        if min_link_distance is not None:
+            max_angle = find_max_wrist_angle(min_link_distance)
+            lower[5], upper[5] = max(lower[5], -max_angle), min(upper[5], max_angle)
         self.joint_range = JointRange(lower, upper)
         self._tool_length = tool_length
         self._wrist_to_tool = WRIST_TO_FLANGE + tool_length
-        bend = math.cos(max(-lower[3], upper[3]))
-        self._min_distance = math.sqrt(UPPER_ARM**2 + FOREARM**2 + 2 * UPPER_ARM * FOREARM * bend)
-        self._max_distance = UPPER_ARM + FOREARM
+        max_elbow_angle = max(-lower[3], upper[3])
+        min_square = UPPER_ARM**2 + FOREARM**2 + 2 * UPPER_ARM * FOREARM * math.cos(max_elbow_angle)
+        self._min_wrist_distance, self._max_wrist_distance = math.sqrt(min_square), UPPER_ARM + FOREARM
 
-    def forward(self, q: ArrayLike) -> Pose:
+    def compute_tool_pose(self, q: ArrayLike) -> Pose:
         """Return the tool pose `X_WT` at the joint positions `q` `(7,)` [rad]."""
-        return self._frames(q)[-1]
+        return self._compute_frames(q)[-1]
 
-    def flange(self, q: ArrayLike) -> Pose:
+    def compute_flange_pose(self, q: ArrayLike) -> Pose:
         """Return the flange pose `X_WF` at `q` `(7,)` [rad]."""
-        X_WT = self.forward(q)
+        X_WT = self.compute_tool_pose(q)
         return Pose(X_WT.rotation, X_WT.position - self._tool_length * X_WT.rotation[:, 2])
 
-    def joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
-        """Return the frame of each joint at `q` `(7,)` [rad]: origin at its centre, z along the arm."""
-        return tuple(self._frames(q)[:-1])
+    def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
+        """Return the frame of each joint at `q` `(7,)` [rad]: origin in the joint, z along the next link."""
+        return tuple(self._compute_frames(q)[:-1])
 
-    def tips(self, qs: Array) -> tuple[Array, Array]:
-        """Return the tool centre points `(N, 3)` [m] and the tool axes `(N, 3)` at `qs` `(N, 7)` [rad].
+    def compute_tips_and_axes(self, qs: Array) -> tuple[Array, Array]:
+        """Return tool centre points `(N, 3)` [m] and tool axes `(N, 3)` at joint positions `(N, 7)` [rad].
 
-        The function rotates two vectors from joint to joint, from the wrist to the base; that takes a
-        fifth of the time of whole frames. Joint 7 has no effect: it turns the tool about the tool axis.
+        The function rotates two vectors from joint to joint, from the wrist to the base, which takes a fifth
+        of the time of complete frames. Joint 7 has no effect, because its axis is the tool axis.
         """
         cosines, sines = np.cos(qs.T), np.sin(qs.T)
         zero = np.zeros(len(qs))
@@ -107,88 +108,93 @@ class Iiwa14:
         axis = np.array([cosines[4] * axis[0], sines[4] * axis[0], axis[2]])
         tip = self._wrist_to_tool * axis
         tip[2] += FOREARM
-        both = np.stack([tip, axis], axis=1)  # (3, 2, N)
-        both = _rotate_about_y(both, cosines[3], -sines[3])
-        both[2, 0] += UPPER_ARM
+        vectors = np.stack([tip, axis], axis=1)  # (3, 2, N)
+        vectors = _rotate_about_y(vectors, cosines[3], -sines[3])
+        vectors[2, 0] += UPPER_ARM
         for joint in (2, 1, 0):
             rotate = _rotate_about_y if joint == 1 else _rotate_about_z
-            both = rotate(both, cosines[joint], sines[joint])
-        both[2, 0] += SHOULDER_HEIGHT
-        return both[:, 0].T, both[:, 1].T
+            vectors = rotate(vectors, cosines[joint], sines[joint])
+        vectors[2, 0] += SHOULDER_HEIGHT
+        return vectors[:, 0].T, vectors[:, 1].T
 
-    def configuration(self, q: ArrayLike) -> Configuration:
-        """Return the key of the configuration of `q` `(7,)` [rad]."""
-        negative = np.asarray(q, dtype=float)[[1, 3, 5]] < 0
-        return int(negative @ [4, 2, 1]), self.redundancy_angle(q)
+    def find_branch(self, q: ArrayLike) -> BranchKey:
+        """Return index of the flip and redundancy angle [rad] of the joint positions `q` `(7,)` [rad]."""
+        is_negative = np.asarray(q, dtype=float)[[1, 3, 5]] < 0
+        return int(is_negative @ [4, 2, 1]), self.compute_redundancy_angle(q)
 
-    def redundancy_angle(self, q: ArrayLike) -> float:
-        """Return the angle of the elbow about the line from shoulder to wrist [rad]; 0 is up."""
-        frames = self.joint_frames(q)
+    def compute_redundancy_angle(self, q: ArrayLike) -> float:
+        """Return the angle of the elbow about the line from shoulder to wrist [rad]; 0: elbow up."""
+        frames = self.compute_joint_frames(q)
         shoulder, elbow, wrist = (frames[i].position for i in (1, 3, 5))
-        _, up, side = _triangle_frame(wrist - shoulder)
+        _, up, side = _compute_elbow_frame(wrist - shoulder)
         return math.atan2(float((elbow - shoulder) @ side), float((elbow - shoulder) @ up))
 
-    def solve(self, X_WT: Pose, configuration: Configuration) -> Array:
-        """Return the joint positions `(7,)` [rad] of a tool pose in one configuration; see `Kinematics`."""
-        branch, angle = configuration
-        return self._solve_branches(X_WT, np.array([angle]))[int(branch), 0]
+    def solve(self, X_WT: Pose, branch: BranchKey) -> Array:
+        """Return the joint positions `(7,)` [rad] of a tool pose in one branch, or raise Unreachable."""
+        flip, angle = branch
+        return self._solve_angles(X_WT, np.array([angle]))[int(flip), 0]
 
-    def solve_all(self, X_WT: Pose, near: ArrayLike, spacing: float) -> Solutions:
-        """Return the solutions in all branches, in steps of the redundancy angle; see `Kinematics`."""
-        angles = self.redundancy_angle(near) + np.radians(np.arange(0.0, 360.0, math.degrees(spacing)))
-        solutions = self._solve_branches(X_WT, angles).reshape(-1, IIWA14_JOINT_COUNT)
-        return Solutions(solutions, list(product(range(len(BRANCHES)), angles.tolist())))
+    def solve_all(self, X_WT: Pose, q_near: ArrayLike, spacing: float) -> Solutions:
+        """Return the solutions of a tool pose for all flips and evenly spaced redundancy angles.
 
-    def _solve_branches(self, X_WT: Pose, angles: Array) -> Array:
-        """Return the solutions `(8, S, 7)` [rad] of a tool pose by branch and redundancy angle `(S,)` [rad].
+        The first redundancy angle is that of the joint positions `q_near` `(7,)` [rad]. The function raises
+        Unreachable if there is no solution.
+        """
+        offsets = np.radians(np.arange(0.0, 360.0, math.degrees(spacing)))
+        angles = self.compute_redundancy_angle(q_near) + offsets
+        solutions = self._solve_angles(X_WT, angles).reshape(-1, IIWA14_JOINT_COUNT)
+        return Solutions(solutions, list(product(range(len(FLIPS)), angles.tolist())))
+
+    def _solve_angles(self, X_WT: Pose, angles: Array) -> Array:
+        """Return the solutions `(8, S, 7)` [rad] of a tool pose by flip and redundancy angle `(S,)` [rad].
 
         Raises:
             Unreachable: The wrist is too near to the shoulder or too far from the shoulder.
         """
         wrist = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2]
-        line = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
-        distance = self._check_distance(X_WT, line)
-        n, up, side = _triangle_frame(line)
+        shoulder_to_wrist = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
+        distance = self._measure_wrist_distance(X_WT, shoulder_to_wrist)
+        n, up, side = _compute_elbow_frame(shoulder_to_wrist)
         cos4 = (distance**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
         q4 = math.acos(min(1.0, max(-1.0, cos4)))
         cos_lift = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
         lift = math.acos(min(1.0, max(-1.0, cos_lift)))
 
-        out = np.outer(np.cos(angles), up) + np.outer(np.sin(angles), side)
-        # Frame 3: z along the upper arm, y normal to the triangle, x completes it.
-        z3 = math.cos(lift) * n + math.sin(lift) * out
-        y3 = np.cross(n, out)
+        elbow_direction = np.outer(np.cos(angles), up) + np.outer(np.sin(angles), side)
+        # Frame 3: z along the upper arm, y normal to the triangle of shoulder, elbow and wrist.
+        z3 = math.cos(lift) * n + math.sin(lift) * elbow_direction
+        y3 = np.cross(n, elbow_direction)
         x3 = np.asarray(np.cross(y3, z3), dtype=np.float64)
         x4 = math.cos(q4) * x3 + math.sin(q4) * z3
         z4 = -math.sin(q4) * x3 + math.cos(q4) * z3
         R_47 = np.stack([x4, y3, z4], axis=-2) @ X_WT.rotation
 
-        base = np.empty((len(angles), IIWA14_JOINT_COUNT))
-        base[:, 0], base[:, 1], base[:, 2] = _find_zyz_angles(x3, y3, z3)
-        base[:, 3] = q4
+        unflipped = np.empty((len(angles), IIWA14_JOINT_COUNT))
+        unflipped[:, 0], unflipped[:, 1], unflipped[:, 2] = _find_zyz_angles(x3, y3, z3)
+        unflipped[:, 3] = q4
         columns = R_47.transpose(2, 0, 1)
-        base[:, 4], base[:, 5], base[:, 6] = _find_zyz_angles(*columns)
-        return wrap_angles(base * _FLIP_SIGNS[:, None] + _FLIP_OFFSETS[:, None])
+        unflipped[:, 4], unflipped[:, 5], unflipped[:, 6] = _find_zyz_angles(*columns)
+        return wrap_angles(unflipped * _FLIP_SIGNS[:, None] + _FLIP_OFFSETS[:, None])
 
-    def _check_distance(self, X_WT: Pose, line: Array) -> float:
-        """Return the length of the line from shoulder to wrist `(3,)` [m]."""
-        distance = float(np.linalg.norm(line))
-        if distance > self._max_distance + _ROUNDING_ERROR:
-            excess = distance - self._max_distance
-            how = f"{excess:.3f} m farther than the arm is long ({self._max_distance:.2f} m)"
-        elif distance < self._min_distance - _ROUNDING_ERROR:
-            lack = self._min_distance - distance
-            how = f"{lack:.3f} m nearer than joint 4 can fold ({self._min_distance:.2f} m)"
+    def _measure_wrist_distance(self, X_WT: Pose, shoulder_to_wrist: Array) -> float:
+        """Return the length of the vector from shoulder to wrist `(3,)` [m], or raise Unreachable."""
+        distance = float(np.linalg.norm(shoulder_to_wrist))
+        if distance > self._max_wrist_distance + _ROUNDING_ERROR:
+            excess = distance - self._max_wrist_distance
+            cause = f"{excess:.3f} m farther than the arm is long ({self._max_wrist_distance:.2f} m)"
+        elif distance < self._min_wrist_distance - _ROUNDING_ERROR:
+            shortfall = self._min_wrist_distance - distance
+            cause = f"{shortfall:.3f} m nearer than joint 4 permits ({self._min_wrist_distance:.2f} m)"
         else:
             return distance
         x, y, z = X_WT.position
         raise Unreachable(
             f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m: its wrist would be {distance:.3f} m from "
-            f"the shoulder, {how}"
+            f"the shoulder, {cause}"
         )
 
-    def _frames(self, q: ArrayLike) -> list[Pose]:
-        """Return the frames of joints 1 to 7, as `joint_frames` does, followed by the frame of the tool."""
+    def _compute_frames(self, q: ArrayLike) -> list[Pose]:
+        """Return the frames of joints 1 to 7 at `q` `(7,)` [rad], followed by the frame of the tool."""
         frames = []
         R, p = np.eye(3), np.array([0.0, 0.0, SHOULDER_HEIGHT])
         lengths = {3: UPPER_ARM, 5: FOREARM}
@@ -218,21 +224,21 @@ def _make_rotation(c: float, s: float, about_z: bool) -> Array:
 
 
 def _find_zyz_angles(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-    """Return `a`, `b >= 0`, `c` with `Rz(a) Ry(b) Rz(c) = [x y z]`; the columns have the shape `(N, 3)`."""
+    """Return angles `a`, `b >= 0`, `c` with `Rz(a) Ry(b) Rz(c) = [x y z]`; `x`, `y` and `z` are `(N, 3)`."""
     sine = np.hypot(z[:, 0], z[:, 1])
-    singular = sine < 1e-9  # Only the sum (or difference) of a and c is defined: c gets all of it.
-    a = np.where(singular, 0.0, np.arctan2(z[:, 1], z[:, 0]))
+    is_singular = sine < 1e-9  # Only the sum or difference of a and c is defined: a is set to 0.
+    a = np.where(is_singular, 0.0, np.arctan2(z[:, 1], z[:, 0]))
     c = np.where(
-        singular,
+        is_singular,
         np.arctan2(x[:, 1], np.where(z[:, 2] > 0, x[:, 0], -x[:, 0])),
         np.arctan2(y[:, 2], -x[:, 2]),
     )
     return a, np.arctan2(sine, z[:, 2]), c
 
 
-def _triangle_frame(line: Array) -> tuple[Array, Array, Array]:
-    """Return the unit vector along `line`, the normal of `line` nearest to up, and the second normal."""
-    n = line / np.linalg.norm(line)
+def _compute_elbow_frame(shoulder_to_wrist: Array) -> tuple[Array, Array, Array]:
+    """Return the unit vector from shoulder to wrist, its normal nearest to up, and its second normal."""
+    n = shoulder_to_wrist / np.linalg.norm(shoulder_to_wrist)
     up = np.array([0.0, 0.0, 1.0]) if abs(n[2]) < 0.9999 else np.array([1.0, 0.0, 0.0])
     up = up - (up @ n) * n
     up /= np.linalg.norm(up)

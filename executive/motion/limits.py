@@ -1,4 +1,4 @@
-"""Joint limits as arrays in SI units, and the minimum time of a motion within them."""
+"""Joint limits as arrays in SI units, and the minimum time of a motion within the limits."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ class JointRange(NamedTuple):
     upper: Array
 
     def shrink(self, margin: float) -> JointRange:
-        """Return the range without a margin [rad] at both ends of every joint."""
+        """Return the range reduced by `margin` [rad] at both ends of every joint."""
         return JointRange(self.lower + margin, self.upper - margin)
 
     def contains(self, qs: Array) -> NDArray[np.bool_]:
-        """Return `(...)` bool: True for joint positions `(..., n)` [rad] within the range."""
+        """Return a mask `(...)` of the joint positions `(..., n)` [rad] within the range."""
         return np.asarray(np.all((self.lower <= qs) & (qs <= self.upper), axis=-1))
 
-    def excess(self, qs: Array) -> Array:
-        """Return the distance of each joint of `qs` `(..., n)` from the range [rad]; negative inside."""
+    def compute_excess(self, qs: Array) -> Array:
+        """Return the distance of each joint position `(..., n)` from the range [rad]; negative inside."""
         return np.asarray(np.maximum(qs - self.upper, self.lower - qs))
 
     def describe(self, joint: int) -> str:
-        """Return the range of a joint, by its index, in words."""
+        """Return the range of the joint with the index `joint` as text: `±170°` or `-30° to 120°`."""
         lower, upper = math.degrees(self.lower[joint]), math.degrees(self.upper[joint])
         return f"±{upper:.0f}°" if lower == -upper else f"{lower:.0f}° to {upper:.0f}°"
 
@@ -63,7 +63,7 @@ class JointLimits:
     stop_jerk: Array
 
     @staticmethod
-    def of(config: LimitsConfig) -> JointLimits:
+    def from_config(config: LimitsConfig) -> JointLimits:
         """Return the limits of a cell file."""
         lower, upper = np.radians(config.position_ranges_deg).T
         return JointLimits(
@@ -81,14 +81,16 @@ class JointLimits:
         return len(self.velocity)
 
 
-def min_time(change: Array, limits: JointLimits) -> Array:
+def compute_min_time(change: Array, limits: JointLimits) -> Array:
     """Return the minimum time `(...)` [s] of a motion from rest to rest by `change` `(..., n)` [rad].
 
     Each joint has its own jerk-limited profile, and the slowest joint determines the time. Depending on the
     distance, a profile reaches the maximum velocity, or only the maximum acceleration, or neither.
     """
     d, v, a, j = np.abs(change), limits.velocity, limits.acceleration, limits.jerk
-    rise = a / j  # [s] from rest to the maximum acceleration
-    ramp = np.where(v >= a * rise, v / a + rise, 2 * np.sqrt(v / j))  # [s] to the maximum velocity
-    short = np.where(d >= 2 * a * rise**2, rise + np.sqrt(rise**2 + 4 * d / a), 4 * np.cbrt(d / 2 / j))
-    return np.max(np.where(d >= v * ramp, d / v + ramp, short), axis=-1)
+    jerk_time = a / j  # [s] from zero to the maximum acceleration
+    ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))  # [s] to maximum velocity
+    time_below_max_velocity = np.where(
+        d >= 2 * a * jerk_time**2, jerk_time + np.sqrt(jerk_time**2 + 4 * d / a), 4 * np.cbrt(d / 2 / j)
+    )
+    return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)

@@ -1,8 +1,8 @@
 """Trajectory optimization: the fastest motion between two states that avoids all obstacles.
 
-Sequential quadratic programming: each step linearizes the distances of the current course from the obstacles,
-and solves for the shortest course nearby. The first course approximates a slow motion without collision that
-stops at corners above the obstacles. This motion determines on which side a course passes each obstacle.
+Sequential quadratic programming: each step linearizes the distances of the current motion from the obstacles,
+and solves for the fastest motion nearby. The initial motion approximates a slow motion without collision that
+stops at corners above the obstacles, and determines on which side the result passes each obstacle.
 """
 
 from __future__ import annotations
@@ -23,24 +23,26 @@ from executive.motion.transcription import (
     SAMPLES_PER_STEP,
     STEP_COUNT,
     VIOLATION_COST,
-    Demand,
-    JointCourse,
+    DiscreteMotion,
+    LinearizedConstraints,
     Transcription,
 )
 
-MAX_DISTANCE = 0.03
-"""Largest slack of the positions and demands in a quadratic program [m]."""
-FIRST_TRUST, TRUST_DECAY = 0.3, 0.9
-"""Largest change of accelerations in the first step, as a share of their limits, and its factor per step."""
-FIRST_DURATION_SHARE = 0.8
-"""Duration of the first course as a share of the duration of the motion that stops at corners."""
+MAX_SLACK = 0.03
+"""Constraints with a larger slack are left out of a quadratic program [m]."""
+INITIAL_TRUST_RADIUS = 0.3
+"""Maximum change of the accelerations in the first step, as a fraction of their limits."""
+TRUST_RADIUS_FACTOR = 0.9
+"""Factor on the maximum change of the accelerations after each step."""
+INITIAL_DURATION_FRACTION = 0.8
+"""Duration of the initial motion as a fraction of the duration of the motion that stops at corners."""
 LIMIT_MARGIN = 0.01
-"""Distance from the position limits of the joints [rad]."""
+"""Minimum distance from the position limits of the joints [rad]."""
 _JOINT_DIFFERENCE = 1e-4  # [rad]
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class OptimizationProblem:
     """The optimization problem between two states.
 
     Attributes:
@@ -60,33 +62,39 @@ class Problem:
     discs: Discs
     payload: PayloadLimit | None = None
 
-    def slack(self, qs: Array) -> Array:
-        """Return the smallest distance [m] or joint angle [rad] beyond the required one `(N,)`.
+    def compute_slack(self, qs: Array) -> Array:
+        """Return the slack `(N,)` of joint positions `(N, n)` [rad]; it is negative if a limit is violated.
 
-        `qs` are joint positions `(N, n)` [rad]. The smaller of both numbers counts.
+        The slack is the minimum of the distances beyond the required distances [m] and of the distances of
+        the joints from their range limits [rad].
         """
-        tips, axes = self.kinematics.tips(qs)
-        return np.minimum(self.clearance.slack(tips, axes, self.discs), self._range_slack(qs).min(axis=1))
+        tips, axes = self.kinematics.compute_tips_and_axes(qs)
+        distance_slack = self.clearance.compute_slack(tips, axes, self.discs)
+        return np.minimum(distance_slack, self._compute_range_slack(qs).min(axis=1))
 
-    def slopes(self, qs: Array, slack: Array) -> Array:
-        """Return the derivative `(N, n)` [m/rad] of the slack `(N,)` at joint positions `(N, n)` [rad]."""
-        tips, axes = self.kinematics.tips(qs)
+    def compute_gradients(self, qs: Array, slack: Array) -> Array:
+        """Return the derivatives `(N, n)` [m/rad] of the slack `(N,)` by joint positions `(N, n)` [rad]."""
+        tips, axes = self.kinematics.compute_tips_and_axes(qs)
         count = qs.shape[1]
-        moved_qs = (qs[:, None] + _JOINT_DIFFERENCE * np.eye(count)).reshape(-1, count)
-        moved_tips, moved_axes = (values.reshape(-1, count, 3) for values in self.kinematics.tips(moved_qs))
-        changes = self.clearance.slopes(tips, axes, self.discs, (moved_tips, moved_axes))
-        slopes = changes / _JOINT_DIFFERENCE
-        range_slack = self._range_slack(qs)
+        displaced_qs = (qs[:, None] + _JOINT_DIFFERENCE * np.eye(count)).reshape(-1, count)
+        displaced = self.kinematics.compute_tips_and_axes(displaced_qs)
+        displaced_tips, displaced_axes = (values.reshape(-1, count, 3) for values in displaced)
+        changes = self.clearance.compute_slack_changes(
+            tips, axes, self.discs, (displaced_tips, displaced_axes)
+        )
+        gradients = changes / _JOINT_DIFFERENCE
+        range_slack = self._compute_range_slack(qs)
         row, joint = np.arange(len(qs)), np.argmin(range_slack, axis=1)
-        limited = range_slack[row, joint] <= slack
-        row, joint = row[limited], joint[limited]
+        is_range_nearer = range_slack[row, joint] <= slack
+        row, joint = row[is_range_nearer], joint[is_range_nearer]
         middle = (self.kinematics.joint_range.lower + self.kinematics.joint_range.upper) / 2
-        slopes[row] = 0.0
-        slopes[row, joint] = -np.sign((qs - middle)[row, joint])
-        return slopes
+        gradients[row] = 0.0
+        gradients[row, joint] = -np.sign((qs - middle)[row, joint])
+        return gradients
 
-    def _range_slack(self, qs: Array) -> Array:
-        return -self.kinematics.joint_range.shrink(LIMIT_MARGIN).excess(qs)
+    def _compute_range_slack(self, qs: Array) -> Array:
+        """Return the distance of each joint from its limits, less a margin `(N, n)` [rad]."""
+        return -self.kinematics.joint_range.shrink(LIMIT_MARGIN).compute_excess(qs)
 
 
 class Optimizer:
@@ -94,75 +102,75 @@ class Optimizer:
 
     Args:
         problem: The optimization problem.
-        first: Joint positions `(M, n)` [rad] of a motion between the states, at the places of a course.
+        initial_qs: Samples `(M, n)` [rad] of a motion between the states, at `SAMPLE_FRACTIONS`.
         duration: Duration of this motion [s].
 
     Attributes:
-        cost: Duration of the best course, and the cost of its violated distances [s].
+        cost: Duration of the best motion, plus the cost of its violated constraints [s].
 
     Raises:
-        NoProfile: No course approximates the first motion.
+        NoProfile: The initial motion cannot be approximated within the joint limits.
     """
 
-    def __init__(self, problem: Problem, first: Array, duration: float) -> None:
+    def __init__(self, problem: OptimizationProblem, initial_qs: Array, duration: float) -> None:
         self._problem = problem
         self._transcription = Transcription(problem.start, problem.end, problem.connector.limits)
-        course = self._transcription.fit(FIRST_DURATION_SHARE * duration / STEP_COUNT, first)
-        if course is None:
-            raise NoProfile("no course approximates the motion that stops at corners")
-        self._best, self.cost, self._trust = course, np.inf, FIRST_TRUST
-        self._payload_demands: list[Demand] = []
-        self._evaluate(course)
+        motion = self._transcription.fit(INITIAL_DURATION_FRACTION * duration / STEP_COUNT, initial_qs)
+        if motion is None:
+            raise NoProfile("no motion inside the joint limits approximates the motion that stops at corners")
+        self._best, self.cost, self._trust_radius = motion, np.inf, INITIAL_TRUST_RADIUS
+        self._payload_constraints: list[LinearizedConstraints] = []
+        self._evaluate(motion)
 
-    def improve(self, steps: int) -> None:
-        """Take up to `steps` steps."""
-        for _ in range(steps):
-            rows = np.nonzero(self._slack < MAX_DISTANCE)[0]
+    def improve(self, max_step_count: int) -> None:
+        """Take up to `max_step_count` optimization steps."""
+        for _ in range(max_step_count):
+            rows = np.nonzero(self._slack < MAX_SLACK)[0]
             slack = self._slack[rows]
-            slopes = self._problem.slopes(self._last.qs[rows], slack)
-            distances = Demand(slack, rows[:, None], slopes[:, None], np.zeros(len(rows)))
-            demands = [distances, *self._payload_demands]
-            course = self._transcription.shorten(self._last, demands, self._trust)
-            if course is None:
+            gradients = self._problem.compute_gradients(self._last.qs[rows], slack)
+            distances = LinearizedConstraints(slack, rows[:, None], gradients[:, None], np.zeros(len(rows)))
+            constraints = [distances, *self._payload_constraints]
+            motion = self._transcription.shorten(self._last, constraints, self._trust_radius)
+            if motion is None:
                 return
-            self._trust *= TRUST_DECAY
-            self._evaluate(course)
+            self._trust_radius *= TRUST_RADIUS_FACTOR
+            self._evaluate(motion)
 
-    def _evaluate(self, course: JointCourse) -> None:
-        """Make `course` the last course, and the best course if its cost is lowest."""
-        self._last, self._slack = course, self._problem.slack(course.qs)
+    def _evaluate(self, motion: DiscreteMotion) -> None:
+        """Make `motion` the last motion, and also the best motion if its cost is the lowest."""
+        self._last, self._slack = motion, self._problem.compute_slack(motion.qs)
         violations = [-float(self._slack.min())]
         if self._problem.payload is not None:
-            time = course.step / SAMPLES_PER_STEP
-            demand = self._problem.payload.demand(course.qs, time, MAX_DISTANCE)
-            violations.append(-float(demand.slack.min(initial=MAX_DISTANCE)))
-            self._payload_demands = [demand]
-        cost = course.duration + VIOLATION_COST * max(0.0, *violations)
+            sample_time = motion.step / SAMPLES_PER_STEP
+            constraints = self._problem.payload.linearize(motion.qs, sample_time, MAX_SLACK)
+            violations.append(-float(constraints.slack.min(initial=MAX_SLACK)))
+            self._payload_constraints = [constraints]
+        cost = motion.duration + VIOLATION_COST * max(0.0, *violations)
         if cost < self.cost:
-            self._best, self.cost = course, cost
+            self._best, self.cost = motion, cost
 
-    def connect_states(self, exactly: bool) -> tuple[PointToPoint, ...]:
-        """Return the best course as motions between its states.
+    def connect_states(self, *, is_exact: bool) -> tuple[PointToPoint, ...]:
+        """Return the best motion as point-to-point motions between its states.
 
         Args:
-            exactly: True to connect the states of all half steps within the times of the course; False to
-                connect the states of all steps as fast as possible, on a slightly different path.
+            is_exact: True to connect the states at all half steps in the times of the best motion; False to
+                connect the states at all steps as fast as possible, on a slightly different path.
 
         Raises:
             NoProfile: No motion connects two of the states.
         """
-        min_duration = self._best.step / 2 if exactly else None
+        min_duration = self._best.step / 2 if is_exact else None
         states = [
             _limit_velocity(state, self._problem.connector.limits)
-            for state in self._transcription.states(self._best)[:: 1 if exactly else 2]
+            for state in self._transcription.compute_states(self._best)[:: 1 if is_exact else 2]
         ]
         return tuple(self._problem.connector.connect(a, b, min_duration) for a, b in pairwise(states))
 
 
 def _limit_velocity(state: JointState, limits: JointLimits) -> JointState:
-    """Return the nearest state through which a motion can pass without exceeding a velocity limit.
+    """Return the state with a velocity that lets a motion pass the state within the velocity limits.
 
-    An acceleration `a` changes the velocity by `a² / 2 j` until it has fallen to 0.
+    While an acceleration `a` falls to 0 with the maximum jerk `j`, it changes the velocity by `a² / 2 j`.
     """
     max_velocity = limits.velocity - state.qdd**2 / (2 * limits.jerk)
     return state._replace(qd=np.clip(state.qd, -max_velocity, max_velocity))

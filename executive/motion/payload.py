@@ -1,4 +1,4 @@
-"""Acceleration limit due to the load: the seal must hold with a safety factor."""
+"""Acceleration limit due to the load: the seal of the suction cup must hold with a safety factor."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from executive.cell.objects import Load
 from executive.geometry import GRAVITY, Array
 from executive.motion.arm_model import Kinematics
 from executive.motion.trajectory import Trajectory
-from executive.motion.transcription import SAMPLES_PER_STEP, Demand
+from executive.motion.transcription import SAMPLES_PER_STEP, LinearizedConstraints
 
 SAFETY_FACTOR = 2.0
-"""Ratio of the force that a seal bears to the largest force on the seal during a motion."""
+"""Ratio of the maximum force that a seal withstands to the largest force on the seal during a motion."""
 DISTANCE_PER_ACCELERATION = 0.02
-"""Distance in a demand that is equivalent to an acceleration of 1 m/s² [m]."""
-POSITION_STRIDE = 4
-"""Distance between the positions of a course in a demand; a divisor of `SAMPLES_PER_STEP`."""
+"""Factor that converts accelerations to distances in the constraints of the optimizer [m per m/s²]."""
+SAMPLE_STRIDE = 4
+"""Interval between the samples at which the constraints are evaluated; a divisor of `SAMPLES_PER_STEP`."""
 _SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])
 _JOINT_DIFFERENCE = 1e-4  # [rad]
 MIN_LIFT_ACCELERATION = 0.5
-"""Acceleration for lifting a load if its seal hardly bears the weight [m/s²]."""
-MIN_ACCELERATION_SHARE = 0.2
-"""Minimum share of the planned accelerations, also for a load whose seal bears less."""
+"""Lower limit of the maximum acceleration of a lift, even if the seal withstands less [m/s²]."""
+MIN_ACCELERATION_FRACTION = 0.2
+"""Minimum fraction of the planned accelerations after a slowdown, even if the seal withstands less."""
 
 
 class PayloadLimit:
-    """Acceleration limit of a load: its seal bears weight and inertia with the safety factor.
+    """Acceleration limit of a load, whose seal must withstand weight and inertia with the safety factor.
 
-    The force on the seal is `m |a + g|`, with the acceleration `a` of the centre of the load.
+    The force on the seal is `m |a + g|`, with the mass `m` of the load, the acceleration `a` of its centre,
+    and `g` = 9.81 m/s² upwards.
 
     Args:
         load: Object in the tool.
@@ -38,68 +39,69 @@ class PayloadLimit:
     """
 
     def __init__(self, load: Load, kinematics: Kinematics) -> None:
-        self._max_pull = load.holding_force / SAFETY_FACTOR / load.kind.mass  # force per mass [m/s²]
+        self._max_pull = load.holding_force / SAFETY_FACTOR / load.kind.mass  # maximum of |a + g| [m/s²]
         self._centre_offset = load.kind.height / 2
         self._kinematics = kinematics
 
     @property
-    def lift(self) -> float:
-        """Maximum acceleration straight up [m/s²]."""
+    def max_lift_acceleration(self) -> float:
+        """Maximum upward acceleration [m/s²]."""
         return max(self._max_pull - GRAVITY, MIN_LIFT_ACCELERATION)
 
-    def share(self, trajectory: Trajectory) -> float:
-        """Return the share of its accelerations at which a motion keeps the safety factor, at most 1."""
-        centres = self._load_centres(trajectory.samples.q)
+    def find_acceleration_fraction(self, trajectory: Trajectory) -> float:
+        """Return the largest factor on the accelerations of a motion, 0 to 1, with the safety factor kept."""
+        centres = self._locate_load(trajectory.samples.q)
         if len(centres) < 4:
             return 1.0
         # The interval before the last sample is shorter than a control step.
         acceleration = np.diff(centres[:-1], n=2, axis=0) / STEP**2
-        return float(np.min(_allowed_shares(acceleration, self._max_pull)))
+        return float(np.min(_find_acceleration_fractions(acceleration, self._max_pull)))
 
     def slow_down(self, trajectory: Trajectory) -> Trajectory:
         """Return the motion, slowed down so that it keeps the safety factor if possible."""
-        share = self.share(trajectory)
-        # Accelerations are proportional to the square of the rate.
-        rate = math.sqrt(max(share, MIN_ACCELERATION_SHARE))
-        return trajectory if share >= 1 else trajectory.slow_down(rate)
+        fraction = self.find_acceleration_fraction(trajectory)
+        # Accelerations are proportional to the square of the speed.
+        speed_factor = math.sqrt(max(fraction, MIN_ACCELERATION_FRACTION))
+        return trajectory if fraction >= 1 else trajectory.slow_down(speed_factor)
 
-    def demand(self, qs: Array, time: float, max_slack: float) -> Demand:
-        """Return the demand of the seal on the positions of a course.
+    def linearize(self, qs: Array, sample_time: float, max_slack: float) -> LinearizedConstraints:
+        """Return the constraints that keep the seal closed, linearized about a motion.
 
         Args:
-            qs: Joint positions `(M, n)` [rad].
-            time: Time between two positions [s].
-            max_slack: Largest slack in the demand [m]; `DISTANCE_PER_ACCELERATION` converts accelerations.
+            qs: Samples of the joint positions `(M, n)` [rad] of the motion, without start and end.
+            sample_time: Time between two samples [s].
+            max_slack: Constraints with a larger slack are omitted [m].
         """
-        # The positions include the ends of the steps of the course, where the acceleration has its extrema.
-        rows = np.arange(POSITION_STRIDE - 1, len(qs) - 1, POSITION_STRIDE)[:, None] + np.array([-1, 0, 1])
-        centres = self._load_centres(qs)
-        acceleration = _SECOND_DIFFERENCE @ centres[rows] / time**2
+        # The chosen samples include the ends of the time steps, where the acceleration has its extrema.
+        rows = np.arange(SAMPLE_STRIDE - 1, len(qs) - 1, SAMPLE_STRIDE)[:, None] + np.array([-1, 0, 1])
+        centres = self._locate_load(qs)
+        acceleration = _SECOND_DIFFERENCE @ centres[rows] / sample_time**2
         pull = acceleration + np.array([0.0, 0.0, GRAVITY])
-        strength = np.linalg.norm(pull, axis=1)
-        slack = DISTANCE_PER_ACCELERATION * (self._max_pull - strength)
+        magnitude = np.linalg.norm(pull, axis=1)
+        slack = DISTANCE_PER_ACCELERATION * (self._max_pull - magnitude)
         chosen = np.nonzero(slack < max_slack)[0]
-        rows, direction = rows[chosen], pull[chosen] / strength[chosen, None]
-        moved = qs[rows][:, :, None] + _JOINT_DIFFERENCE * np.eye(qs.shape[1])
-        moved_centres = self._load_centres(moved.reshape(-1, qs.shape[1])).reshape(*moved.shape[:3], 3)
-        jacobian = (moved_centres - centres[rows][:, :, None]) / _JOINT_DIFFERENCE
+        rows, direction = rows[chosen], pull[chosen] / magnitude[chosen, None]
+        displaced_qs = qs[rows][:, :, None] + _JOINT_DIFFERENCE * np.eye(qs.shape[1])
+        displaced_centres = self._locate_load(displaced_qs.reshape(-1, qs.shape[1]))
+        displaced_centres = displaced_centres.reshape(*displaced_qs.shape[:3], 3)
+        jacobian = (displaced_centres - centres[rows][:, :, None]) / _JOINT_DIFFERENCE
         projected = np.einsum("k,rkjx,rx->rkj", _SECOND_DIFFERENCE, jacobian, direction)
-        slopes = -DISTANCE_PER_ACCELERATION / time**2 * projected
+        gradients = -DISTANCE_PER_ACCELERATION / sample_time**2 * projected
         # If the same positions take more time, accelerations fall with the square of the time.
-        along = np.einsum("rx,rx->r", direction, acceleration[chosen])
-        growth = 2 * DISTANCE_PER_ACCELERATION * along / (SAMPLES_PER_STEP * time)
-        return Demand(slack[chosen], rows, slopes, growth)
+        along_pull = np.einsum("rx,rx->r", direction, acceleration[chosen])
+        step_derivatives = 2 * DISTANCE_PER_ACCELERATION * along_pull / (SAMPLES_PER_STEP * sample_time)
+        return LinearizedConstraints(slack[chosen], rows, gradients, step_derivatives)
 
-    def _load_centres(self, qs: Array) -> Array:
-        """Return the centre of the load at joint positions `(N, n)` as `(N, 3)` [m]."""
-        tips, axes = self._kinematics.tips(qs)
+    def _locate_load(self, qs: Array) -> Array:
+        """Return the centre of the load `(N, 3)` [m] at joint positions `(N, n)` [rad]."""
+        tips, axes = self._kinematics.compute_tips_and_axes(qs)
         return np.asarray(tips + self._centre_offset * axes)
 
 
-def _allowed_shares(acceleration: Array, max_pull: float) -> Array:
-    """Return the largest `k`, 0 to 1, with `|k a + g| <= max_pull` [m/s²] for accelerations `a` `(N, 3)`."""
-    square = np.sum(acceleration**2, axis=1) + 1e-12
-    along = GRAVITY * acceleration[:, 2]
-    discriminant = along**2 - square * (GRAVITY**2 - max_pull**2)
-    shares = (np.sqrt(np.maximum(discriminant, 0.0)) - along) / square
-    return np.clip(np.where(discriminant < 0, 0.0, shares), 0.0, 1.0)
+def _find_acceleration_fractions(accelerations: Array, max_pull: float) -> Array:
+    """Return the largest `k`, 0 to 1, with `|k a + g| <= max_pull` for accelerations `a` `(N, 3)` [m/s²]."""
+    square = np.sum(accelerations**2, axis=1) + 1e-12
+    product = GRAVITY * accelerations[:, 2]
+    discriminant = product**2 - square * (GRAVITY**2 - max_pull**2)
+    fractions = (np.sqrt(np.maximum(discriminant, 0.0)) - product) / square
+    return np.clip(np.where(discriminant < 0, 0.0, fractions), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Plans that are computed at once, and known after the planning time on the clock of the run."""
+"""Motion plans that are computed immediately and become ready after the planning time of the cell."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ M = TypeVar("M", bound=Motion)
 
 @dataclass(frozen=True, eq=False)
 class Plan(Generic[M]):
-    """A motion in planning; implements `executive.cell.arm.Planning`.
+    """Planning of a motion, in progress or finished; implements `executive.cell.arm.Planning`.
 
     Attributes:
         clock: Clock of the run.
-        due: Time at which the outcome is known [s].
+        ready_time: Time at which the planning is finished [s].
         outcome: The motion, or the error of the planner.
     """
 
     clock: Clock
-    due: float
+    ready_time: float
     outcome: M | Unreachable | Blocked
 
     @property
     def ready(self) -> bool:
-        """True from the control step at the time `due`."""
-        return self.clock.now >= self.due - self.clock.step / 2
+        """True from the control step at `ready_time`."""
+        return self.clock.now >= self.ready_time - self.clock.step / 2
 
     def result(self) -> M:
         """Return the motion.
@@ -47,46 +47,46 @@ class Plan(Generic[M]):
         return self.outcome
 
 
-class Plans(Generic[M]):
-    """Makes the plans of an arm, at most one of them ahead, and emits an event for each requested plan.
+class PlanFactory(Generic[M]):
+    """Makes the plans of an arm, keeps at most one plan for a later request, and emits the requested plans.
 
     Args:
-        solve: Plans a motion from joint positions at rest `(n,)` [rad]; raises Unreachable and Blocked.
+        planner: Plans a motion from joint positions `(n,)` [rad] at rest; raises Unreachable and Blocked.
         clock: Clock of the run.
-        latency: Time for planning a motion on the clock of the run [s].
-        emit: Emits an event.
+        planning_time: Time from the request of a plan until the plan is ready [s].
+        emit: Function that receives the events.
     """
 
     def __init__(
-        self, solve: Callable[[Array, Goal | str, Task], M], clock: Clock, latency: float, emit: Emit
+        self, planner: Callable[[Array, Goal | str, Task], M], clock: Clock, planning_time: float, emit: Emit
     ) -> None:
-        self._solve = solve
+        self._plan_motion = planner
         self._clock = clock
-        self._latency = latency
+        self._planning_time = planning_time
         self._emit = emit
-        self._query_ahead: tuple[bytes, Goal | str, Task] | None = None
-        self._plan_ahead: Plan[M] | None = None
+        self._stored_query: tuple[bytes, Goal | str, Task] | None = None
+        self._stored_plan: Plan[M] | None = None
 
     def plan_ahead(self, start: Array, goal: Goal | str, task: Task) -> None:
-        """Plan a motion from `start` `(n,)` [rad] before the motion is requested."""
+        """Plan a motion from `start` `(n,)` [rad], and store the plan for a later call of `plan`."""
         query = start.tobytes(), goal, task
-        if query != self._query_ahead:
-            self._query_ahead, self._plan_ahead = query, self._plan(start, goal, task)
+        if query != self._stored_query:
+            self._stored_query, self._stored_plan = query, self._make_plan(start, goal, task)
 
     def plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
-        """Return the plan of a motion from `start` `(n,)` [rad], which may have been planned ahead."""
-        ahead = self._plan_ahead if (start.tobytes(), goal, task) == self._query_ahead else None
-        plan = ahead or self._plan(start, goal, task)
-        self._query_ahead = self._plan_ahead = None
+        """Return the plan of a motion from `start` `(n,)` [rad], if possible the plan of `plan_ahead`."""
+        stored = self._stored_plan if (start.tobytes(), goal, task) == self._stored_query else None
+        plan = stored or self._make_plan(start, goal, task)
+        self._stored_query = self._stored_plan = None
         duration = 0.0 if isinstance(plan.outcome, Exception) else plan.outcome.duration
-        wait_time = max(0.0, plan.due - self._clock.now)
-        self._emit(MotionPlanned(ahead is not None, round(wait_time, 4), round(duration, 4)))
+        wait_time = max(0.0, plan.ready_time - self._clock.now)
+        self._emit(MotionPlanned(stored is not None, round(wait_time, 4), round(duration, 4)))
         return plan
 
-    def _plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
+    def _make_plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
         outcome: M | Unreachable | Blocked
         try:
-            outcome = self._solve(start, goal, task)
+            outcome = self._plan_motion(start, goal, task)
         except (Unreachable, Blocked) as error:
             outcome = error
-        return Plan(self._clock, self._clock.now + self._latency, outcome)
+        return Plan(self._clock, self._clock.now + self._planning_time, outcome)

@@ -1,7 +1,7 @@
 """Time-optimal, jerk-limited motion of all joints between two states, by ruckig.
 
-Each joint has its own profile. The slowest joint determines the duration, and the other joints take as long.
-The path between the states is a result: the caller must check its positions.
+Each joint has its own velocity profile, and all profiles have the duration of the slowest joint. The path
+between the states is not prescribed, so that the caller must check its joint positions.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.state import JointState
 
-_ROUNDING_ERROR = 1e-9  # share of a limit
+_ROUNDING_ERROR = 1e-9  # fraction of a limit
 
 
 class NoProfile(ValueError):
-    """No motion inside the limits connects the given states."""
+    """No velocity profile inside the joint limits connects the given states."""
 
 
 class PointToPoint:
-    """A motion from state to state; implements `executive.motion.state.Piece`."""
+    """A motion from state to state; implements `executive.motion.state.MotionPiece`."""
 
     def __init__(self, profile: Profile) -> None:
         self._profile = profile
         self.duration: float = profile.duration
 
-    def at(self, s: float) -> JointState:
-        """Return the state at time `s`, 0 to `duration` [s]."""
-        return JointState(*map(np.array, self._profile.at_time(s)))
+    def state_at(self, time: float) -> JointState:
+        """Return the state at `time`, 0 to `duration` [s]."""
+        return JointState(*map(np.array, self._profile.at_time(time)))
 
-    def over(self, times: Array) -> JointState:
+    def sample(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
-        return JointState(*np.array([self._profile.at_time(s) for s in times.tolist()]).swapaxes(0, 1))
+        return JointState(*np.array([self._profile.at_time(t) for t in times.tolist()]).swapaxes(0, 1))
 
 
 class Connector:
@@ -52,11 +52,11 @@ class Connector:
     def connect(self, start: JointState, end: JointState, min_duration: float | None = None) -> PointToPoint:
         """Return the fastest motion from `start` to `end` that takes at least `min_duration` [s].
 
-        The joint positions on the way are not limited.
+        The joint positions between the states are not limited.
 
         Raises:
-            NoProfile: There is no such motion, for instance because a velocity is outside the limits.
-            Fault: A state lacks a finite number for each joint; ruckig would read out of bounds or crash.
+            NoProfile: No motion exists, for example because the velocity of a state exceeds its limit.
+            Fault: A state lacks a finite number for a joint; ruckig would read out of bounds or crash.
         """
         count = self.limits.joint_count
         for values in (*start, *end):
@@ -78,7 +78,7 @@ class Connector:
         else:
             if result not in (Result.Working, Result.Finished):
                 problem = result
-            elif np.any(_max_speeds(profile) > (1 + _ROUNDING_ERROR) * self.limits.velocity):
+            elif np.any(_find_max_speeds(profile) > (1 + _ROUNDING_ERROR) * self.limits.velocity):
                 problem = "its profile exceeds a velocity limit"
         if problem is not None:
             states = f"from {start.q.round(4)} to {end.q.round(4)} rad"
@@ -86,7 +86,7 @@ class Connector:
         return PointToPoint(profile)
 
 
-def _max_speeds(profile: Profile) -> Array:
+def _find_max_speeds(profile: Profile) -> Array:
     """Return the largest speed of each joint `(n,)` [rad/s].
 
     ruckig does not always check the speed at which an acceleration changes its sign within a phase.

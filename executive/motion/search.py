@@ -1,4 +1,4 @@
-"""Search for motions, the best first: direct motions, optimized detours, and motions with corners."""
+"""Search for motions, the best first: direct motions, optimized detours, and motions that stop at corners."""
 
 from __future__ import annotations
 
@@ -14,33 +14,38 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
-from executive.motion.arm_model import Configuration, Kinematics
+from executive.motion.arm_model import BranchKey, Kinematics
 from executive.motion.candidates import Candidate, find_candidates
-from executive.motion.cartesian_line import CHAIN_LENGTH, CartesianLine
-from executive.motion.clearance_model import ClearanceModel, discs_below_flange
+from executive.motion.cartesian_line import WAYPOINT_COUNT, CartesianLine
+from executive.motion.clearance_model import ClearanceModel, make_tool_discs
+from executive.motion.configurations import find_vertical_waypoints, solve_vertical_waypoints
 from executive.motion.limits import JointLimits
-from executive.motion.optimizer import Optimizer, Problem
+from executive.motion.optimizer import OptimizationProblem, Optimizer
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import Connector, NoProfile
-from executive.motion.postures import find_vertical_line, solve_vertical_line
-from executive.motion.state import JointState, Piece
+from executive.motion.state import JointState, MotionPiece
 from executive.motion.trajectory import Trajectory, sample_pieces
-from executive.motion.transcription import SAMPLE_SHARES
+from executive.motion.transcription import SAMPLE_FRACTIONS
 
 MAX_CANDIDATES = 3
 """Maximum number of candidates for the end of a motion."""
-FIRST_STEPS, FURTHER_STEPS = 4, 8
-"""Optimization steps for the detour to each candidate, and for each detour before it is checked."""
+INITIAL_STEP_COUNT = 4
+"""Number of optimization steps for the detour to each candidate."""
+REFINEMENT_STEP_COUNT = 8
+"""Number of further optimization steps for a detour before it is returned."""
 EXTRA_HEIGHTS = (0.0, 0.05, 0.10)
-"""Heights above the travel height of a motion with corners, in the order of the attempts [m]."""
+"""Heights of the corners above the travel height, in the order of the attempts [m]."""
 LIFT_OFF_DISTANCE = 5e-4
 """Length of the straight motion upwards that separates a load from the surface below [m]."""
 MIN_COSINE_DOWN = 0.99
-"""Minimum cosine between the tool axis and straight down for a motion that first rises."""
+"""Minimum cosine between the tool axis and straight down for a motion that begins with a rise."""
 
 
 class Search:
-    """Search for the motion of one query.
+    """Search for a motion between two joint configurations, or from one to a goal.
+
+    A motion consists of an optional straight departure upwards, a free part (joint motion), and an optional
+    straight arrival downwards.
 
     Args:
         config: Content of the cell file.
@@ -48,7 +53,7 @@ class Search:
         limits: Joint limits of the arm.
         start: Joint positions at the start `(n,)` [rad].
         end: A goal, or joint positions at the end `(n,)` [rad].
-        task: Load and obstacles; `around` includes the target.
+        task: Load and obstacles of the free part; `around` includes the target.
     """
 
     def __init__(
@@ -65,23 +70,28 @@ class Search:
         self._connector = Connector(limits)
         self._travel_height = compute_travel_height(config)
         self._end = end
-        self._straight = config.motion.straight
-        self._discs = discs_below_flange(config, task.load)
+        self._straight_length = config.motion.straight
+        self._discs = make_tool_discs(config, task.load)
         if not isinstance(end, Goal) and task.load is None:
-            # The arm must be able to return to a named pose from any posture.
+            # Without a load, the tool may tilt: the arm must reach named poses from any configuration.
             self._discs = self._discs._replace(min_cosine=-1.0)
         self._payload = PayloadLimit(task.load, kinematics) if task.load else None
-        tips, axes = map(np.concatenate, zip(kinematics.tips(start[None]), self._free_end(), strict=True))
+        tips, axes = map(
+            np.concatenate,
+            zip(kinematics.compute_tips_and_axes(start[None]), self._find_free_end(), strict=True),
+        )
         self._clearance = ClearanceModel(config, task.around, tips[:, :2])
-        self._clearance.relax(tips, axes, self._discs)
-        self._rises: dict[tuple[float, bool], tuple[list[Piece], JointState]] = {}
+        self._clearance.relax_end_margins(tips, axes, self._discs)
+        self._rises: dict[tuple[float, bool], tuple[list[MotionPiece], JointState]] = {}
         self._departure = self._plan_departure(start, float(tips[0, 2]))
         self._start = (
-            self._departure.at(self._departure.duration) if self._departure else JointState.rest(start)
+            self._departure.state_at(self._departure.duration)
+            if self._departure
+            else JointState.at_rest(start)
         )
 
     def list_motions(self) -> Iterator[Trajectory]:
-        """Yield motions, the best first: direct and optimized ones, then those that stop at corners."""
+        """Yield motions, the best first: direct and optimized motions, then motions that stop at corners."""
         candidates = list(islice(self._list_candidates(), MAX_CANDIDATES))
         yield from self._list_direct_and_optimized(candidates)
         for extra_height in EXTRA_HEIGHTS:
@@ -90,102 +100,105 @@ class Search:
                     corners = self._connect_with_corners(candidate, extra_height, is_straight=True)
                     yield self._build_motion(candidate, *corners)
 
-    def require_clear(self, qs: Array) -> None:
-        """Raise an error if a state `(N, n)` [rad] is too near to known or undetected objects.
+    def require_clearance(self, qs: Array) -> None:
+        """Check that joint positions `(N, n)` [rad] keep the required distances from obstacles.
 
         Raises:
-            Blocked: A state is too near to an object.
+            Blocked: A distance is too small.
         """
-        self._clearance.require_clear(*self._kinematics.tips(qs), self._discs)
+        self._clearance.require_clearance(*self._kinematics.compute_tips_and_axes(qs), self._discs)
 
-    def _free_end(self) -> tuple[Array, Array]:
+    def _find_free_end(self) -> tuple[Array, Array]:
         """Return tool centre point [m] and tool axis, `(1, 3)` each, at the end of the free part."""
         if not isinstance(self._end, Goal):
-            return self._kinematics.tips(self._end[None])
+            return self._kinematics.compute_tips_and_axes(self._end[None])
         x, y, z = self._end.position
         return np.array([[x, y, z + self._end.guarded]]), np.array([[0.0, 0.0, -1.0]])
 
     def _list_candidates(self) -> Iterator[Candidate]:
         if not isinstance(self._end, Goal):
-            yield Candidate(0.0, JointState.rest(self._end), None, None)
+            yield Candidate(0.0, JointState.at_rest(self._end), None, None)
             return
-        length = self._end.guarded or self._straight
+        length = self._end.guarded or self._straight_length
         yield from find_candidates(self._kinematics, self._limits, self._start, self._end, length)
 
     def _list_direct_and_optimized(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
-        """Yield direct motions without collision, and optimized detours."""
-        direct, optimizers = self._evaluate(candidates)
+        """Yield direct motions without collision and optimized detours, the fastest first."""
+        direct, optimizers = self._evaluate_candidates(candidates)
         for candidate, optimizer in optimizers:
-            optimizer.improve(FURTHER_STEPS)
-            while direct and direct[0][0] <= _total_cost(candidate, optimizer):
+            optimizer.improve(REFINEMENT_STEP_COUNT)
+            while direct and direct[0][0] <= _compute_total_cost(candidate, optimizer):
                 yield direct.pop(0)[1]
             yield from self._sort_optimized(candidate, optimizer)
         yield from (motion for _, motion in direct)
 
     def _sort_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterable[Trajectory]:
-        """Return the motions on an optimized course; with a load, the fastest with a safe seal first."""
+        """Return the optimized motions to a candidate; with a load, in the order of their safe durations."""
         motions, payload = self._list_optimized(candidate, optimizer), self._payload
         if payload is None:
             return motions
         return sorted(motions, key=lambda motion: payload.slow_down(motion).duration)
 
     def _list_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterator[Trajectory]:
-        for exactly in (False, True):
+        for is_exact in (False, True):
             with contextlib.suppress(NoProfile):
-                yield self._build_motion(candidate, *optimizer.connect_states(exactly))
+                yield self._build_motion(candidate, *optimizer.connect_states(is_exact=is_exact))
 
-    def _evaluate(
+    def _evaluate_candidates(
         self, candidates: Sequence[Candidate]
     ) -> tuple[list[tuple[float, Trajectory]], list[tuple[Candidate, Optimizer]]]:
-        """Return the direct motions without collision, and the optimizers of detours to other candidates.
+        """Return direct motions without collision, and optimizers of the detours to other candidates.
 
-        Both lists begin with the fastest motion. A direct motion is in a pair with its duration [s].
+        Both lists begin with the fastest motion. Each direct motion is in a pair `(duration [s], motion)`.
         """
         direct: list[tuple[float, Trajectory]] = []
         optimizers: list[tuple[Candidate, Optimizer]] = []
         for candidate in candidates:
-            costs = [duration for duration, _ in direct] + [_total_cost(*pair) for pair in optimizers]
+            costs = [duration for duration, _ in direct] + [_compute_total_cost(*pair) for pair in optimizers]
             if min(costs, default=math.inf) <= candidate.min_duration + candidate.arrival_duration:
                 break
-            problem = Problem(
+            problem = OptimizationProblem(
                 self._start, candidate.entry, self._connector, self._kinematics, self._clearance,
                 self._discs, self._payload,
             )  # fmt: skip
             with contextlib.suppress(NoProfile, Unreachable):
-                free = self._connector.connect(self._start, candidate.entry)
-                if problem.slack(free.over(SAMPLE_SHARES * free.duration).q).min() >= 0:
-                    motion = self._build_motion(candidate, free)
-                    direct.append((free.duration + candidate.arrival_duration, motion))
+                free_part = self._connector.connect(self._start, candidate.entry)
+                qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
+                if problem.compute_slack(qs).min() >= 0:
+                    motion = self._build_motion(candidate, free_part)
+                    direct.append((free_part.duration + candidate.arrival_duration, motion))
                     continue
                 corners = self._connect_with_corners(candidate, EXTRA_HEIGHTS[0], is_straight=False)
                 duration = sum(piece.duration for piece in corners)
-                optimizer = Optimizer(problem, sample_pieces(corners, SAMPLE_SHARES * duration).q, duration)
-                optimizer.improve(FIRST_STEPS)
+                optimizer = Optimizer(
+                    problem, sample_pieces(corners, SAMPLE_FRACTIONS * duration).q, duration
+                )
+                optimizer.improve(INITIAL_STEP_COUNT)
                 optimizers.append((candidate, optimizer))
         direct.sort(key=lambda pair: pair[0])
-        optimizers.sort(key=lambda pair: _total_cost(*pair))
+        optimizers.sort(key=lambda pair: _compute_total_cost(*pair))
         return direct, optimizers
 
-    def _build_motion(self, candidate: Candidate, *free: Piece) -> Trajectory:
-        """Return the motion of a straight departure, the free part, and a straight arrival."""
-        pieces = (self._departure, *free) if self._departure else free
-        guarded = math.inf
+    def _build_motion(self, candidate: Candidate, *free_part: MotionPiece) -> Trajectory:
+        """Return the motion that consists of departure, free part, and arrival."""
+        pieces = (self._departure, *free_part) if self._departure else free_part
+        guarded_start_time = math.inf
         if isinstance(self._end, Goal) and self._end.guarded > 0:
-            guarded = sum(piece.duration for piece in pieces)
-        return Trajectory((*pieces, candidate.arrival) if candidate.arrival else pieces, guarded)
+            guarded_start_time = sum(piece.duration for piece in pieces)
+        return Trajectory((*pieces, candidate.arrival) if candidate.arrival else pieces, guarded_start_time)
 
     def _connect_with_corners(
         self, candidate: Candidate, extra_height: float, *, is_straight: bool
-    ) -> list[Piece]:
-        """Return a free part that stops above the start and above the goal.
+    ) -> list[MotionPiece]:
+        """Return a free part that stops at two corners: above the start and above the goal.
 
         Args:
             candidate: The end of the motion.
             extra_height: Height of the corners above the travel height [m].
-            is_straight: True for vertical motions of the tool if possible, which need more computation.
+            is_straight: True if the tool rises and descends on vertical lines if possible.
 
         Raises:
-            Unreachable: A corner is out of reach in the configuration of the candidate.
+            Unreachable: A corner is out of reach in the branch of the candidate.
             NoProfile: No motion connects two of the states.
         """
         connect, height = self._connector.connect, self._travel_height + extra_height
@@ -193,59 +206,60 @@ class Search:
             self._rises[height, is_straight] = self._plan_rise(height, is_straight)
         rise, corner = self._rises[height, is_straight]
         (x, y, z), _ = self._find_tip(candidate.entry.q)
-        if candidate.configuration is None or z >= height:
+        if candidate.branch is None or z >= height:
             return [*rise, connect(corner, candidate.entry)]
         if is_straight and candidate.arrival is None:
-            chain = solve_vertical_line(
-                self._kinematics, candidate.entry.q, height - z, CHAIN_LENGTH, candidate.configuration
+            waypoints = solve_vertical_waypoints(
+                self._kinematics, candidate.entry.q, height - z, WAYPOINT_COUNT, candidate.branch
             )
-            line = CartesianLine(chain[::-1], height - z, self._limits)
-            return [*rise, connect(corner, JointState.rest(chain[-1])), line]
-        above = self._solve_corner((x, y, height), candidate.configuration, candidate.entry.q)
-        return [*rise, connect(corner, above), connect(above, candidate.entry)]
+            descent = CartesianLine(waypoints[::-1], height - z, self._limits)
+            return [*rise, connect(corner, JointState.at_rest(waypoints[-1])), descent]
+        goal_corner = self._solve_corner((x, y, height), candidate.branch, candidate.entry.q)
+        return [*rise, connect(corner, goal_corner), connect(goal_corner, candidate.entry)]
 
-    def _plan_rise(self, height: float, is_straight: bool) -> tuple[list[Piece], JointState]:
-        """Return the motion from the start up to a height [m], and the state at its end."""
+    def _plan_rise(self, height: float, is_straight: bool) -> tuple[list[MotionPiece], JointState]:
+        """Return the motion from the start up to a corner at a height [m], and the state at the corner."""
         q, ((x, y, z), points_down) = self._start.q, self._find_tip(self._start.q)
         if not points_down or z >= height:
             return [], self._start
         if is_straight and self._departure is None:
-            chain = find_vertical_line(self._kinematics, q, height - z, CHAIN_LENGTH)
-            if chain is not None:
-                return [CartesianLine(chain, height - z, self._limits)], JointState.rest(chain[-1])
-        above = self._solve_corner((x, y, height), self._kinematics.configuration(q), q)
-        return [self._connector.connect(self._start, above)], above
+            waypoints = find_vertical_waypoints(self._kinematics, q, height - z, WAYPOINT_COUNT)
+            if waypoints is not None:
+                line = CartesianLine(waypoints, height - z, self._limits)
+                return [line], JointState.at_rest(waypoints[-1])
+        corner = self._solve_corner((x, y, height), self._kinematics.find_branch(q), q)
+        return [self._connector.connect(self._start, corner)], corner
 
     def _find_tip(self, q: Array) -> tuple[Array, bool]:
-        """Return the tool centre point `(3,)` [m], and True if the tool points down."""
-        tips, axes = self._kinematics.tips(q[None])
+        """Return the tool centre point `(3,)` [m], and whether the tool points down."""
+        tips, axes = self._kinematics.compute_tips_and_axes(q[None])
         return tips[0], bool(-axes[0, 2] > MIN_COSINE_DOWN)
 
     def _solve_corner(
-        self, position: tuple[float, float, float], configuration: Configuration, q_near: Array
+        self, position: tuple[float, float, float], branch: BranchKey, q_near: Array
     ) -> JointState:
-        """Return the state of rest at a position [m], with the last joint as in `q_near` `(n,)` [rad]."""
-        q = self._kinematics.solve(tool_down(position), configuration)
+        """Return the state of rest at a tool position [m], with the last joint of `q_near` `(n,)` [rad]."""
+        q = self._kinematics.solve(tool_down(position), branch)
         q[-1] = q_near[-1]
-        return JointState.rest(q)
+        return JointState.at_rest(q)
 
     def _plan_departure(self, start: Array, height: float) -> CartesianLine | None:
-        """Return the straight motion upwards from the start, or None.
+        """Return the straight motion upwards from the start, or None if the free part begins at the start.
 
-        The cell file may require a straight departure. A load also departs straight if the seal limits the
-        acceleration: a load that is pressed on the surface below, or dragged over the surface, tears off.
+        The cell file may require a straight departure. A load also departs straight if its seal limits the
+        acceleration, because a load that is pressed on its support or dragged over the support tears off.
         """
-        length = self._straight or (LIFT_OFF_DISTANCE if self._payload else 0.0)
+        length = self._straight_length or (LIFT_OFF_DISTANCE if self._payload else 0.0)
         if not length or height + length > self._travel_height:
             return None
-        chain = find_vertical_line(self._kinematics, start, length, CHAIN_LENGTH)
-        if chain is None:
+        waypoints = find_vertical_waypoints(self._kinematics, start, length, WAYPOINT_COUNT)
+        if waypoints is None:
             return None
-        max_lift = self._payload.lift if self._payload else math.inf
-        line = CartesianLine(chain, length, self._limits, acceleration=max_lift, ends_in_motion=True)
-        return line if self._straight or line.acceleration >= max_lift else None
+        acceleration = self._payload.max_lift_acceleration if self._payload else math.inf
+        line = CartesianLine(waypoints, length, self._limits, acceleration=acceleration, ends_in_motion=True)
+        return line if self._straight_length or line.acceleration >= acceleration else None
 
 
-def _total_cost(candidate: Candidate, optimizer: Optimizer) -> float:
-    """Return the cost of a detour and its arrival [s]."""
+def _compute_total_cost(candidate: Candidate, optimizer: Optimizer) -> float:
+    """Return the cost of a detour plus the duration of the arrival [s]."""
     return optimizer.cost + candidate.arrival_duration

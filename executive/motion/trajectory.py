@@ -1,4 +1,4 @@
-"""Planned motion of the arm: pieces that join with equal position, velocity and acceleration."""
+"""Planned motion of the arm: a sequence of pieces with continuous position, velocity and acceleration."""
 
 from __future__ import annotations
 
@@ -16,72 +16,78 @@ from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
 from executive.motion.point_to_point import NoProfile
-from executive.motion.state import JointState, Piece
+from executive.motion.state import JointState, MotionPiece
 
 _ROUNDING_ERROR = 1e-6
-"""Largest difference of two equal joint states [rad, rad/s, rad/s²]."""
+"""Maximum difference of joint states that count as equal [rad, rad/s, rad/s²]."""
 
 
 class Trajectory:
-    """A motion of all joints, at rest at both ends; implements `cell.arm.Motion`.
+    """A motion of `n` joints, at rest at both ends; implements `executive.cell.arm.Motion`.
 
     Attributes:
         duration: Time from the start to the final rest [s].
         start: Joint positions at the start `(n,)` [rad].
         end: Joint positions at the end `(n,)` [rad].
-        guarded: Time from which a contact of the tool is expected [s]; infinite: none is.
+        guarded_start_time: Time from which the tool may touch the target [s]; infinite if it must not.
     """
 
-    def __init__(self, pieces: Sequence[Piece], guarded: float = math.inf) -> None:
+    def __init__(self, pieces: Sequence[MotionPiece], guarded_start_time: float = math.inf) -> None:
         """Join one or more pieces.
 
         Raises:
-            Fault: A piece does not start in the final state of the piece before, or an end is not at rest.
+            Fault: A piece does not start in the final state of the previous piece, or an end is not at rest.
         """
-        self.guarded = guarded
+        self.guarded_start_time = guarded_start_time
         self._pieces = tuple(pieces)
-        self._ends = tuple(accumulate(piece.duration for piece in pieces))
-        self.duration = self._ends[-1]
-        first, self._last = pieces[0].at(0.0), pieces[-1].at(pieces[-1].duration)
+        self._end_times = tuple(accumulate(piece.duration for piece in pieces))
+        self.duration = self._end_times[-1]
+        first, self._last = pieces[0].state_at(0.0), pieces[-1].state_at(pieces[-1].duration)
         self.start, self.end = first.q, self._last.q
         for number, (before, after) in enumerate(pairwise(pieces), start=1):
-            _require_same(before.at(before.duration), after.at(0.0), f"pieces {number} and {number + 1}")
-        for state, end in ((first, "start"), (self._last, "end")):
-            _require_same(state, JointState.rest(state.q), f"rest and the {end} of a trajectory")
-
-    def slow_down(self, rate: float) -> Trajectory:
-        """Return the motion on the same path at `rate` times the speed, 0 to 1."""
-        return Trajectory([_SlowPiece(piece, rate) for piece in self._pieces], self.guarded / rate)
-
-    def at(self, s: float) -> JointState:
-        """Return the joint state at path time `s` [s], at rest before the start and after the end."""
-        if not math.isfinite(s):  # ruckig would end the process
-            raise Fault(
-                f"a trajectory has no state at the time {s}; its times are 0 to {self.duration:.3f} s"
+            _require_equal(
+                before.state_at(before.duration), after.state_at(0.0), f"pieces {number} and {number + 1}"
             )
-        if s <= 0 or s >= self.duration:
-            return JointState.rest((self.start if s <= 0 else self.end).copy())
-        number = min(bisect_right(self._ends, s), len(self._pieces) - 1)
-        start_time = self._ends[number - 1] if number else 0.0
-        return self._pieces[number].at(s - start_time)
+        for state, end in ((first, "start"), (self._last, "end")):
+            _require_equal(state, JointState.at_rest(state.q), f"rest and the {end} of a trajectory")
+
+    def slow_down(self, speed_factor: float) -> Trajectory:
+        """Return the motion on the same path with `speed_factor` (0 to 1) times the velocities."""
+        pieces = [_SlowPiece(piece, speed_factor) for piece in self._pieces]
+        return Trajectory(pieces, self.guarded_start_time / speed_factor)
+
+    def state_at(self, time: float) -> JointState:
+        """Return the joint state at `time` [s]; the arm is at rest before time 0 and after `duration`."""
+        if not math.isfinite(time):  # ruckig would end the process
+            raise Fault(
+                f"a trajectory has no state at the time {time}; its times are 0 to {self.duration:.3f} s"
+            )
+        if time <= 0 or time >= self.duration:
+            return JointState.at_rest((self.start if time <= 0 else self.end).copy())
+        index = min(bisect_right(self._end_times, time), len(self._pieces) - 1)
+        start_time = self._end_times[index - 1] if index else 0.0
+        return self._pieces[index].state_at(time - start_time)
 
     @cached_property
     def samples(self) -> JointState:
-        """The states in every control step, and the last state: each array of shape `(N, n)`."""
+        """States at all control steps and at the end, each array of shape `(N, n)`."""
         states = sample_pieces(self._pieces, np.arange(0.0, self.duration, STEP, dtype=np.float64))
         return JointState(*map(np.vstack, zip(states, self._last, strict=True)))
 
-    def check(self, limits: JointLimits) -> JointState:
+    def check_limits(self, limits: JointLimits) -> JointState:
         """Check the limits of every joint, and return the checked states (`samples`).
 
         Raises:
-            Unreachable: A joint would leave its range; the text names the joint.
+            Unreachable: A joint would leave its range; the message names the joint.
             NoProfile: A velocity, acceleration or jerk would exceed its limit.
         """
         states = self.samples
-        # Ruckig's `position_extrema` are too small if a joint turns back (pantor/ruckig issue 215).
+        # The samples are checked, because ruckig's `position_extrema` are too small if a joint turns back
+        # (pantor/ruckig issue 215).
         _require_in_range(states.q, limits)
-        for name, peaks in zip(("velocity", "acceleration", "jerk"), find_peaks(states, limits), strict=True):
+        for name, peaks in zip(
+            ("velocity", "acceleration", "jerk"), compute_peak_fractions(states, limits), strict=True
+        ):
             joint = int(np.argmax(peaks))
             if peaks[joint] > 1 + _ROUNDING_ERROR:
                 raise NoProfile(
@@ -90,60 +96,60 @@ class Trajectory:
         return states
 
 
-def find_peaks(states: JointState, limits: JointLimits) -> Array:
-    """Return the largest velocity, acceleration and jerk of each joint as shares of the limits `(3, n)`.
+def compute_peak_fractions(states: JointState, limits: JointLimits) -> Array:
+    """Return the largest velocity, acceleration and jerk of each joint as fractions of the limits `(3, n)`.
 
-    `states` are the samples of a motion. The jerk before the last sample does not count, because the last
-    interval is shorter than a control step.
+    `states` are the samples of a motion. The jerk before the last sample is ignored, because the last
+    interval is shorter than a control period.
     """
     jerk = np.diff(states.qdd, axis=0)[:-1] / STEP
-    shares = (states.qd / limits.velocity, states.qdd / limits.acceleration, jerk / limits.jerk)
-    return np.array([np.abs(share).max(axis=0, initial=0.0) for share in shares])
+    fractions = (states.qd / limits.velocity, states.qdd / limits.acceleration, jerk / limits.jerk)
+    return np.array([np.abs(values).max(axis=0, initial=0.0) for values in fractions])
 
 
 @dataclass(frozen=True, eq=False)
 class _SlowPiece:
-    """A piece at a lower rate: its velocities and accelerations follow from the chain rule."""
+    """A piece with lower velocities on the same path; implements `MotionPiece`."""
 
-    piece: Piece
-    rate: float
+    piece: MotionPiece
+    speed_factor: float
 
     @property
     def duration(self) -> float:
-        return self.piece.duration / self.rate
+        return self.piece.duration / self.speed_factor
 
-    def at(self, s: float) -> JointState:
-        return self._scale(self.piece.at(s * self.rate))
+    def state_at(self, time: float) -> JointState:
+        return self._scale(self.piece.state_at(time * self.speed_factor))
 
-    def over(self, times: Array) -> JointState:
-        return self._scale(self.piece.over(times * self.rate))
+    def sample(self, times: Array) -> JointState:
+        return self._scale(self.piece.sample(times * self.speed_factor))
 
     def _scale(self, state: JointState) -> JointState:
-        return JointState(state.q, self.rate * state.qd, self.rate**2 * state.qdd)
+        return JointState(state.q, self.speed_factor * state.qd, self.speed_factor**2 * state.qdd)
 
 
-def thin_out(qs: Array, spacing: float) -> Array:
-    """Return a subset of a path `(N, n)` [rad] in which no joint moves farther than `spacing` per step."""
+def thin_out_path(qs: Array, spacing: float) -> Array:
+    """Return waypoints of a path `(N, n)` [rad]; no joint moves by more than `spacing` [rad] between them."""
     kept = [0]
-    for number in range(1, len(qs) - 1):
-        if np.max(np.abs(qs[number + 1] - qs[kept[-1]])) > spacing:
-            kept.append(number)
+    for index in range(1, len(qs) - 1):
+        if np.max(np.abs(qs[index + 1] - qs[kept[-1]])) > spacing:
+            kept.append(index)
     return qs[[*kept, len(qs) - 1]]
 
 
-def sample_pieces(pieces: Sequence[Piece], times: Array) -> JointState:
+def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
     """Return the states of consecutive pieces at increasing `times` `(N,)` [s], each of shape `(N, n)`."""
-    ends = [*accumulate(piece.duration for piece in pieces[:-1]), math.inf]
-    states, start = [JointState(*np.empty((3, 0, len(pieces[0].at(0.0).q))))], 0.0
-    for piece, end in zip(pieces, ends, strict=True):
-        piece_times = times[(start <= times) & (times < end)] - start
+    end_times = [*accumulate(piece.duration for piece in pieces[:-1]), math.inf]
+    states, start_time = [JointState(*np.empty((3, 0, len(pieces[0].state_at(0.0).q))))], 0.0
+    for piece, end_time in zip(pieces, end_times, strict=True):
+        piece_times = times[(start_time <= times) & (times < end_time)] - start_time
         if len(piece_times):
-            states.append(piece.over(piece_times))
-        start = end
+            states.append(piece.sample(piece_times))
+        start_time = end_time
     return JointState(*map(np.concatenate, zip(*states, strict=True)))
 
 
-def _require_same(state: JointState, other: JointState, description: str) -> None:
+def _require_equal(state: JointState, other: JointState, description: str) -> None:
     for name, a, b in zip(JointState._fields, state, other, strict=True):
         difference = float(np.max(np.abs(a - b)))
         if difference > _ROUNDING_ERROR:
@@ -151,10 +157,10 @@ def _require_same(state: JointState, other: JointState, description: str) -> Non
 
 
 def _require_in_range(qs: Array, limits: JointLimits) -> None:
-    excess = limits.position.excess(qs)
-    number, joint = np.unravel_index(np.argmax(excess), excess.shape)
-    if excess[number, joint] > _ROUNDING_ERROR:
+    excess = limits.position.compute_excess(qs)
+    row, joint = np.unravel_index(np.argmax(excess), excess.shape)
+    if excess[row, joint] > _ROUNDING_ERROR:
         raise Unreachable(
-            f"the motion would take joint {joint + 1} to {math.degrees(qs[number, joint]):.1f}°; "
+            f"the motion would take joint {joint + 1} to {math.degrees(qs[row, joint]):.1f}°; "
             f"its limit is {limits.position.describe(int(joint))}"
         )

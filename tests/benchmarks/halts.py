@@ -139,11 +139,11 @@ def measure_distance(q: Array, trajectory: Trajectory) -> float:
     ratio = (math.sqrt(5) - 1) / 2
     for _ in range(60):
         a, b = high - ratio * (high - low), low + ratio * (high - low)
-        if np.linalg.norm(trajectory.at(a).q - q) < np.linalg.norm(trajectory.at(b).q - q):
+        if np.linalg.norm(trajectory.state_at(a).q - q) < np.linalg.norm(trajectory.state_at(b).q - q):
             high = b
         else:
             low = a
-    return float(np.abs(trajectory.at((low + high) / 2).q - q).max())
+    return float(np.abs(trajectory.state_at((low + high) / 2).q - q).max())
 
 
 class _WatchedCell(CellWrapper):
@@ -173,7 +173,7 @@ class _RunWithHalts:
         self._halts: list[Figures] = []
         self._halt: Figures = {}
         config = subject.loaded.cell_config
-        self._limits = JointLimits.of(config.arm.limits)
+        self._limits = JointLimits.from_config(config.arm.limits)
         kind = subject.kind or cell_kind(config.kind)
 
         def make_cell(*args: Any, **options: Any) -> CellWrapper:

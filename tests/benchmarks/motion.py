@@ -22,10 +22,10 @@ from executive.cell.layout import compute_travel_height
 from executive.cells.sim.world import World
 from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Array
-from executive.motion.braking import brake
+from executive.motion.braking import plan_braking
 from executive.motion.planner import Planner
 from executive.motion.state import JointState
-from executive.motion.trajectory import Trajectory, find_peaks
+from executive.motion.trajectory import Trajectory, compute_peak_fractions
 from tests.benchmarks import motion_baselines as baselines
 from tests.benchmarks.motion_execution import execute_pairs
 from tests.benchmarks.motion_scenes import Scene, SceneGenerator, open_world
@@ -78,7 +78,7 @@ class _MethodComparison:
 
     def _add(self, method: str, duration: float, states: Sequence[JointState]) -> None:
         """Add the time [s] and the states of a pair."""
-        shares = [find_peaks(one, self._planner.limits).max(axis=1) for one in states]
+        shares = [compute_peak_fractions(one, self._planner.limits).max(axis=1) for one in states]
         self._durations[method].append(duration)
         self._peaks[method] = np.max([self._peaks[method], *shares], axis=0)
 
@@ -120,11 +120,11 @@ class _MethodComparison:
         """
         planner = self._planner
         approach = self._call_timed("ours", planner.plan, start, scene.approach, scene.fetch_task)
-        tips, _ = planner.kinematics.tips(approach.samples.q)
+        tips, _ = planner.kinematics.compute_tips_and_axes(approach.samples.q)
         above = int(np.flatnonzero(tips[:, 2] > scene.contact_height)[-1])
         touched = min((above + 1) * STEP, approach.duration)
-        stop = brake(approach, touched, planner.limits, STEP)
-        grasp = approach.at(float(stop[-1])).q
+        stop = plan_braking(approach, touched, planner.limits, STEP)
+        grasp = approach.state_at(float(stop[-1])).q
         transit = self._call_timed(
             "ours", planner.plan, grasp, scene.drop, scene.make_carry_task(scene.breakaway_force)
         )

@@ -19,9 +19,9 @@ from executive.cell.arm import Goal
 from executive.cell.clock import STEP
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
-from executive.motion.limits import JointLimits, min_time
+from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
+from executive.motion.limits import JointLimits, compute_min_time
 from executive.motion.point_to_point import Connector
-from executive.motion.postures import find_postures, find_vertical_line
 from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 from tests.motion.joint_states import reach
@@ -51,14 +51,16 @@ def find_waypoints(
     Raises:
         Unreachable: A waypoint is out of reach.
     """
-    x, y, z = kinematics.forward(start).position.tolist()
-    line = find_vertical_line(kinematics, start, max(0.0, height - z), 2)
+    x, y, z = kinematics.compute_tool_pose(start).position.tolist()
+    line = find_vertical_waypoints(kinematics, start, max(0.0, height - z), 2)
     up = reach(kinematics, (x, y, height), start) if line is None else line[-1]
-    fetch = find_postures(kinematics, touch, height - touch.position[2], start)
-    carry = find_postures(kinematics, drop, height - drop.position[2], start)
-    fetching = min_time(fetch.high - up, limits) + 2 * min_time(fetch.high - fetch.low, limits)
-    carrying = min_time(carry.high - fetch.high[:, None], limits)
-    carrying += min_time(carry.low - carry.high, limits)
+    fetch = find_configuration_pairs(kinematics, touch, height - touch.position[2], start)
+    carry = find_configuration_pairs(kinematics, drop, height - drop.position[2], start)
+    fetching = compute_min_time(fetch.high - up, limits) + 2 * compute_min_time(
+        fetch.high - fetch.low, limits
+    )
+    carrying = compute_min_time(carry.high - fetch.high[:, None], limits)
+    carrying += compute_min_time(carry.low - carry.high, limits)
     i, j = np.unravel_index(np.argmin(fetching[:, None] + carrying), carrying.shape)
     return (
         np.array([start, up, fetch.high[i], fetch.low[i]]),
@@ -70,7 +72,7 @@ def plan_with_stops(waypoints: Array, limits: JointLimits) -> tuple[float, Joint
     """Return the time [s] and the states of the motion that rests at every waypoint (ruckig)."""
     connector = Connector(limits)
     motion = Trajectory(
-        [connector.connect(JointState.rest(a), JointState.rest(b)) for a, b in pairwise(waypoints)]
+        [connector.connect(JointState.at_rest(a), JointState.at_rest(b)) for a, b in pairwise(waypoints)]
     )
     return motion.duration, motion.samples
 
@@ -104,9 +106,11 @@ def find_lower_bound(
     Each of the two motions is from rest to rest, without a waypoint. Joint 7 is free at both ends; IK branch
     and swivel are those with the least total time.
     """
-    touching, dropping = (find_postures(kinematics, goal, 0.0, start).low for goal in (touch, drop))
-    there = min_time(touching - start, limits)
-    back = min_time(touching[:, None] - dropping, limits)
+    touching, dropping = (
+        find_configuration_pairs(kinematics, goal, 0.0, start).low for goal in (touch, drop)
+    )
+    there = compute_min_time(touching - start, limits)
+    back = compute_min_time(touching[:, None] - dropping, limits)
     i, j = np.unravel_index(np.argmin(there[:, None] + back), back.shape)
     motions = [
         plan_with_stops(np.array(ends), limits) for ends in pairwise((start, touching[i], dropping[j]))

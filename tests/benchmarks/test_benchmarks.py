@@ -22,7 +22,7 @@ from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.events import TimedEvent
-from executive.motion.braking import brake
+from executive.motion.braking import plan_braking
 from executive.motion.limits import JointLimits
 from executive.motion.point_to_point import Connector
 from executive.motion.state import JointState
@@ -48,7 +48,7 @@ def cell() -> CellConfig:
 
 @pytest.fixture(scope="module")
 def limits(cell: CellConfig) -> JointLimits:
-    return JointLimits.of(cell.arm.limits)
+    return JointLimits.from_config(cell.arm.limits)
 
 
 @pytest.mark.parametrize(
@@ -124,11 +124,13 @@ class TestHalts:
         assert worst["rest_s"] > 0.1 and worst["jerk_ratio"] > 0.5 and worst["deviation_rad"] > 0.0
 
     def test_braking_is_measured(self, limits: JointLimits) -> None:
-        path = Trajectory([Connector(limits).connect(JointState.rest(START), JointState.rest(START + 0.8))])
+        path = Trajectory(
+            [Connector(limits).connect(JointState.at_rest(START), JointState.at_rest(START + 0.8))]
+        )
         stopped = 40
         times = [step * STEP for step in range(stopped + 1)]
-        times += brake(path, times[-1], limits, STEP).tolist()
-        commands = [path.at(time).q for time in (*times, *[times[-1]] * 4)]
+        times += plan_braking(path, times[-1], limits, STEP).tolist()
+        commands = [path.state_at(time).q for time in (*times, *[times[-1]] * 4)]
         good = halts.measure_braking(commands, stopped, path, limits)
         assert good["deviation_rad"] < 1e-7
         assert 0.5 < good["acceleration_ratio"] <= 1.0 and 0.5 < good["jerk_ratio"] <= 1.02

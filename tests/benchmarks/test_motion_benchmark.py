@@ -13,8 +13,8 @@ from executive.cli.cells import load_cells
 from executive.geometry import Pose
 from executive.motion.arm_model import Kinematics
 from executive.motion.arms import build_kinematics, build_planner
-from executive.motion.postures import find_postures
-from executive.motion.trajectory import find_peaks
+from executive.motion.configurations import find_configuration_pairs
+from executive.motion.trajectory import compute_peak_fractions
 from tests.benchmarks import motion
 from tests.benchmarks import motion_baselines as baselines
 from tests.benchmarks.motion_execution import ClearanceMonitor
@@ -57,10 +57,10 @@ def test_the_methods_are_in_order_and_pass_the_waypoints(cell: CellConfig) -> No
     planner = build_planner(cell)
     arm, limits = planner.kinematics, planner.limits
     touch, drop = Goal((0.5, 0.1, 0.051)), Goal((0.24, -0.48, 0.065))
-    start = find_postures(arm, Goal((0.24, 0.48, 0.065)), 0.1, np.zeros(7)).low[0]
+    start = find_configuration_pairs(arm, Goal((0.24, 0.48, 0.065)), 0.1, np.zeros(7)).low[0]
     height = compute_travel_height(cell)
     chains = baselines.find_waypoints(arm, limits, start, touch, drop, height)
-    tips, _ = arm.tips(np.concatenate(chains))
+    tips, _ = arm.compute_tips_and_axes(np.concatenate(chains))
     high_object, high_bin = (0.5, 0.1, height), (0.24, -0.48, height)
     fetch = [(0.24, 0.48, 0.065), (0.24, 0.48, height), high_object, touch.position]
     assert tips == pytest.approx(np.array([*fetch, touch.position, high_object, high_bin, drop.position]))
@@ -70,9 +70,9 @@ def test_the_methods_are_in_order_and_pass_the_waypoints(cell: CellConfig) -> No
     )
     bound, states = baselines.find_lower_bound(arm, limits, start, touch, drop)
     assert 0.5 < bound < passing[0][0] + passing[1][0] < stopping[0][0] + stopping[1][0] < 6.5
-    assert arm.forward(states[1].q[-1]).position == pytest.approx(drop.position, abs=1e-6)
-    assert find_peaks(stopping[0][1], limits).max() == pytest.approx(1.0, abs=1e-3)
-    assert find_peaks(passing[0][1], limits)[2].max() > 5.0
+    assert arm.compute_tool_pose(states[1].q[-1]).position == pytest.approx(drop.position, abs=1e-6)
+    assert compute_peak_fractions(stopping[0][1], limits).max() == pytest.approx(1.0, abs=1e-3)
+    assert compute_peak_fractions(passing[0][1], limits)[2].max() > 5.0
     for corner in chains[0]:
         assert np.abs(passing[0][1].q - corner).max(axis=1).min() < 0.02
 

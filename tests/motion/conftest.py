@@ -24,7 +24,7 @@ def config(missions: Path) -> CellConfig:
 
 @pytest.fixture(scope="session")
 def limits(config: CellConfig) -> JointLimits:
-    return JointLimits.of(config.arm.limits)
+    return JointLimits.from_config(config.arm.limits)
 
 
 @pytest.fixture(scope="session")

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
+from executive.motion.configurations import find_configuration_pairs
 from executive.motion.limits import JointLimits, JointRange
-from executive.motion.postures import find_postures
-from executive.motion.state import JointState, Piece
+from executive.motion.state import JointState, MotionPiece
 
 POSITION_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
 """Of an iiwa 14 [rad]."""
@@ -43,10 +43,10 @@ def states(draw: st.DrawFn) -> JointState:
     return JointState(draw(positions), 0.99 * draw(shares) * most, qdd)
 
 
-def passed(motion: Piece, spacing: float = SOONER) -> JointState:
+def passed(motion: MotionPiece, spacing: float = SOONER) -> JointState:
     """The states of a motion every `spacing` [s], the last one included, each array of shape `(N, 7)`."""
     times = [*np.arange(0.0, motion.duration, spacing), motion.duration]
-    return JointState(*map(np.array, zip(*(motion.at(float(s)) for s in times), strict=True)))
+    return JointState(*map(np.array, zip(*(motion.state_at(float(s)) for s in times), strict=True)))
 
 
 def peaks(states: JointState, limits: JointLimits, spacing: float = SOONER) -> tuple[float, float, float]:
@@ -60,12 +60,12 @@ def peaks(states: JointState, limits: JointLimits, spacing: float = SOONER) -> t
 def tool_velocities(kinematics: Kinematics, states: JointState) -> Array:
     """The tool centre point's velocities `(N, 3)` [m/s] in states, each array of shape `(N, 7)`."""
     h = 1e-6
-    ahead, behind = (kinematics.tips(states.q + step * states.qd)[0] for step in (h, -h))
+    ahead, behind = (kinematics.compute_tips_and_axes(states.q + step * states.qd)[0] for step in (h, -h))
     return (ahead - behind) / (2 * h)
 
 
 def reach(kinematics: Kinematics, place: ArrayLike, q: Array) -> Array:
     """The joint positions `(7,)` nearest to `q` with the tool straight down at a place `(3,)` [m]."""
     x, y, z = np.asarray(place, dtype=float).tolist()
-    found = find_postures(kinematics, Goal((x, y, z)), 0.0, q).low
+    found = find_configuration_pairs(kinematics, Goal((x, y, z)), 0.0, q).low
     return found[np.argmin(np.max(np.abs(found - q), axis=1))]

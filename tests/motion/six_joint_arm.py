@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
-from executive.motion.arm_model import Configuration, Solutions, wrap_angles
+from executive.motion.arm_model import BranchKey, Solutions, wrap_angles
 from executive.motion.limits import JointRange
 
 HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.30, 0.45, 0.42, 0.10  # [m]
@@ -30,15 +30,15 @@ class SixJointArm:
         self._tool_length = tool_length
         self._wrist_to_tool = WRIST_TO_FLANGE + tool_length
 
-    def forward(self, q: ArrayLike) -> Pose:
+    def compute_tool_pose(self, q: ArrayLike) -> Pose:
         R, p = self._last_frame(q)
         return Pose(R, p + self._wrist_to_tool * R[:, 2])
 
-    def flange(self, q: ArrayLike) -> Pose:
+    def compute_flange_pose(self, q: ArrayLike) -> Pose:
         R, p = self._last_frame(q)
         return Pose(R, p + WRIST_TO_FLANGE * R[:, 2])
 
-    def joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
+    def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
         frames = []
         R, p = np.eye(3), np.array([0.0, 0.0, HEIGHT])
         lengths = {2: UPPER_ARM, 3: FOREARM}
@@ -48,7 +48,7 @@ class SixJointArm:
             frames.append(Pose(R, p))
         return tuple(frames)
 
-    def tips(self, qs: Array) -> tuple[Array, Array]:
+    def compute_tips_and_axes(self, qs: Array) -> tuple[Array, Array]:
         axis = np.tile([0.0, 0.0, 1.0], (len(qs), 1))
         for joint in (4, 3):
             axis = rotated(axis, AXES[joint], qs[:, joint])
@@ -58,15 +58,15 @@ class SixJointArm:
             tip, axis = (rotated(vectors, AXES[joint], qs[:, joint]) for vectors in (tip, axis))
         return np.add(tip, (0.0, 0.0, HEIGHT)), axis
 
-    def configuration(self, q: ArrayLike) -> Configuration:
-        solutions = self.solve_all(self.forward(q), q, 0.0)
-        return solutions.configurations[int(np.argmin(np.abs(wrap_angles(solutions.qs - q)).max(axis=1)))]
+    def find_branch(self, q: ArrayLike) -> BranchKey:
+        solutions = self.solve_all(self.compute_tool_pose(q), q, 0.0)
+        return solutions.branches[int(np.argmin(np.abs(wrap_angles(solutions.qs - q)).max(axis=1)))]
 
-    def solve(self, X_WT: Pose, configuration: Configuration) -> Array:
-        (index,) = configuration
+    def solve(self, X_WT: Pose, branch: BranchKey) -> Array:
+        (index,) = branch
         return self.solve_all(X_WT, np.zeros(6), 0.0).qs[int(index)]
 
-    def solve_all(self, X_WT: Pose, near: ArrayLike, spacing: float) -> Solutions:
+    def solve_all(self, X_WT: Pose, q_near: ArrayLike, spacing: float) -> Solutions:
         x, y, z = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2] - (0.0, 0.0, HEIGHT)
         radius = math.hypot(x, y)
         cos3 = (radius**2 + z**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
@@ -86,7 +86,7 @@ class SixJointArm:
         return Solutions(wrap_angles(qs), [(index,) for index in range(len(FLIPS))])
 
     def _last_frame(self, q: ArrayLike) -> tuple[Array, Array]:
-        frame = self.joint_frames(q)[-1]
+        frame = self.compute_joint_frames(q)[-1]
         return frame.rotation, frame.position
 
 

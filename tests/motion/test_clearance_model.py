@@ -21,7 +21,7 @@ from executive.motion.clearance_model import (
     TILT_DISTANCE,
     ClearanceModel,
     Discs,
-    discs_below_flange,
+    make_tool_discs,
 )
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -40,7 +40,7 @@ def discs_of(tip: Array, axis: Array, discs: Discs) -> list[Array]:
     one = np.cross(axis, [1.0, 0.0, 0.0])
     one /= np.linalg.norm(one)
     both = np.stack([one, np.cross(axis, one)])
-    places = zip(discs.offset, discs.radius, strict=True)
+    places = zip(discs.offsets, discs.radii, strict=True)
     return [tip + offset * axis + radius * ROUND @ both for offset, radius in places]
 
 
@@ -58,7 +58,9 @@ def to_box(points: Array, low: Array, high: Array) -> Array:
 def slack(clearance: ClearanceModel, tip, axis=DOWN, discs: Discs | None = None) -> float:
     """Of one state."""
     assert discs is not None
-    return float(clearance.slack(np.array([tip], dtype=float), np.array([axis], dtype=float), discs)[0])
+    return float(
+        clearance.compute_slack(np.array([tip], dtype=float), np.array([axis], dtype=float), discs)[0]
+    )
 
 
 near_the_post = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15), st.floats(0.15, 0.42)).map(
@@ -69,7 +71,7 @@ near_the_post = st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15), st.flo
 @given(near_the_post, st.booleans())
 @settings(max_examples=60)
 def test_distances_from_a_cylinder_are_what_geometry_says(config: CellConfig, tip, loaded: bool) -> None:
-    discs = discs_below_flange(config, CUBE if loaded else None)
+    discs = make_tool_discs(config, CUBE if loaded else None)
     without = slack(ClearanceModel(config, (), AWAY), tip, discs=discs)
     found = slack(ClearanceModel(config, (POST,), AWAY), tip, discs=discs)
     points = np.concatenate(discs_of(tip, DOWN, discs))
@@ -86,7 +88,7 @@ def test_distances_from_a_cylinder_are_what_geometry_says(config: CellConfig, ti
 @given(st.tuples(st.floats(0.08, 0.38), st.floats(-0.66, -0.32), st.floats(0.01, 0.2)).map(np.array))
 @settings(max_examples=80)
 def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) -> None:
-    discs = discs_below_flange(config, None)
+    discs = make_tool_discs(config, None)
     bin, t = config.bins["red_bin"], BIN_THICKNESS
     low, high = np.array(bin.position[:2]), np.array(bin.position[:2])
     low, high = low - np.array(bin.size[:2]) / 2, high + np.array(bin.size[:2]) / 2
@@ -114,14 +116,16 @@ def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) ->
 
 def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: CellConfig) -> None:
     empty, washer = (
-        discs_below_flange(config, None),
-        discs_below_flange(config, Load(ObjectClass("washer", 0.006, 0.02, 0.015))),
+        make_tool_discs(config, None),
+        make_tool_discs(config, Load(ObjectClass("washer", 0.006, 0.02, 0.015))),
     )
-    assert np.allclose(empty.offset, [0.0, -NECK_LENGTH])
-    assert np.allclose(empty.radius, [config.tool.cup_radius, TOOL_RADIUS])
+    assert np.allclose(empty.offsets, [0.0, -NECK_LENGTH])
+    assert np.allclose(empty.radii, [config.tool.cup_radius, TOOL_RADIUS])
     wide = 0.02 + 0.015 + POSITION_TOLERANCE
-    assert np.allclose(washer.offset, [0.006, 0.0, -NECK_LENGTH]), "its underside, its top, the tool above it"
-    assert np.allclose(washer.radius, [wide, wide, TOOL_RADIUS])
+    assert np.allclose(washer.offsets, [0.006, 0.0, -NECK_LENGTH]), (
+        "its underside, its top, the tool above it"
+    )
+    assert np.allclose(washer.radii, [wide, wide, TOOL_RADIUS])
     assert washer.min_cosine > empty.min_cosine
 
 
@@ -129,7 +133,7 @@ def test_a_load_hangs_below_the_tool_and_is_as_wide_as_its_ring_puts_it(config: 
 @settings(max_examples=60)
 def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, y, z) -> None:
     end = np.array([[0.53, 0.0]])
-    tip, discs = (x, y, min(z, compute_max_pile_height(config))), discs_below_flange(config, None)
+    tip, discs = (x, y, min(z, compute_max_pile_height(config))), make_tool_discs(config, None)
     away = math.hypot(x - end[0, 0], y - end[0, 1])
     if away > OBSERVED_RADIUS + compute_max_pile_height(config):
         assert slack(ClearanceModel(config, (), end), tip, discs=discs) < 0
@@ -141,14 +145,14 @@ def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, 
 
 
 def test_near_an_end_what_is_unavoidable_there_is_allowed_and_elsewhere_it_is_not(config) -> None:
-    discs = discs_below_flange(config, None)
+    discs = make_tool_discs(config, None)
     beside = np.array([POST.x + POST.radius + POSITION_TOLERANCE + TOOL_RADIUS + 0.002, POST.y, 0.1])
     opposite = np.array([2 * POST.x - beside[0], POST.y, 0.1])
     clearance = ClearanceModel(config, (POST,), beside[None, :2])
     assert slack(clearance, beside, discs=discs) == pytest.approx(
         0.002 - (config.motion.margin + SAMPLING_MARGIN)
     )
-    clearance.relax(beside[None], DOWN[None], discs)
+    clearance.relax_end_margins(beside[None], DOWN[None], discs)
     assert slack(clearance, beside, discs=discs) == pytest.approx(0.0, abs=1e-9)
     assert slack(clearance, beside - (0.001, 0, 0), discs=discs) == pytest.approx(-0.001, abs=1e-9)
     assert np.linalg.norm(opposite - beside) > OBSERVED_RADIUS
@@ -156,16 +160,16 @@ def test_near_an_end_what_is_unavoidable_there_is_allowed_and_elsewhere_it_is_no
         0.002 - (config.motion.margin + SAMPLING_MARGIN)
     )
     inside = np.array([[POST.x, POST.y, POST.top - 0.01]])
-    clearance.relax(inside, DOWN[None], discs)
-    clearance.require_clear(inside, DOWN[None], discs)  # what is entered already may be left
+    clearance.relax_end_margins(inside, DOWN[None], discs)
+    clearance.require_clearance(inside, DOWN[None], discs)  # what is entered already may be left
 
 
 def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> None:
-    discs, clearance = discs_below_flange(config, None), ClearanceModel(config, (POST,), AWAY)
+    discs, clearance = make_tool_discs(config, None), ClearanceModel(config, (POST,), AWAY)
 
     def require(tip, axis=DOWN) -> None:
         tips = np.array([[-0.6, 0.0, 0.4], tip, [-0.6, 0.0, 0.4]])
-        clearance.require_clear(tips, np.array([DOWN, axis, DOWN]), discs)
+        clearance.require_clearance(tips, np.array([DOWN, axis, DOWN]), discs)
 
     require((-0.6, 0.0, 0.4))
     text = "would bring tool or load 16 mm too near to the post, with the tool at (-0.500, 0.100, 0.290) m"
@@ -195,14 +199,14 @@ def test_an_error_names_the_thing_the_lack_and_the_place(config: CellConfig) -> 
 def test_slopes_are_the_differences_of_slack(config, tip, tilt, turn, loaded: bool) -> None:
     axis = np.array([math.sin(tilt), math.cos(tilt) * math.sin(turn), -math.cos(tilt) * math.cos(turn)])
     discs, clearance = (
-        discs_below_flange(config, CUBE if loaded else None),
+        make_tool_discs(config, CUBE if loaded else None),
         ClearanceModel(config, (POST,), AWAY),
     )
     h = 1e-5
     tips, axes = tip + h * np.eye(3), np.broadcast_to(axis, (3, 3))
-    found = clearance.slopes(tip[None], axis[None], discs, (tips[None], axes[None]))[0] / h
+    found = clearance.compute_slack_changes(tip[None], axis[None], discs, (tips[None], axes[None]))[0] / h
     here = slack(clearance, tip, axis, discs)
-    forward = (clearance.slack(tips, axes, discs) - here) / h
-    backward = (here - clearance.slack(2 * tip - tips, axes, discs)) / h
+    forward = (clearance.compute_slack(tips, axes, discs) - here) / h
+    backward = (here - clearance.compute_slack(2 * tip - tips, axes, discs)) / h
     smooth = np.abs(forward - backward) < 1e-2  # no kink between
     assert np.allclose(found[smooth], forward[smooth], atol=1e-6)

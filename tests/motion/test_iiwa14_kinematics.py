@@ -26,9 +26,9 @@ def assert_same(one: Pose, other: Pose, tolerance: float = 1e-7) -> None:
 @given(postures)
 @settings(max_examples=40)
 def test_every_solution_of_a_reachable_pose_reaches_it(q) -> None:
-    goal = ARM.forward(q)
+    goal = ARM.compute_tool_pose(q)
     for solution in ARM.solve_all(goal, q, math.pi).qs:
-        assert_same(ARM.forward(solution), goal, 1e-6)
+        assert_same(ARM.compute_tool_pose(solution), goal, 1e-6)
 
 
 @given(postures)
@@ -36,7 +36,7 @@ def test_every_solution_of_a_reachable_pose_reaches_it(q) -> None:
 def test_the_configuration_of_a_posture_leads_back_to_it(q) -> None:
     if min(abs(math.sin(q[i])) for i in (1, 3, 5)) < 1e-3:
         return  # straight joints: the posture is not one of a few
-    found = ARM.solve(ARM.forward(q), ARM.configuration(q))
+    found = ARM.solve(ARM.compute_tool_pose(q), ARM.find_branch(q))
     assert np.abs(found - q).max() < 1e-5
 
 
@@ -48,15 +48,15 @@ def test_forward_kinematics_agree_with_pybullet() -> None:
         for joint, angle in enumerate(q):
             client.resetJointState(arm, joint, angle)
         state = client.getLinkState(arm, 6, computeForwardKinematics=True)
-        assert_same(ARM.flange(q), Pose.of(*state[4:6]) @ Pose.of([0, 0, 0.045]), 1e-5)
-        assert_same(ARM.forward(q), Pose.of(*state[4:6]) @ Pose.of([0, 0, 0.165]), 1e-5)
+        assert_same(ARM.compute_flange_pose(q), Pose.of(*state[4:6]) @ Pose.of([0, 0, 0.045]), 1e-5)
+        assert_same(ARM.compute_tool_pose(q), Pose.of(*state[4:6]) @ Pose.of([0, 0, 0.165]), 1e-5)
     client.disconnect()
 
 
 def test_tips_are_where_the_tool_is_and_where_it_points() -> None:
     qs = np.random.default_rng(4).uniform(-LIMIT, LIMIT, (200, 7))
-    tips, axes = ARM.tips(qs)
+    tips, axes = ARM.compute_tips_and_axes(qs)
     for q, tip, axis in zip(qs, tips, axes, strict=True):
-        X_WT = ARM.forward(q)
+        X_WT = ARM.compute_tool_pose(q)
         assert np.allclose(tip, X_WT.position, atol=1e-12)
         assert np.allclose(axis, X_WT.rotation[:, 2], atol=1e-12)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, shares
 
-from executive.motion.limits import JointLimits, min_time
+from executive.motion.limits import JointLimits, compute_min_time
 from executive.motion.point_to_point import Connector
 from executive.motion.state import JointState
 
@@ -27,6 +27,8 @@ def test_limits_are_the_cell_files_in_radians(config, limits: JointLimits) -> No
 @settings(max_examples=150)
 def test_the_closed_form_is_ruckigs_duration(share, power: float) -> None:
     change = share * 10**power
-    found = CONNECTOR.connect(JointState.rest(np.zeros(7)), JointState.rest(change)).duration
+    found = CONNECTOR.connect(JointState.at_rest(np.zeros(7)), JointState.at_rest(change)).duration
     # Ruckig takes moves of less than a billionth of a radian for none.
-    assert min_time(change, LIMITS) == pytest.approx(found, rel=1e-6, abs=5e-3 if found < 5e-3 else 1e-8)
+    assert compute_min_time(change, LIMITS) == pytest.approx(
+        found, rel=1e-6, abs=5e-3 if found < 5e-3 else 1e-8
+    )

@@ -15,9 +15,9 @@ from executive.cell.config import ArmConfig, CellConfig, LimitsConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.motion.arm_model import Kinematics
+from executive.motion.configurations import find_configuration_pairs
 from executive.motion.limits import JointLimits
 from executive.motion.planner import Planner
-from executive.motion.postures import find_postures
 
 LIMITS = LimitsConfig(
     source="Invented; like those of a Panda, some do not include 0.",
@@ -42,28 +42,31 @@ def six(config: CellConfig) -> CellConfig:
 
 @pytest.fixture(scope="module")
 def arm(six: CellConfig) -> Kinematics:
-    return SixJointArm(six.tool.length, JointLimits.of(LIMITS).position)
+    return SixJointArm(six.tool.length, JointLimits.from_config(LIMITS).position)
 
 
 def test_the_kinematics_of_the_test_arm_are_consistent(arm: Kinematics) -> None:
-    rng, limits = np.random.default_rng(1), JointLimits.of(LIMITS).position
+    rng, limits = np.random.default_rng(1), JointLimits.from_config(LIMITS).position
     qs = rng.uniform(limits.lower, limits.upper, (100, 6))
-    tips, axes = arm.tips(qs)
+    tips, axes = arm.compute_tips_and_axes(qs)
     for q, tip, axis in zip(qs, tips, axes, strict=True):
-        X_WT = arm.forward(q)
+        X_WT = arm.compute_tool_pose(q)
         assert np.allclose(tip, X_WT.position)
         assert np.allclose(axis, X_WT.rotation[:, 2])
-        assert np.allclose(arm.solve(X_WT, arm.configuration(q)), q, atol=1e-6)
+        assert np.allclose(arm.solve(X_WT, arm.find_branch(q)), q, atol=1e-6)
         for solution in arm.solve_all(X_WT, q, 0.1).qs:
-            assert np.allclose(arm.forward(solution).position, X_WT.position, atol=1e-9)
-            assert np.allclose(arm.forward(solution).rotation, X_WT.rotation, atol=1e-9)
+            assert np.allclose(arm.compute_tool_pose(solution).position, X_WT.position, atol=1e-9)
+            assert np.allclose(arm.compute_tool_pose(solution).rotation, X_WT.rotation, atol=1e-9)
 
 
 def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
     six: CellConfig, arm: Kinematics
 ) -> None:
     checked = []
-    planner, limits = Planner(six, arm, lambda path, task: checked.append(path)), JointLimits.of(LIMITS)
+    planner, limits = (
+        Planner(six, arm, lambda path, task: checked.append(path)),
+        JointLimits.from_config(LIMITS),
+    )
     rng, q = np.random.default_rng(3), HOME
     for number in range(12):
         x, y = rng.uniform((0.42, -0.22), (0.64, 0.22)).tolist()
@@ -77,28 +80,28 @@ def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
         assert states.q.shape[1] == 6
         assert limits.position.contains(states.q).all()
         assert max(peaks(states, limits)) <= 1 + 1e-6
-        assert arm.forward(motion.end).position == pytest.approx(goal.position, abs=1e-6)
-        assert arm.forward(motion.end).rotation[2, 2] == pytest.approx(-1)
+        assert arm.compute_tool_pose(motion.end).position == pytest.approx(goal.position, abs=1e-6)
+        assert arm.compute_tool_pose(motion.end).rotation[2, 2] == pytest.approx(-1)
         q = motion.end
     assert all(path.shape[1] == 6 for path in checked)
 
 
 def test_the_yaw_of_a_goal_is_that_of_the_tool(six: CellConfig, arm: Kinematics) -> None:
     motion = Planner(six, arm).plan(HOME, Goal((0.5, 0.1, 0.1), yaw=0.4))
-    assert arm.forward(motion.end).rotation[:, 1] == pytest.approx(
+    assert arm.compute_tool_pose(motion.end).rotation[:, 1] == pytest.approx(
         [-math.sin(0.4), math.cos(0.4), 0], abs=1e-6
     )
 
 
 def test_only_configurations_within_asymmetric_limits_are_found(arm: Kinematics) -> None:
-    found = find_postures(arm, Goal((0.5, 0.1, 0.05)), 0.1, HOME)
+    found = find_configuration_pairs(arm, Goal((0.5, 0.1, 0.05)), 0.1, HOME)
     assert len(found)
     assert (found.low[:, 2] >= math.radians(20)).all()
 
 
 def test_errors_state_both_limits_of_a_joint(six: CellConfig, arm: Kinematics) -> None:
     with pytest.raises(Unreachable, match=r"leaves joint \d \d+\.\d° outside -?\d+° to \d+°$"):
-        find_postures(arm, Goal((-0.3, -0.02, 0.05)), 0.0, HOME)
+        find_configuration_pairs(arm, Goal((-0.3, -0.02, 0.05)), 0.0, HOME)
     narrow = HOME.copy()
     narrow[4] = math.radians(-25)
     text = "would take joint 5 to -25.0°; its limit is -20° to 120°"

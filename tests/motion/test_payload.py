@@ -9,10 +9,10 @@ import pytest
 
 from executive.cell.objects import Load, ObjectClass
 from executive.geometry import GRAVITY
-from executive.motion.payload import DISTANCE_PER_ACCELERATION, POSITION_STRIDE, SAFETY_FACTOR, PayloadLimit
+from executive.motion.payload import DISTANCE_PER_ACCELERATION, SAFETY_FACTOR, SAMPLE_STRIDE, PayloadLimit
 from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
-from executive.motion.transcription import SAMPLE_SHARES, SAMPLES_PER_STEP, STEP_COUNT
+from executive.motion.transcription import SAMPLE_FRACTIONS, SAMPLES_PER_STEP, STEP_COUNT
 
 KIND = ObjectClass("cube", 0.05, 0.035, mass=0.1)
 LENGTH = 1.0 / STEP_COUNT
@@ -27,7 +27,7 @@ class Sway:
     def __init__(self, q, angle: float) -> None:
         self._q, self._angle = q, angle
 
-    def at(self, s: float) -> JointState:
+    def state_at(self, s: float) -> JointState:
         """A quintic from rest to rest."""
         turn = np.eye(7)[0] * self._angle
         place, speed, change = (
@@ -37,9 +37,9 @@ class Sway:
         )
         return JointState(self._q + turn * place, turn * speed, turn * change)
 
-    def over(self, times) -> JointState:
+    def sample(self, times) -> JointState:
         """The states at many times."""
-        return JointState(*map(np.array, zip(*map(self.at, times), strict=True)))
+        return JointState(*map(np.array, zip(*map(self.state_at, times), strict=True)))
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def sway(home):
 
 def strongest(trajectory: Trajectory, kinematics) -> float:
     """The largest acceleration of the tool by the textbook: along the circle, and to its middle [m/s²]."""
-    tips, _ = kinematics.tips(trajectory.start[None])
+    tips, _ = kinematics.compute_tips_and_axes(trajectory.start[None])
     radius = math.hypot(*tips[0, :2])
     _, qd, qdd = trajectory.samples
     return float(np.max(radius * np.hypot(qdd[:, 0], qd[:, 0] ** 2)))
@@ -61,9 +61,11 @@ def test_a_seal_affords_all_of_a_motion_or_nothing(sway, kinematics) -> None:
         (SAFETY_FACTOR * KIND.mass * math.hypot(GRAVITY, 1.01 * most), 1.0),
         (0.99 * weight, 0.0),
     ):
-        assert PayloadLimit(Load(KIND, bears), kinematics).share(sway) == share
-    assert PayloadLimit(Load(KIND, 1.2 * weight), kinematics).lift == pytest.approx(0.2 * GRAVITY)
-    assert PayloadLimit(Load(KIND, weight), kinematics).lift == 0.5
+        assert PayloadLimit(Load(KIND, bears), kinematics).find_acceleration_fraction(sway) == share
+    assert PayloadLimit(Load(KIND, 1.2 * weight), kinematics).max_lift_acceleration == pytest.approx(
+        0.2 * GRAVITY
+    )
+    assert PayloadLimit(Load(KIND, weight), kinematics).max_lift_acceleration == 0.5
 
 
 @pytest.mark.parametrize("share", [0.25, 0.6, 0.9])
@@ -74,57 +76,57 @@ def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinema
     gentle = payload.slow_down(sway)
     rate = sway.duration / gentle.duration
     assert rate == pytest.approx(math.sqrt(share), rel=0.01)
-    assert payload.share(gentle) == pytest.approx(1.0, abs=0.01)
-    assert payload.share(sway.slow_down(1.1 * rate)) < 0.9
+    assert payload.find_acceleration_fraction(gentle) == pytest.approx(1.0, abs=0.01)
+    assert payload.find_acceleration_fraction(sway.slow_down(1.1 * rate)) < 0.9
 
 
 def test_a_motion_too_short_to_pull_at_anything_is_affordable(kinematics, connector, home) -> None:
-    still = Trajectory([connector.connect(JointState.rest(home), JointState.rest(home))])
-    assert PayloadLimit(Load(KIND, 0.5), kinematics).share(still) == 1.0
+    still = Trajectory([connector.connect(JointState.at_rest(home), JointState.at_rest(home))])
+    assert PayloadLimit(Load(KIND, 0.5), kinematics).find_acceleration_fraction(still) == 1.0
 
 
 def test_a_demand_is_what_the_seal_bears_beyond_weight_and_hold(sway, kinematics) -> None:
     """Of places STRIDE apart on a course, in centimetres for each metre per second squared."""
     bears = 3.0
-    qs = np.array([sway.at(place).q for place in SAMPLE_SHARES])
-    demand = PayloadLimit(Load(KIND, bears), kinematics).demand(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
+    qs = np.array([sway.state_at(place).q for place in SAMPLE_FRACTIONS])
+    demand = PayloadLimit(Load(KIND, bears), kinematics).linearize(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
     middle = demand.rows[:, 1]
-    assert np.array_equal(np.diff(middle), np.full(len(middle) - 1, POSITION_STRIDE))
-    assert middle[0] < 2 * POSITION_STRIDE
-    assert middle[-1] > len(qs) - 2 * POSITION_STRIDE
-    radius = math.hypot(*kinematics.tips(qs[:1])[0][0, :2])
-    states = [sway.at(place) for place in SAMPLE_SHARES[middle]]
+    assert np.array_equal(np.diff(middle), np.full(len(middle) - 1, SAMPLE_STRIDE))
+    assert middle[0] < 2 * SAMPLE_STRIDE
+    assert middle[-1] > len(qs) - 2 * SAMPLE_STRIDE
+    radius = math.hypot(*kinematics.compute_tips_and_axes(qs[:1])[0][0, :2])
+    states = [sway.state_at(place) for place in SAMPLE_FRACTIONS[middle]]
     level = radius * np.array([math.hypot(state.qdd[0], state.qd[0] ** 2) for state in states])
     wanted = DISTANCE_PER_ACCELERATION * (bears / SAFETY_FACTOR / KIND.mass - np.hypot(level, GRAVITY))
     assert demand.slack == pytest.approx(wanted, abs=DISTANCE_PER_ACCELERATION * 0.05)
-    near = PayloadLimit(Load(KIND, bears), kinematics).demand(qs, LENGTH / SAMPLES_PER_STEP, 0.096)
+    near = PayloadLimit(Load(KIND, bears), kinematics).linearize(qs, LENGTH / SAMPLES_PER_STEP, 0.096)
     assert 0 < len(near.slack) < len(demand.slack)
     for values, every in zip(near, demand, strict=True):
         assert np.array_equal(values, every[demand.slack < 0.096]), "what is far from its bounds is left out"
 
 
 def test_slopes_are_the_derivatives_of_a_demand_by_the_positions(sway, kinematics) -> None:
-    qs = np.array([sway.at(place).q for place in SAMPLE_SHARES])
+    qs = np.array([sway.state_at(place).q for place in SAMPLE_FRACTIONS])
     payload, h = PayloadLimit(Load(KIND, 3.0), kinematics), 1e-6
-    demand = payload.demand(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
+    demand = payload.linearize(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
     for row in range(0, len(demand.slack), 5):
         for k, joint in np.ndindex(3, 7):
             there = [qs.copy(), qs.copy()]
             for moved, sign in zip(there, (1, -1), strict=True):
                 moved[demand.rows[row, k], joint] += sign * h
             after, before = (
-                payload.demand(moved, LENGTH / SAMPLES_PER_STEP, math.inf).slack[row] for moved in there
+                payload.linearize(moved, LENGTH / SAMPLES_PER_STEP, math.inf).slack[row] for moved in there
             )
-            assert demand.slopes[row, k, joint] == pytest.approx(
+            assert demand.gradients[row, k, joint] == pytest.approx(
                 (after - before) / (2 * h), rel=1e-2, abs=0.02
             )
 
 
 def test_growth_is_the_derivative_of_a_demand_by_the_length_of_a_step(sway, kinematics) -> None:
-    qs = np.array([sway.at(place).q for place in SAMPLE_SHARES])
+    qs = np.array([sway.state_at(place).q for place in SAMPLE_FRACTIONS])
     payload, h = PayloadLimit(Load(KIND, 3.0), kinematics), 1e-6
     demand, after, before = (
-        payload.demand(qs, (LENGTH + change) / SAMPLES_PER_STEP, math.inf) for change in (0.0, h, -h)
+        payload.linearize(qs, (LENGTH + change) / SAMPLES_PER_STEP, math.inf) for change in (0.0, h, -h)
     )
-    assert demand.growth.max() > 0.1
-    assert demand.growth == pytest.approx((after.slack - before.slack) / (2 * h), rel=1e-4)
+    assert demand.step_derivatives.max() > 0.1
+    assert demand.step_derivatives == pytest.approx((after.slack - before.slack) / (2 * h), rel=1e-4)

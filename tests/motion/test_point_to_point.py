@@ -13,19 +13,21 @@ from executive.motion.point_to_point import Connector, NoProfile
 from executive.motion.state import JointState
 
 CONNECTOR = Connector(LIMITS)
-STILL = JointState.rest(np.zeros(7))
+STILL = JointState.at_rest(np.zeros(7))
 
 
 @given(states(), states())
 @settings(max_examples=60)
 def test_it_joins_two_states_inside_the_limits(start: JointState, end: JointState) -> None:
     motion = CONNECTOR.connect(start, end)
-    for state, wanted in ((motion.at(0.0), start), (motion.at(motion.duration), end)):
+    for state, wanted in ((motion.state_at(0.0), start), (motion.state_at(motion.duration), end)):
         for one, other in zip(state, wanted, strict=True):
             assert np.allclose(one, other, atol=1e-6)
     assert max(peaks(passed(motion), LIMITS)) <= 1 + 1e-6
     times = np.linspace(0, motion.duration, 9)
-    for values, alone in zip(motion.over(times), zip(*map(motion.at, times), strict=True), strict=True):
+    for values, alone in zip(
+        motion.sample(times), zip(*map(motion.state_at, times), strict=True), strict=True
+    ):
         assert np.array_equal(values, np.array(alone))
 
 
@@ -41,7 +43,7 @@ def test_it_takes_as_long_as_it_is_told_to(start: JointState, end: JointState, l
 
 @pytest.mark.parametrize(
     ("end", "least"),
-    [(STILL._replace(qd=1.01 * LIMITS.velocity), None), (JointState.rest(np.full(7, 0.3)), 1e5)],
+    [(STILL._replace(qd=1.01 * LIMITS.velocity), None), (JointState.at_rest(np.full(7, 0.3)), 1e5)],
 )
 def test_a_state_too_fast_and_a_motion_too_slow_have_no_profile(end: JointState, least: float | None) -> None:
     with pytest.raises(NoProfile, match=r"ruckig finds no profile from \[0\. .*\] to \[0\.[ 3].*\] rad: "):
@@ -50,7 +52,7 @@ def test_a_state_too_fast_and_a_motion_too_slow_have_no_profile(end: JointState,
 
 def test_a_profile_that_is_too_fast_between_its_phases_counts_for_none() -> None:
     """Ruckig's own would be too fast by 0.6 % where the acceleration changes sign."""
-    ends = [JointState.rest(np.zeros(7)) for _ in range(2)]
+    ends = [JointState.at_rest(np.zeros(7)) for _ in range(2)]
     moving = (0.0, -1.67968043, -3.33422395), (-0.27431039, -1.24049521, 8.54397608)
     for state, third in zip(ends, moving, strict=True):
         for values, value in zip(state, third, strict=True):

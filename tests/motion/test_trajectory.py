@@ -15,7 +15,7 @@ from executive.cells.sim.rebuild import join_samples
 from executive.errors import Fault, Unreachable
 from executive.motion.point_to_point import Connector, NoProfile
 from executive.motion.state import JointState
-from executive.motion.trajectory import Trajectory, find_peaks, thin_out
+from executive.motion.trajectory import Trajectory, compute_peak_fractions, thin_out_path
 
 CONNECTOR = Connector(LIMITS)
 A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])
@@ -24,7 +24,7 @@ MOVING = JointState((A + B) / 2, (B - A) / 3, np.full(7, 0.2))
 
 def by_way_of(*passing: JointState) -> Trajectory:
     """A motion from A to B, in pieces that meet in the given states."""
-    ends = [JointState.rest(A), *passing, JointState.rest(B)]
+    ends = [JointState.at_rest(A), *passing, JointState.at_rest(B)]
     return Trajectory([CONNECTOR.connect(one, other) for one, other in pairwise(ends)])
 
 
@@ -32,24 +32,24 @@ def by_way_of(*passing: JointState) -> Trajectory:
     ("field", "off"), [("q", "their q differ by 0.01"), ("qd", "qd differ"), ("qdd", "qdd differ")]
 )
 def test_pieces_that_do_not_meet_are_a_fault(field: str, off: str) -> None:
-    first = CONNECTOR.connect(JointState.rest(A), MOVING)
+    first = CONNECTOR.connect(JointState.at_rest(A), MOVING)
     wrong = MOVING._replace(**{field: getattr(MOVING, field) + 0.01})
-    second = CONNECTOR.connect(wrong, JointState.rest(B))
+    second = CONNECTOR.connect(wrong, JointState.at_rest(B))
     with pytest.raises(Fault, match=f"pieces 1 and 2 do not fit together: .*{off}"):
         Trajectory([first, second])
 
 
 def test_a_motion_that_does_not_begin_or_end_at_rest_is_a_fault() -> None:
     with pytest.raises(Fault, match="rest and the start of a trajectory do not fit together: their qd"):
-        Trajectory([CONNECTOR.connect(MOVING, JointState.rest(B))])
+        Trajectory([CONNECTOR.connect(MOVING, JointState.at_rest(B))])
     with pytest.raises(Fault, match="rest and the end of a trajectory do not fit together: their qd"):
-        Trajectory([CONNECTOR.connect(JointState.rest(A), MOVING)])
+        Trajectory([CONNECTOR.connect(JointState.at_rest(A), MOVING)])
 
 
 @pytest.mark.parametrize("s", [math.nan, math.inf, -math.inf])
 def test_a_time_that_would_crash_ruckig_is_a_fault(s: float) -> None:
     with pytest.raises(Fault, match=rf"has no state at the time {s}; its times are 0 to \d\.\d\d\d s"):
-        by_way_of().at(s)
+        by_way_of().state_at(s)
 
 
 @given(states(), st.floats(0.2, 1.0))
@@ -61,61 +61,63 @@ def test_slowed_it_takes_the_same_path_in_more_time(between: JointState, rate: f
     assert slow.duration == pytest.approx(trajectory.duration / rate)
     assert np.array_equal(slow.start, trajectory.start)
     assert np.allclose(slow.end, trajectory.end, atol=1e-9)
-    assert Trajectory(trajectory._pieces, 0.2).slow_down(rate).guarded == pytest.approx(0.2 / rate)
-    assert slow.guarded == math.inf
+    assert Trajectory(trajectory._pieces, 0.2).slow_down(rate).guarded_start_time == pytest.approx(0.2 / rate)
+    assert slow.guarded_start_time == math.inf
     for s in np.linspace(0, trajectory.duration, 13):
-        fast = trajectory.at(s)
-        q, qd, qdd = slow.at(s / rate)
+        fast = trajectory.state_at(s)
+        q, qd, qdd = slow.state_at(s / rate)
         assert np.allclose(q, fast.q, atol=1e-6)
         assert np.allclose(qd, rate * fast.qd, atol=1e-5)
         assert np.allclose(qdd, rate**2 * fast.qdd, atol=1e-4)
     states = slow.samples
     times = [*np.arange(0, slow.duration, STEP), slow.duration]
-    for values, wanted in zip(states, zip(*map(slow.at, times), strict=True), strict=True):
+    for values, wanted in zip(states, zip(*map(slow.state_at, times), strict=True), strict=True):
         assert np.allclose(values, wanted, atol=1e-6)
     measured = np.diff(states.q[:-1], axis=0) / STEP
     assert np.allclose(measured, (states.qd[1:-1] + states.qd[:-2]) / 2, atol=LIMITS.jerk.max() * STEP**2)
 
 
 def test_a_motion_to_where_the_arm_is_takes_no_time() -> None:
-    trajectory = Trajectory([CONNECTOR.connect(JointState.rest(A), JointState.rest(A))])
+    trajectory = Trajectory([CONNECTOR.connect(JointState.at_rest(A), JointState.at_rest(A))])
     assert trajectory.duration == 0
-    assert np.array_equal(join_samples(trajectory.samples, 0.0).at(1.0).q, A)
-    assert np.array_equal(trajectory.at(0.5).q, A)
-    assert np.array_equal(trajectory.check(LIMITS).q, [A])
+    assert np.array_equal(join_samples(trajectory.samples, 0.0).state_at(1.0).q, A)
+    assert np.array_equal(trajectory.state_at(0.5).q, A)
+    assert np.array_equal(trajectory.check_limits(LIMITS).q, [A])
 
 
 @given(st.integers(0, 6), st.floats(0.3, 0.9))
 @settings(max_examples=30)
 def test_leaving_a_joints_range_between_two_states_inside_it_is_seen(joint: int, share: float) -> None:
     """Where a joint turns back, ruckig's own extremes are too small."""
-    edge = JointState.rest(np.zeros(7))
+    edge = JointState.at_rest(np.zeros(7))
     edge.q[joint] = -LIMITS.position.upper[joint] + 0.01
-    leaving = JointState.rest(edge.q.copy())
+    leaving = JointState.at_rest(edge.q.copy())
     leaving.qd[joint] = share * LIMITS.velocity[joint]
-    back = CONNECTOR.connect(leaving, JointState.rest(np.zeros(7)))
+    back = CONNECTOR.connect(leaving, JointState.at_rest(np.zeros(7)))
     trajectory = Trajectory([CONNECTOR.connect(edge, leaving), back])
     limit = round(np.degrees(LIMITS.position.upper[joint]))
     with pytest.raises(Unreachable, match=rf"take joint {joint + 1} to -\d+\.\d°; its limit is ±{limit}°"):
-        trajectory.check(LIMITS)
+        trajectory.check_limits(LIMITS)
 
 
 @pytest.mark.parametrize("limit", ["velocity", "acceleration", "jerk"])
 def test_a_motion_outside_a_limit_cannot_be_flown_and_the_text_names_the_joint(limit: str) -> None:
     motion = by_way_of(MOVING)
-    assert np.array_equal(motion.check(LIMITS).q, motion.samples.q)
-    most = find_peaks(motion.samples, LIMITS)[("velocity", "acceleration", "jerk").index(limit), 4]
+    assert np.array_equal(motion.check_limits(LIMITS).q, motion.samples.q)
+    most = compute_peak_fractions(motion.samples, LIMITS)[
+        ("velocity", "acceleration", "jerk").index(limit), 4
+    ]
     less = getattr(LIMITS, limit).copy()
     less[4] *= most / 1.01
     with pytest.raises(NoProfile, match=rf"the {limit} of joint 5 would be 1\.010 times its limit"):
-        motion.check(replace(LIMITS, **{limit: less}))
+        motion.check_limits(replace(LIMITS, **{limit: less}))
 
 
 @given(positions, st.floats(0.01, 0.2))
 @settings(max_examples=30)
 def test_a_thinned_path_has_no_gaps_and_no_more_points_than_it_needs(end, spacing: float) -> None:
-    qs = Trajectory([CONNECTOR.connect(JointState.rest(A), JointState.rest(end))]).samples.q
-    kept = thin_out(qs, spacing)
+    qs = Trajectory([CONNECTOR.connect(JointState.at_rest(A), JointState.at_rest(end))]).samples.q
+    kept = thin_out_path(qs, spacing)
     step = np.max(np.abs(np.diff(qs, axis=0)), initial=0.0)
     assert np.array_equal(kept[[0, -1]], qs[[0, -1]])
     assert np.max(np.abs(np.diff(kept, axis=0))) <= max(spacing, step) + 1e-12

@@ -9,7 +9,13 @@ from joint_states import LIMITS, positions, shares
 from executive.geometry import Array
 from executive.motion.point_to_point import Connector
 from executive.motion.state import JointState
-from executive.motion.transcription import SAMPLES_PER_STEP, STEP_COUNT, Demand, JointCourse, Transcription
+from executive.motion.transcription import (
+    SAMPLES_PER_STEP,
+    STEP_COUNT,
+    DiscreteMotion,
+    LinearizedConstraints,
+    Transcription,
+)
 
 CONNECTOR = Connector(LIMITS)
 PLACES = np.arange(1, STEP_COUNT * SAMPLES_PER_STEP) / (STEP_COUNT * SAMPLES_PER_STEP)
@@ -17,10 +23,12 @@ WIDE = 0.5
 FINE = 40
 
 
-def clear_of(rows: Array, slack: float, slopes: Array) -> Demand:
+def clear_of(rows: Array, slack: float, slopes: Array) -> LinearizedConstraints:
     """A wall that positions are so far from, whatever their number, however long the steps."""
     count = len(rows)
-    return Demand(np.full(count, slack), rows[:, None], np.tile(slopes, (count, 1, 1)), np.zeros(count))
+    return LinearizedConstraints(
+        np.full(count, slack), rows[:, None], np.tile(slopes, (count, 1, 1)), np.zeros(count)
+    )
 
 
 NOTHING = [clear_of(np.zeros(0, dtype=np.intp), 0.0, np.zeros(7))]
@@ -46,10 +54,10 @@ def moves(draw: st.DrawFn, passing: float = 0.0) -> tuple[JointState, JointState
 def direct(start: JointState, end: JointState) -> tuple[float, Array]:
     """How long the fastest motion takes, and its positions at the places looked at."""
     motion = CONNECTOR.connect(start, end)
-    return motion.duration, motion.over(PLACES * motion.duration).q
+    return motion.duration, motion.sample(PLACES * motion.duration).q
 
 
-def fitted(start: JointState, end: JointState, slower: float = 1.6) -> tuple[Transcription, JointCourse]:
+def fitted(start: JointState, end: JointState, slower: float = 1.6) -> tuple[Transcription, DiscreteMotion]:
     """A course that takes so much longer than the fastest motion."""
     program = Transcription(start, end, LIMITS)
     duration, first = direct(start, end)
@@ -58,7 +66,7 @@ def fitted(start: JointState, end: JointState, slower: float = 1.6) -> tuple[Tra
     return program, course
 
 
-def shortened(program: Transcription, course: JointCourse, times: int = 12) -> JointCourse:
+def shortened(program: Transcription, course: DiscreteMotion, times: int = 12) -> DiscreteMotion:
     """What remains of a course after so many steps with nothing in the way."""
     for _ in range(times):
         found = program.shorten(course, NOTHING, WIDE)
@@ -67,7 +75,7 @@ def shortened(program: Transcription, course: JointCourse, times: int = 12) -> J
     return course
 
 
-def flown(start: JointState, course: JointCourse, fine: int = FINE) -> JointState:
+def flown(start: JointState, course: DiscreteMotion, fine: int = FINE) -> JointState:
     """States on a course, by adding up its accelerations, each array of shape `(N, 7)`."""
     dt = course.step / fine
     q, qd, states = start.q, start.qd, []
@@ -134,7 +142,7 @@ def test_a_step_meets_what_is_demanded_of_three_positions_together_and_of_its_le
     rows, weights = np.array([[20, 24, 28], [60, 64, 68]]), np.array([0.2, -0.3, 0.1])
     slopes = np.tile(weights[:, None] * share, (2, 1, 1))
     lack = 0.2 * growth * course.step
-    demand = Demand(np.full(2, -lack), rows, slopes, np.full(2, growth))
+    demand = LinearizedConstraints(np.full(2, -lack), rows, slopes, np.full(2, growth))
     wall = clear_of(np.arange(50, 78), 0.1, share)
     found = program.shorten(course, [wall, demand], WIDE)
     assert found is not None

@@ -98,7 +98,7 @@ def halt(missions: Path, tmp_path_factory: pytest.TempPathFactory, request: pyte
     (tick, path), *_ = pressed
     return Halt(
         tick, outcome, path, np.array(commands[tick - BEFORE :]), np.array(measured),
-        JointLimits.of(loaded.cell_config.arm.limits),
+        JointLimits.from_config(loaded.cell_config.arm.limits),
         [node.name for node in run.root.iterate() if node.status is Status.RUNNING],
         read_journal(file),
     )  # fmt: skip
@@ -109,9 +109,10 @@ def distance(q: Array, path: Trajectory) -> float:
     near = int(np.argmin(np.abs(path.samples.q - q).max(axis=1))) * STEP
     bounds = near - STEP, near + STEP
     apart = minimize_scalar(
-        lambda s: np.linalg.norm(path.at(s).q - q), bounds=bounds, method="bounded", options={"xatol": 1e-9}
-    )
-    return float(np.abs(path.at(apart.x).q - q).max())
+        lambda s: np.linalg.norm(path.state_at(s).q - q),
+        bounds=bounds, method="bounded", options={"xatol": 1e-9},
+    )  # fmt: skip
+    return float(np.abs(path.state_at(apart.x).q - q).max())
 
 
 def test_the_arm_is_at_rest_within_half_a_second(halt: Halt) -> None:

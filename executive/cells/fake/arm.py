@@ -21,7 +21,7 @@ from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, discard_event
 from executive.geometry import Array, Pose, tool_down
 from executive.motion.arms import build_kinematics
-from executive.motion.plans import Plan, Plans
+from executive.motion.plans import Plan, PlanFactory
 
 MAX_REACH = 0.85
 """Maximum distance of the tool of the fake arm from the base [m]."""
@@ -73,7 +73,7 @@ class FakeArm:
         self._height = compute_travel_height(config)
         self._joint_count = config.arm.joint_count
         self._obstacles = FakeObstacles(config)
-        self._plans = Plans(self._plan_motion, clock, config.motion.planning_time, emit)
+        self._plans = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
         self._tool = self.poses["home"]
         self._path: list[Pose] = []
         self._half_length = 0
@@ -274,7 +274,9 @@ class FakeTool:
 def compute_named_poses(config: CellConfig) -> dict[str, Pose]:
     """Return the tool pose of each named pose of a cell file."""
     kinematics = build_kinematics(config)
-    return {name: kinematics.forward(np.radians(pose)) for name, pose in config.arm.poses_deg.items()}
+    return {
+        name: kinematics.compute_tool_pose(np.radians(pose)) for name, pose in config.arm.poses_deg.items()
+    }
 
 
 def check_reachable(position: Array) -> None:

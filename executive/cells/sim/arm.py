@@ -18,9 +18,9 @@ from executive.cells.sim.world import World
 from executive.errors import Fault
 from executive.events import Emit, discard_event
 from executive.geometry import Array, Pose
-from executive.motion.braking import brake
+from executive.motion.braking import plan_braking
 from executive.motion.planner import Planner
-from executive.motion.plans import Plan, Plans
+from executive.motion.plans import Plan, PlanFactory
 from executive.motion.trajectory import Trajectory
 
 VELOCITY_INTERVAL = 1e-4
@@ -66,7 +66,7 @@ class SimArm:
         self.planner = planner
         self._world = world
         self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
-        self._plans = Plans(self._solve, clock, config.motion.planning_time, emit)
+        self._plans = PlanFactory(self._solve, clock, config.motion.planning_time, emit)
         self._contacts = Contacts(world, held)
         self._motion: Trajectory | None = None
         self._time = 0.0
@@ -90,20 +90,20 @@ class SimArm:
     @property
     def tool_pose(self) -> Pose:
         """Pose of the tool centre point in the world, from the measured joint positions."""
-        return self.planner.kinematics.forward(self.q)
+        return self.planner.kinematics.compute_tool_pose(self.q)
 
     @property
     def tool_velocity(self) -> Array:
         """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
         states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
         q, change = np.array([(state[0], state[1] * VELOCITY_INTERVAL) for state in states]).T
-        forward = self.planner.kinematics.forward
-        return (forward(q + change).position - forward(q).position) / VELOCITY_INTERVAL
+        compute_pose = self.planner.kinematics.compute_tool_pose
+        return (compute_pose(q + change).position - compute_pose(q).position) / VELOCITY_INTERVAL
 
     @property
     def destination(self) -> Array:
         """Position of the tool at the end of the running motion, or now if none runs `(3,)` [m]."""
-        return self.planner.kinematics.forward(self._goal).position
+        return self.planner.kinematics.compute_tool_pose(self._goal).position
 
     @property
     def at_rest(self) -> bool:
@@ -159,7 +159,7 @@ class SimArm:
     def stop(self) -> None:
         """Brake along the path of the running motion, if there is one; returns at once."""
         if self._motion is not None and self._braking is None:
-            self._braking = list(brake(self._motion, self._time, self.planner.limits, STEP))
+            self._braking = list(plan_braking(self._motion, self._time, self.planner.limits, STEP))
 
     def run_into(self, obstacle: str) -> None:
         """Brake as after a collision, and set `collision` to `obstacle`; does nothing if no motion runs."""
@@ -180,7 +180,7 @@ class SimArm:
         if self._motion is None:
             return
         if self._braking is None:
-            self._met = self._contacts.find_new(lip_may_touch=self._time >= self._motion.guarded)
+            self._met = self._contacts.find_new(lip_may_touch=self._time >= self._motion.guarded_start_time)
             if self._met is not None:
                 self.stop()
         if self._braking is None:
@@ -189,7 +189,7 @@ class SimArm:
         else:
             self._time = self._braking.pop(0)
             done = not self._braking
-        self._command = self._motion.at(self._time)[0]
+        self._command = self._motion.state_at(self._time)[0]
         self.hold()
         if done:
             self._motion, self._braking = None, None

@@ -78,7 +78,7 @@ class CommandLog:
         """Append the start of a motion with its states, so that a resumed run can brake on its path."""
         if self._file is not None:
             states = np.hstack(motion.samples)
-            head = struct.pack(f"<{_BODIES[MOTION]}", motion.duration, motion.guarded, len(states))
+            head = struct.pack(f"<{_BODIES[MOTION]}", motion.duration, motion.guarded_start_time, len(states))
             self._append(bytes([MOTION]) + head + states.astype("<f8").tobytes())
 
     def close(self) -> None:

@@ -11,19 +11,19 @@ from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.errors import Unreachable
 from executive.geometry import Array, tool_down
 from executive.motion.arms import build_kinematics
-from executive.motion.limits import JointLimits, min_time
+from executive.motion.limits import JointLimits, compute_min_time
 
 ANGLE_SPACING = np.radians(20.0)
 """Step between sampled redundancy angles [rad]."""
 SAFETY_FACTOR = 0.8
-"""Share of the minimum time found for a carry; other configurations and heights may take less time."""
+"""Share of the minimum time found for a carry; other branches and heights may take less time."""
 
 
 class SimMinTimes(CellMinTimes):
     """Lower bounds of motion times for any planner; implements `executive.cell.protocols.MinTimes`.
 
     A carry begins at rest on an object and ends at rest over the bin. On any path, each joint needs at least
-    the time of its rest-to-rest motion. The bound is the minimum over all configurations; the last joint need
+    the time of its rest-to-rest motion. The bound is the minimum over all branches; the last joint need
     not turn, because the yaw is arbitrary.
 
     Args:
@@ -34,7 +34,7 @@ class SimMinTimes(CellMinTimes):
         self._highest = compute_max_pile_height(config)
         lowest = min(kind.height for kind in config.objects.values())
         super().__init__(config, TOUCH_DISTANCE, self._highest - lowest)
-        self._limits = JointLimits.of(config.arm.limits)
+        self._limits = JointLimits.from_config(config.arm.limits)
         self._kinematics = build_kinematics(config)
         self._carries: dict[str, float] = {}
 
@@ -53,7 +53,7 @@ class SimMinTimes(CellMinTimes):
         """Return the minimum time [s] for the nearest pair of `places` `(N, 2)` and `slots` `(N, 2)` [m]."""
         nearest = np.argmin(np.linalg.norm(places - slots, axis=1))
         starts, ends = (self._solve_postures(points[nearest], self._highest) for points in (places, slots))
-        return float(min_time(ends - starts[:, None], self._limits).min())
+        return float(compute_min_time(ends - starts[:, None], self._limits).min())
 
     def _solve_postures(self, place: Array, height: float) -> Array:
         """Return joint positions `(N, n)` [rad] with the tool at a place `(2,)` [m], the last joint at 0.

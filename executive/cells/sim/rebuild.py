@@ -108,7 +108,7 @@ def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> Int
 
 
 class SampledPiece:
-    """Quintic spline through given states; implements `Piece`.
+    """Quintic spline through given states; implements `MotionPiece`.
 
     Args:
         states: States at every `STEP` and at the end; each array has the shape `(N, n)`.
@@ -120,11 +120,11 @@ class SampledPiece:
         self._times = np.append(np.arange(0.0, duration, STEP), duration)
         self._states = states
 
-    def at(self, s: float) -> JointState:
+    def state_at(self, s: float) -> JointState:
         """Return the state at time `s` [s]."""
         return JointState(*(curve(s) for curve in self._curves))
 
-    def over(self, times: Array) -> JointState:
+    def sample(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s]."""
         return JointState(*(curve(times) for curve in self._curves))
 

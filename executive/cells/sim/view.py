@@ -55,8 +55,12 @@ class ArmShadow:
     def visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
         """Return a mask `(H, W)` of the pixels that the arm cannot occlude."""
         q = self._arm.q
-        flange, X_WT = self._kinematics.flange(q).position, self._kinematics.forward(q)
-        joints = [np.zeros(3), *(frame.position for frame in self._kinematics.joint_frames(q)), flange]
+        flange, X_WT = self._kinematics.compute_flange_pose(q).position, self._kinematics.compute_tool_pose(q)
+        joints = [
+            np.zeros(3),
+            *(frame.position for frame in self._kinematics.compute_joint_frames(q)),
+            flange,
+        ]
         parts: list[ArmPart] = [(joints, self._link_radius), ([flange, X_WT.position], TOOL_RADIUS)]
         if self._loaded():
             parts.append(([X_WT.position, X_WT.apply(np.array([0.0, 0.0, self._top]))], self._load))

@@ -22,7 +22,7 @@ def test_it_follows_a_motion_to_a_hundredth_of_a_degree(rig: Rig) -> None:
     rig.arm.start(motion)
     for step in range(1, math.ceil(motion.duration * 240) + 1):
         rig.step()
-        assert np.max(np.abs(rig.arm.q - motion.at(step / 240).q)) < math.radians(0.01)
+        assert np.max(np.abs(rig.arm.q - motion.state_at(step / 240).q)) < math.radians(0.01)
     assert rig.arm.at_rest
     assert rig.arm.collision is None
     assert np.allclose(rig.arm.tool_pose.position, OVER.position, atol=1e-4)

@@ -29,12 +29,12 @@ def float_at(rig: Rig, label: str, place: Array, mass: float = 0.1) -> int:
 
 def tool_at(rig: Rig, motion: Trajectory, share: float) -> Array:
     """Return where the tool is after a share of the time of a motion `(3,)` [m]."""
-    return rig.planner.kinematics.forward(motion.at(share * motion.duration).q).position
+    return rig.planner.kinematics.compute_tool_pose(motion.state_at(share * motion.duration).q).position
 
 
 def on_the_way_down(rig: Rig, motion: Trajectory) -> Array:
     """Return where the tool is in the middle of the guarded part of a motion `(3,)` [m]."""
-    return tool_at(rig, motion, (motion.guarded / motion.duration + 1) / 2)
+    return tool_at(rig, motion, (motion.guarded_start_time / motion.duration + 1) / 2)
 
 
 def bump(rig: Rig, motion: Trajectory, earliest: float = 0.0) -> str:
@@ -76,7 +76,7 @@ def test_it_counts_on_the_guarded_part_of_a_motion_as_well(rig: Rig) -> None:
     motion = rig.planned(LONG_DESCENT)
     under_the_flange = np.add(on_the_way_down(rig, motion), (0, -0.045, rig.config.tool.length - 0.025))
     float_at(rig, "cube", under_the_flange, mass=1.0)
-    said = bump(rig, motion, earliest=motion.guarded)
+    said = bump(rig, motion, earliest=motion.guarded_start_time)
     assert re.match(r"link 7 ran into a cube, with the tool at", said)
 
 
@@ -103,5 +103,5 @@ def test_the_shaft_of_the_tool_feels_a_bump_on_a_guarded_motion_too(rig: Rig) ->
     # Its edge lies beside the thin end of the tool, under the wider shaft.
     beside = 0.025 + (rig.config.tool.cup_radius + TOOL_RADIUS) / 2
     float_at(rig, "cube", np.add(on_the_way_down(rig, motion), (0, -beside, NECK_LENGTH - 0.025)), mass=1.0)
-    said = bump(rig, motion, earliest=motion.guarded)
+    said = bump(rig, motion, earliest=motion.guarded_start_time)
     assert said.startswith("the tool ran into a cube, with the tool at")

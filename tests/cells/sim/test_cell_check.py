@@ -17,7 +17,7 @@ from executive.cells.sim.cell import SimCell
 from executive.cells.sim.poses import find_places_out_of_reach, find_unfit_poses
 from executive.cells.sim.robot_models import ROBOT_MODELS
 from executive.mission.parse.cell_file import load_cell
-from executive.motion.arms import ARMS, build_kinematics
+from executive.motion.arms import ARMS_BY_URDF, build_kinematics
 from tests.cells.sim.conftest import shipped_cell
 from tests.motion.joint_states import reach
 
@@ -154,7 +154,7 @@ def test_limits_of_another_number_of_joints_are_a_finding(overhead: CellConfig) 
     ("position", "why"),
     [
         ((0.6, -0.6, 0.0), "farther than the arm is long (0.82 m)"),
-        ((0.24, -0.25, 0.0), "nearer than joint 4 can fold (0.41 m)"),
+        ((0.24, -0.25, 0.0), "nearer than joint 4 permits (0.41 m)"),
     ],
 )
 def test_a_bin_with_one_slot_out_of_reach_is_named_with_the_distance(
@@ -179,5 +179,5 @@ def test_the_safe_place_and_poses_must_be_within_reach(overhead: CellConfig) -> 
 
 def test_every_arm_with_kinematics_has_a_model_with_as_many_joints() -> None:
     assert {name: model.joint_count for name, model in ROBOT_MODELS.items()} == {
-        name: joint_count for name, (joint_count, _) in ARMS.items()
+        name: joint_count for name, (joint_count, _) in ARMS_BY_URDF.items()
     }

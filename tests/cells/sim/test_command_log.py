@@ -49,7 +49,7 @@ def test_a_command_that_was_torn_is_left_out_wherever_it_was(path: Path, overhea
     written.motion(motion)
     written.close()
     *_, command = read_commands(path)
-    assert command.numbers[:2] == (motion.duration, motion.guarded)
+    assert command.numbers[:2] == (motion.duration, motion.guarded_start_time)
     for one, other in zip(states_of(command), motion.samples, strict=True):
         assert np.array_equal(one, other)
     content = path.read_bytes()

@@ -115,15 +115,17 @@ def test_it_is_the_same_to_the_last_bit(cells: list[tuple[Left, SimCell]]) -> No
 
 
 def test_the_arm_brakes_on_the_path_it_was_on(cells: list[tuple[Left, SimCell]], mission) -> None:
-    limits = JointLimits.of(mission.cell_config.arm.limits)
+    limits = JointLimits.from_config(mission.cell_config.arm.limits)
     for one, cell in cells:
-        commands = [] if one.motion is None else [one.motion.at(one.time - k * STEP).q for k in (2, 1, 0)]
+        commands = (
+            [] if one.motion is None else [one.motion.state_at(one.time - k * STEP).q for k in (2, 1, 0)]
+        )
         for _ in range(240):
             if cell.cell.arm.at_rest:
                 break
             cell.advance()
             assert one.motion is not None
-            on_path = one.motion.at(cell._arm._time).q
+            on_path = one.motion.state_at(cell._arm._time).q
             assert np.abs(cell._arm._command - on_path).max() < 1e-7, one.tick
             commands.append(cell._arm._command)
         assert cell.cell.arm.at_rest, one.tick
@@ -139,7 +141,7 @@ def test_a_command_that_no_physics_step_has_followed_is_not_skipped(
     log = tmp_path / "log"
     log.write_bytes(one.log.read_bytes())
     time = one.time + STEP
-    CommandLog(log, 7, again=True).note(JOINTS_TO, time, *one.motion.at(time).q)
+    CommandLog(log, 7, again=True).note(JOINTS_TO, time, *one.motion.state_at(time).q)
     cell = rebuilt(mission, log)
     cell.advance()
     assert cell._arm._time == pytest.approx(time, abs=STEP / 10)

@@ -12,9 +12,9 @@ from joint_states import LIMITS
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array
+from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
 from executive.motion.iiwa14_kinematics import Iiwa14
 from executive.motion.limits import JointRange
-from executive.motion.postures import find_postures, find_vertical_line
 
 ARM = Iiwa14(0.12, LIMITS.position)
 START = np.radians([38, 33, 0, -88, 0, 59, 20])
@@ -29,20 +29,22 @@ def arm_within(limit: Array) -> Iiwa14:
 @given(places, yaws, st.floats(0.0, 0.15))
 @settings(max_examples=40)
 def test_every_posture_points_down_over_the_goal_inside_the_limits(place, yaw, length: float) -> None:
-    found = find_postures(ARM, Goal(place, yaw), length, START)
+    found = find_configuration_pairs(ARM, Goal(place, yaw), length, START)
     for qs, height in ((found.low, 0.0), (found.high, length)):
-        tips, axes = ARM.tips(qs)
+        tips, axes = ARM.compute_tips_and_axes(qs)
         assert np.allclose(tips, np.add(place, (0, 0, height)), atol=1e-7)
         assert np.allclose(axes, [0, 0, -1], atol=1e-7)
         assert np.all(LIMITS.position.shrink(-1e-9).contains(qs))
         for q in qs[::17] if yaw is not None else ():
-            assert np.allclose(ARM.forward(q).rotation[:, 1], [-math.sin(yaw), math.cos(yaw), 0], atol=1e-7)
+            assert np.allclose(
+                ARM.compute_tool_pose(q).rotation[:, 1], [-math.sin(yaw), math.cos(yaw), 0], atol=1e-7
+            )
 
 
 def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:
     start = START.copy()
     start[6] = LIMITS.position.upper[6]
-    found = find_postures(ARM, Goal((0.5, 0.1, 0.05)), 0.1, start)
+    found = find_configuration_pairs(ARM, Goal((0.5, 0.1, 0.05)), 0.1, start)
     drift = found.high[:, 6] - found.low[:, 6]
     last = LIMITS.position.upper[6] - math.radians(1)
     assert np.allclose(np.maximum(found.low[:, 6], found.high[:, 6]), last, atol=1e-9)
@@ -51,10 +53,10 @@ def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:
 
 def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leaves_its_range() -> None:
     tilted = START + np.eye(7)[5] * 0.1
-    assert find_vertical_line(ARM, START, 0.1, 5) is not None
-    assert find_vertical_line(ARM, tilted, 0.1, 5) is None
+    assert find_vertical_waypoints(ARM, START, 0.1, 5) is not None
+    assert find_vertical_waypoints(ARM, tilted, 0.1, 5) is None
     narrow = arm_within(np.minimum(LIMITS.position.upper, np.abs(START) + 0.01))
-    assert find_vertical_line(narrow, START, 0.2, 5) is None
+    assert find_vertical_waypoints(narrow, START, 0.2, 5) is None
 
 
 @pytest.mark.parametrize(
@@ -68,7 +70,7 @@ def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leave
         (
             (0.3, 0.0, 0.114),
             0.0,
-            r"(0.300, 0.000, 0.114) m: .* 0\.110 m nearer than joint 4 can fold",
+            r"(0.300, 0.000, 0.114) m: .* 0\.110 m nearer than joint 4 permits",
         ),
         ((0.5, 0.0, 0.05), 0.9, r"(0.500, 0.000, 0.950) m: .* farther than the arm"),
         ((0.5, 0.0, 0.1), 0.0, r"(0.500, 0.000, 0.100) m: .* best one leaves joint 6 14\.1° outside ±20°"),
@@ -78,16 +80,17 @@ def test_what_cannot_be_reached_says_at_which_height_and_why(place, length: floa
     narrow = arm_within(np.radians([170, 120, 170, 120, 170, 20 if place[2] == 0.1 else 120, 175]))
     point, reason = text.split(" m: ")
     with pytest.raises(Unreachable, match=f"{re.escape(point)} m: {reason}"):
-        find_postures(narrow, Goal(place), length, np.zeros(7))
+        find_configuration_pairs(narrow, Goal(place), length, np.zeros(7))
 
 
 def test_heights_that_only_different_postures_reach_are_unreachable_together() -> None:
     narrow = arm_within(np.radians([15, 120, 18, 120, 170, 120, 175]))
     x, y, low, high = 0.42, 0.18, 0.05, 0.25
     for height in (low, high):
-        assert len(find_postures(narrow, Goal((x, y, height), 0.0), 0.0, START))
+        assert len(find_configuration_pairs(narrow, Goal((x, y, height), 0.0), 0.0, START))
     text = (
-        "the heights 0.250 and 0.050 m above (0.420, 0.180) m, but no single posture of the arm reaches both"
+        "the heights 0.250 and 0.050 m above (0.420, 0.180) m, "
+        "but not without a change of the configuration of the arm in between"
     )
     with pytest.raises(Unreachable, match=re.escape(text)):
-        find_postures(narrow, Goal((x, y, low), 0.0), high - low, START)
+        find_configuration_pairs(narrow, Goal((x, y, low), 0.0), high - low, START)
