@@ -26,7 +26,7 @@ def journal_of(*statuses: tuple[str, str], end: RunEnded = HALTED) -> list[Timed
     return [*events, at(40, end)]
 
 
-def test_an_arm_that_moves_is_told(fake: FakeCell) -> None:
+def test_a_moving_arm_is_reported(fake: FakeCell) -> None:
     assert list(check_rest(fake)) == []
     fake.arm.start(fake.arm._plan_motion(fake.arm.destination, "home", Task()) or pytest.fail())
     fake.arm._path *= 20
@@ -54,7 +54,7 @@ def test_every_node_of_a_journal_begins_once_and_ends(
 @pytest.mark.parametrize(
     "journal", [[], [*journal_of(), *journal_of()], [*journal_of(), at(41, item_changed("cube-1"))]]
 )
-def test_a_journal_without_one_end_at_its_end_is_told(journal: list[TimedEvent]) -> None:
+def test_a_journal_without_exactly_one_end_is_reported(journal: list[TimedEvent]) -> None:
     (problem,) = check_journal(journal, HALTED)
     ends = sum(isinstance(timed.event, RunEnded) for timed in journal)
     assert (
@@ -62,7 +62,7 @@ def test_a_journal_without_one_end_at_its_end_is_told(journal: list[TimedEvent])
     )
 
 
-def test_a_journal_that_ends_otherwise_than_the_run_is_told() -> None:
+def test_a_journal_with_another_end_than_the_run_is_reported() -> None:
     (problem,) = check_journal(journal_of(end=replace(HALTED, holds="cube_1")), HALTED)
     assert problem.startswith("the journal ends with RunEnded(status='HALTED'")
 
@@ -77,7 +77,7 @@ def test_a_journal_that_ends_otherwise_than_the_run_is_told() -> None:
         (False, "cube_1", ['the tool holds nothing, but the run names "cube_1"']),
     ],
 )
-def test_what_the_tool_holds_must_be_told_by_name(holding: bool, statuses: str, problem: list[str]) -> None:
+def test_the_held_item_must_be_named(holding: bool, statuses: str, problem: list[str]) -> None:
     workcell: Any = SimpleNamespace(
         cell=SimpleNamespace(tool=SimpleNamespace(holding=holding)),
         accounts=SimpleNamespace(summaries=lambda: [item_changed("cube_1")]),

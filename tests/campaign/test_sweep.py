@@ -43,15 +43,15 @@ def work(job: Job) -> Result:
 
 
 def test_every_seed_is_run_once_in_another_process():
-    told = []
-    results = swept(range(1, 5), work, progress=lambda done, total: told.append((done, total)))
+    reported = []
+    results = swept(range(1, 5), work, progress=lambda done, total: reported.append((done, total)))
     assert [entry.seed for entry in results] == [1, 2, 3, 4]
     assert results[0].ticks != os.getpid()
     assert results[0].unknown == {"a": "1"}
     assert (results[2].status, results[2].message) == ("FAULT", "ValueError: seed three")
     assert (results[3].status, results[3].message) == ("FAULT", "there is no place for seed four")
     assert results[2].planning == PlanningTotals()
-    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def interrupt(job: Job) -> Result:
@@ -79,9 +79,9 @@ def test_every_run_leaves_its_record_and_its_report(tmp_path):
 
 @pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
-    told = []
-    results = swept(range(9), interrupt, workers=1, halting=lambda: told.append("halting"))
-    assert ([entry.seed for entry in results], told) == ([0], ["halting"])
+    reported = []
+    results = swept(range(9), interrupt, workers=1, halting=lambda: reported.append("halting"))
+    assert ([entry.seed for entry in results], reported) == ([0], ["halting"])
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 

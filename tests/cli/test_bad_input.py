@@ -125,7 +125,9 @@ def test_the_mission_that_all_cases_change_is_sound(write: Callable[..., int]) -
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_a_mistake_in_a_file_is_told_once_and_nothing_moves(write: Callable[..., int], case: Case) -> None:
+def test_a_mistake_in_a_file_is_reported_once_and_nothing_moves(
+    write: Callable[..., int], case: Case
+) -> None:
     line = write(case.mission, case.cell)
     expected = dedent(case.expected).lstrip("\n").replace(":LINE:", f":{line}:").replace("LINE", f"{line:4}")
     checked = invoke("check", "m.yaml")
@@ -199,7 +201,9 @@ SHIPPED = f"Shipped missions: {', '.join(shipped_missions())}.\n"
         ("m.yaml --request cube --request banana", 'cannot pick "banana"; ask for one of: cube, sphere, duck\n'),
     ],
 )  # fmt: skip
-def test_what_is_not_there_is_told_with_what_is(write: Callable[..., int], words: str, expected: str) -> None:
+def test_a_missing_name_is_reported_with_the_existing_names(
+    write: Callable[..., int], words: str, expected: str
+) -> None:
     write()
     ran = invoke("run", *words.split(), "--runs", "runs")
     assert (ran.exit_code, ran.stdout, ran.stderr) == (2, "", expected)

@@ -267,7 +267,7 @@ def test_check_tells_every_finding(project):
     assert shown.exit_code == 2
 
 
-def test_a_warning_is_told_and_stops_nothing(project):
+def test_a_warning_is_printed_and_the_run_continues(project):
     shown = invoke("check", "sort")
     assert (shown.exit_code, shown.stdout) == (0, "sort: ok\n")
     project.warnings = (Finding("sort.yaml", 3, 5, "warning", "unused", "no skill reads it"),)
@@ -278,7 +278,7 @@ def test_a_warning_is_told_and_stops_nothing(project):
 
 
 @pytest.mark.parametrize(
-    ("statuses", "asked", "code", "told"),
+    ("statuses", "asked", "code", "expected"),
     [
         (["SUCCESS"], 1, 0, "1 of 1 runs succeeded\n"),
         (["SUCCESS", "FAILURE"], 2, 1, "1 of 2 runs succeeded\n"),
@@ -287,12 +287,12 @@ def test_a_warning_is_told_and_stops_nothing(project):
         ([], 6, 130, "0 of 6 runs, cut off\n"),
     ],
 )
-def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses, asked, code, told):
+def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses, asked, code, expected):
     results = [replace(RESULT, seed=seed, status=status) for seed, status in enumerate(statuses)]
     monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: results)
     shown = invoke("sweep", "sort", "--seeds", f"0-{asked - 1}", "--json", "--runs", str(tmp_path))
     assert shown.exit_code == code
-    assert told in shown.stderr
+    assert expected in shown.stderr
     figures = json.loads(shown.stdout)
     assert (figures["asked"], figures["cut_off"], figures["results"]) == (
         asked,

@@ -1,4 +1,4 @@
-"""`executive sweep` in a process of its own, told to end long before its last seed."""
+"""`executive sweep` in a process of its own, interrupted long before its last seed."""
 
 from __future__ import annotations
 
@@ -30,6 +30,6 @@ def test_it_says_at_once_that_it_halts_and_then_how_far_it_came(tmp_path: Path, 
     figures = json.loads(shown)
     assert (figures["asked"], figures["cut_off"]) == (400, True)
     assert 1 <= figures["runs"] < 400
-    halting, told = said.index("halting: no new runs start"), said.index(" of 400 runs, cut off; ")
-    assert halting < told
+    halting, summary = said.index("halting: no new runs start"), said.index(" of 400 runs, cut off; ")
+    assert halting < summary
     assert f"{figures['runs']} of 400 runs, cut off; {figures['succeeded']} of them succeeded" in said

@@ -37,8 +37,8 @@ def test_a_cells_detector_is_measured_as_in_a_run_with_a_sheet_of_its_worst_miss
     sheet = tmp_path / "sheet.png"
     stored = tmp_path / "overhead.measured.json"
     options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--seed", 2, "--out", stored)
-    said, told = evaluate(*options, "--sheet", sheet)
-    measured = told["measured"]["overhead"]
+    said, printed = evaluate(*options, "--sheet", sheet)
+    measured = printed["measured"]["overhead"]
     assert (measured["detector"], measured["kind"], measured["images"]) == ("embedded", "embedded", 1)
     assert (measured["recall"], measured["localized"]["median"] < 5) == (1, True)
     (measurement,) = read_measurements(stored)
@@ -59,10 +59,10 @@ def test_a_detector_is_measured_in_the_world_of_a_scene_file(tmp_path):
     scene = tmp_path / "moved.yaml"
     scene.write_text("scene: moved\ncamera: {shift: [0.0, 0.03, 0.0]}\ntable: {objects: [4, 4]}\n")
     options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--scene", scene)
-    _, told = evaluate(*options)
-    measured = told["measured"]["overhead"]
-    assert (told["scene"], measured["objects"]) == (str(scene), 4)
-    # The detector is told nothing of the shift, so that its objects are localized beside their places.
+    _, printed = evaluate(*options)
+    measured = printed["measured"]["overhead"]
+    assert (printed["scene"], measured["objects"]) == (str(scene), 4)
+    # The detector does not know the shift, so its objects are localized beside their true positions.
     assert measured["localized"]["median"] == pytest.approx(30, abs=5)
 
 
@@ -75,20 +75,20 @@ def test_a_detector_is_measured_in_the_world_of_a_scene_file(tmp_path):
     ],
 )
 def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset, arguments, where, detector):
-    _, told = evaluate("--dataset", dataset, *arguments)
-    ((called, measured),) = told["measured"].items()
+    _, printed = evaluate("--dataset", dataset, *arguments)
+    ((called, measured),) = printed["measured"].items()
     assert (called, measured["detector"], measured["images"], measured["objects"]) == (where, detector, 1, 1)
     assert (measured["recall"], measured["confusion"]) == (0, {"cube": {"nothing": 1}})
     model = detector == "model"
-    assert (told["weights"], measured["threshold"]) == ((str(MODEL), 0.9) if model else (None, 0.5))
+    assert (printed["weights"], measured["threshold"]) == ((str(MODEL), 0.9) if model else (None, 0.5))
 
 
 def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(missions, tmp_path):
     options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--seed", 2)
     changed = ("--set", "cell.detectors.embedded.threshold=0.7")
     before = sorted((missions / "cells").iterdir())
-    said, told = evaluate(*options, *changed)
-    assert (told["measured"]["overhead"]["threshold"], "stored" in said) == (0.7, False)
+    said, printed = evaluate(*options, *changed)
+    assert (printed["measured"]["overhead"]["threshold"], "stored" in said) == (0.7, False)
     assert sorted((missions / "cells").iterdir()) == before
     evaluate(*options, *changed, "--out", tmp_path / "o.json")
     assert read_measurements(tmp_path / "o.json")[0].fingerprint["threshold"] == "0.7"
@@ -123,7 +123,7 @@ def test_options_that_make_no_sense_are_explained(dataset, arguments, sentence):
     assert sentence in evaluate(*arguments, code=2)[0]
 
 
-def test_a_detector_that_cannot_be_built_is_told_before_anything_is_rendered(missions, tmp_path):
+def test_a_detector_that_cannot_be_built_is_reported_before_anything_is_rendered(missions, tmp_path):
     text = (missions / "cells" / "overhead.yaml").read_text(encoding="utf-8")
     cell = tmp_path / "mine.yaml"
     options = "kind: rfdetr\n    model_path: none.onnx\n    labels: [cube]"

@@ -26,28 +26,28 @@ def invoke(*words: str) -> Result:
 @pytest.fixture
 def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """Stands for the campaign: what it was asked for, and what it says went wrong."""
-    told = SimpleNamespace(asked=[], problems=(), complete=True)
+    fake = SimpleNamespace(asked=[], problems=(), complete=True)
 
     class Campaign:
         def __init__(self, subject, *, workers, progress, halting):
-            told.asked.append((subject.name, subject.cell, subject.seed, workers))
+            fake.asked.append((subject.name, subject.cell, subject.seed, workers))
             self._name = subject.name
 
         def try_singles(self):
-            told.asked.append("singles")
+            fake.asked.append("singles")
             return self._figures(pairs=False)
 
         def try_pairs(self, count):
-            told.asked.append(("pairs", count))
+            fake.asked.append(("pairs", count))
             return self._figures(pairs=True)
 
         def _figures(self, *, pairs):
-            trial = Trial(**{**vars(TRIAL), "problems": told.problems})
+            trial = Trial(**{**vars(TRIAL), "problems": fake.problems})
             ways = (Branch("sort.yaml:14", "recover", ("tree/retry/recover",)),)
-            return FaultFigures(self._name, "fake", 0, 11.5, 1, (trial,), ways, told.complete, pairs)
+            return FaultFigures(self._name, "fake", 0, 11.5, 1, (trial,), ways, fake.complete, pairs)
 
     monkeypatch.setattr("executive.campaign.faults.campaign.Campaign", Campaign)
-    return told
+    return fake
 
 
 def test_pairs_are_tried_instead_and_an_oracle_where_one_is_wanted(campaigns):
@@ -72,16 +72,16 @@ def test_one_fault_is_repeated_and_recorded(tmp_path: Path):
     number = next(line.split()[0] for line in lines if "Grasp missed, first: nothing seals" in line)
     shown = invoke(*FAKE, "--fault", number, "--runs", str(tmp_path))
     assert shown.exit_code == 0, shown.output
-    told = shown.stdout.splitlines()
-    assert told[0].startswith(f"fault {number}: tree/")
-    assert told[1] == "  SUCCESS"
-    assert (Path(told[-1]) / "result.json").is_file()
+    lines = shown.stdout.splitlines()
+    assert lines[0].startswith(f"fault {number}: tree/")
+    assert lines[1] == "  SUCCESS"
+    assert (Path(lines[-1]) / "result.json").is_file()
     plain = json.loads(invoke(*FAKE, "--fault", number, "--runs", str(tmp_path), "--json").stdout)
     assert (plain["fault"], plain["verdict"], plain["happened"]) == (number, "ok", True)
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "expected"),
     [
         (("--fault", "0"), "sort_overhead has no fault 0; the numbers are 1 to "),
         (("--fault", "twelve"), '"twelve" is no fault; write it as 12, or 3+12 for two at once'),
@@ -89,23 +89,23 @@ def test_one_fault_is_repeated_and_recorded(tmp_path: Path):
         (("--pairs", "0"), "0 is not in the range x>=1"),
     ],
 )
-def test_what_cannot_be_tried_is_refused(words, told):
+def test_what_cannot_be_tried_is_refused(words, expected):
     shown = invoke(*FAKE, *words)
     assert shown.exit_code == 2
-    assert told in shown.stderr
+    assert expected in shown.stderr
 
 
 @pytest.mark.parametrize(
-    ("problems", "complete", "code", "told"),
+    ("problems", "complete", "code", "expected"),
     [
         ((), True, 0, "    never entered: sort.yaml:14: recover"),
         (("the arm is not at rest",), True, 1, "wrong: the arm is not at rest"),
         ((), False, 130, "ended by the user"),
     ],
 )
-def test_it_prints_the_matrix_and_ends_by_what_it_found(campaigns, problems, complete, code, told):
+def test_it_prints_the_matrix_and_ends_by_what_it_found(campaigns, problems, complete, code, expected):
     campaigns.problems, campaigns.complete = problems, complete
     shown = invoke(*FAKE, "--workers", "1", "--seed", "4")
     assert campaigns.asked == [("sort_overhead", "fake", 4, 1), "singles"]
-    assert (shown.exit_code, told in shown.stdout) == (code, True)
+    assert (shown.exit_code, expected in shown.stdout) == (code, True)
     assert "  Grasp  sort.yaml:7  missed  " in shown.stdout

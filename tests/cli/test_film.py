@@ -42,8 +42,8 @@ def test_a_film_is_made_where_it_was_wanted(run: Path, tmp_path: Path) -> None:
     done = invoke("film", "latest", "--runs", str(run.parents[1]), "-o", str(out), "--json", "--workers", "3")
     assert done.exit_code == 0, done.output
     assert out.read_text() == "10-00-00_sort_s5 .mp4 1 3"
-    told = json.loads(done.stdout)
-    assert told == {"file": str(out), "frames": 30, "seconds": 1.2, "size": out.stat().st_size}
+    printed = json.loads(done.stdout)
+    assert printed == {"file": str(out), "frames": 30, "seconds": 1.2, "size": out.stat().st_size}
     assert done.stderr.startswith("making a film of about 6 s\n")
     assert f"{out}: 1.2 s, 0.0 MB" in done.stderr.replace("\n", "")
 

@@ -123,7 +123,7 @@ def test_in_an_empty_working_directory_nothing_needs_to_be_entered(monkeypatch: 
 
 
 @pytest.mark.parametrize(
-    ("held", "folder", "told"),
+    ("held", "folder", "expected"),
     [
         (["hall/notes"], "hall", 'the folder "hall" is not empty: it holds notes'),
         (
@@ -136,13 +136,15 @@ def test_in_an_empty_working_directory_nothing_needs_to_be_entered(monkeypatch: 
         ([], "random", "random.py; give another name with --name"),
     ],
 )
-def test_where_no_project_can_be_everything_stays_as_it_is(held: list[str], folder: str, told: str) -> None:
+def test_where_no_project_can_be_everything_stays_as_it_is(
+    held: list[str], folder: str, expected: str
+) -> None:
     for name in held:
         Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_text("mine")
     result = init(folder)
     assert (result.exit_code, result.stdout) == (2, "")
-    assert told in result.stderr
+    assert expected in result.stderr
     assert sorted(str(path) for path in Path().rglob("*") if path.is_file()) == held
 
 

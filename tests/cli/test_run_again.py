@@ -70,8 +70,12 @@ def test_a_replay_says_what_is_decided_otherwise(runs: Path, tmp_path: Path) -> 
     edited.write_text((path / "mission.yaml").read_text().replace("prefer: surest", "prefer: nearest"))
     other = invoke("replay", str(path), "--mission", str(edited), "--json")
     assert other.exit_code == 1
-    told = json.loads(other.stdout)
-    assert (told["same"], told["edited"], told["recorded"]["kind"]) == (False, True, "TargetSelected")
+    printed = json.loads(other.stdout)
+    assert (printed["same"], printed["edited"], printed["recorded"]["kind"]) == (
+        False,
+        True,
+        "TargetSelected",
+    )
 
 
 @pytest.mark.parametrize(

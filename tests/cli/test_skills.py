@@ -56,9 +56,9 @@ def shown(*words: str) -> Result:
 
 
 def test_json_tells_everything_of_one_skill_as_one_object_and_of_all_as_one_array():
-    told = json.loads(shown("PlaceNeatly", "--json").stdout)
-    params, ports = told.pop("params"), told.pop("ports")
-    assert told == {
+    printed = json.loads(shown("PlaceNeatly", "--json").stdout)
+    params, ports = printed.pop("params"), printed.pop("ports")
+    assert printed == {
         "name": "PlaceNeatly",
         "doc": "Put the item down in line with the others.\n\nSucceeds when the tool is empty.",
         "reasons": ["full", "stuck"], "uses": ["arm", "tool"], "senses": True, "moves": True,
@@ -126,9 +126,9 @@ def test_an_unknown_skill_is_refused_in_either_form():
     assert 'no skill "Rets" is installed. Did you mean "Rest"?' in result.stderr
 
 
-def test_every_installed_skill_can_be_told(monkeypatch):
+def test_every_installed_skill_can_be_described(monkeypatch):
     monkeypatch.undo()
-    told = json.loads(shown("--json").stdout)
-    assert [facts["name"] for facts in told] == list(discover())
-    for facts in told:
+    printed = json.loads(shown("--json").stdout)
+    assert [facts["name"] for facts in printed] == list(discover())
+    for facts in printed:
         assert shown(facts["name"]).stdout.startswith(f"{facts['name']}\n")

@@ -72,10 +72,10 @@ def test_without_a_name_all_skills_are_checked_and_mistakes_have_exit_code_1() -
 
 def test_as_json_all_checks_are_one_array() -> None:
     result = conform("Nap", "--json")
-    told = json.loads(result.stdout)
-    assert [verdict["check"] for verdict in told] == [rule.__name__ for rule in RULES]
-    assert {verdict["skill"] for verdict in told} == {"Nap"}
-    (failed,) = (verdict for verdict in told if verdict["status"] != "ok")
+    printed = json.loads(result.stdout)
+    assert [verdict["check"] for verdict in printed] == [rule.__name__ for rule in RULES]
+    assert {verdict["skill"] for verdict in printed} == {"Nap"}
+    (failed,) = (verdict for verdict in printed if verdict["status"] != "ok")
     assert (failed["check"], failed["status"]) == ("has_allowed_defaults", "failed")
     assert failed["doc"].startswith("Each default is a valid value of its param")
     assert len(failed["problems"]) == 2

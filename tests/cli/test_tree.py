@@ -96,7 +96,7 @@ def test_what_a_mission_says_cannot_break_the_picture(every_node):
     assert "<b>" not in picture
 
 
-def test_ports_and_reasons_are_told_on_demand(every_node):
+def test_ports_and_reasons_are_printed_on_demand(every_node):
     plain, full = shown(every_node).stdout, shown(every_node, "--ports", "--reasons").stdout
     assert "reads" not in plain and "may fail" not in plain
     assert "reads $targets, $same?, wanted <- $kind?; writes $target, $item, $bin" in full

@@ -100,7 +100,7 @@ def test_what_the_tool_has_met_exists_however_often_it_is_overlooked() -> None:
     assert item.existence_probability == 1.0
 
 
-def test_looks_that_agree_sharpen_a_place_and_a_push_starts_anew() -> None:
+def test_agreeing_looks_reduce_the_standard_error_and_a_push_resets_it() -> None:
     item = record()
     for offset in (-0.01, 0.01, -0.01, 0.01):
         item.update_position(HERE + np.array([offset, 0, 0]), 0.013, is_settled=True)

@@ -47,7 +47,7 @@ def held(fake: FakeCell) -> str:
     return pick(fake, target)
 
 
-def test_the_ledger_is_told_once(fake: FakeCell, held: str) -> None:
+def test_a_drop_is_recorded_once(fake: FakeCell, held: str) -> None:
     assert not record_drop(fake.cell, held)
     fake.tool.break_seal()
     assert record_drop(fake.cell, held)

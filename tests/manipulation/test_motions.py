@@ -23,7 +23,7 @@ def test_an_arm_that_runs_into_something_stops_and_the_whole_table_is_in_doubt(
     assert run_skill(MoveToScan(pose="aside"), fake).status == "SUCCESS", "only that motion was broken off"
 
 
-def test_what_a_look_shows_while_a_motion_is_planned_is_heeded(fake: FakeCell) -> None:
+def test_a_look_during_planning_changes_the_plan(fake: FakeCell) -> None:
     asked: list[Task] = []
 
     def ask() -> tuple[Goal, Task]:

@@ -114,7 +114,7 @@ def neighbours(x: float, y: float, turn: float, count: int, top: float) -> tuple
     )
 
 
-def test_the_check_gets_the_whole_path_without_gaps_and_what_has_to_be_heeded(config, home) -> None:
+def test_the_collision_check_gets_the_complete_path_and_the_obstacles(config, home) -> None:
     asked = []
     motion = build_planner(config, lambda path, task: asked.append((path, task))).plan(home, BIN, CARRYING)
     ((path, task),) = asked

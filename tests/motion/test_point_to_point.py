@@ -33,7 +33,7 @@ def test_it_joins_two_states_inside_the_limits(start: JointState, end: JointStat
 
 @given(states(), states(), st.floats(0, 8))
 @settings(max_examples=30)
-def test_it_takes_as_long_as_it_is_told_to(start: JointState, end: JointState, least: float) -> None:
+def test_a_motion_takes_the_requested_duration(start: JointState, end: JointState, least: float) -> None:
     fastest = CONNECTOR.connect(start, end).duration
     slower = CONNECTOR.connect(start, end, least).duration
     # Some durations in between cannot be: a moving joint may have to turn back first.

@@ -86,7 +86,7 @@ def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypa
     assert (mine.setting.name, mine.setting.base, mine.setting.seed) == ("mine", tmp_path, 7)
 
 
-def test_detectors_are_built_once_in_the_files_order_whoever_needs_them(oracle_installed):
+def test_detectors_are_built_once_in_the_order_of_the_file(oracle_installed):
     built = build(first=oracle(beside="second"), second=oracle())
     assert list(built) == ["first", "second"]
     assert built["first"].other is built["second"]

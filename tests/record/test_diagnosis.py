@@ -87,7 +87,7 @@ def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
     assert story.chain[2].why == "runs again only after IsHolding.empty"
 
 
-def test_an_undeclared_reason_is_told_at_the_line_of_its_skill() -> None:
+def test_an_undeclared_reason_is_reported_at_the_line_of_its_skill() -> None:
     run = FailedRun(PICK, objects=CUBE)
 
     def seals() -> bool:
@@ -154,7 +154,7 @@ def test_a_halt_at_a_question_says_so() -> None:
     gone=st.sampled_from([0.0, 0.0, 0.5, 1.0]),
     stop=st.none() | st.integers(0, 1500),
 )  # fmt: skip
-def test_whatever_goes_wrong_its_story_can_be_told(breaks, slips, misses, gone, stop) -> None:
+def test_every_failure_has_a_diagnosis(breaks, slips, misses, gone, stop) -> None:
     run = FailedRun("sort_overhead", overrides={"attempts": "2"})
     run.fake.tool.can_seal = lambda: breaks.random() >= misses
     run.fake.detector.answers = lambda look, true: "gone" if breaks.random() < gone else true

@@ -91,8 +91,8 @@ def test_wherever_the_disk_fills_up_the_run_ends_at_rest_and_says_so(run, monkey
         assert (result["status"], result["run"]) == ("FAULT", str(left))
         assert "no space left on device" in result["message"]
         # What stands in the journal is what came about, as far as it goes.
-        told = [json.loads(line) for line in (left / "journal.jsonl").read_bytes().splitlines()]
-        assert [entry["kind"] for entry in told] == kinds[: len(told)]
+        recorded = [json.loads(line) for line in (left / "journal.jsonl").read_bytes().splitlines()]
+        assert [entry["kind"] for entry in recorded] == kinds[: len(recorded)]
         assert not (left / "result.json").exists() or json.loads((left / "result.json").read_text()) == result
     # Where the run has not begun it is bad input: a place that cannot be written to.
     assert codes == sorted(codes, key=(2, 3, 0).index)

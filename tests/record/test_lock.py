@@ -38,7 +38,7 @@ def refusal(path: Path, **how: bool) -> str:
     return str(raised.value)
 
 
-def test_a_second_run_is_told_which_process_writes_there(tmp_path, holder):
+def test_a_second_run_is_refused_with_the_process_that_writes(tmp_path, holder):
     assert refusal(tmp_path / "journal.jsonl") == (
         f'the run directory "{tmp_path}" is in use: process {holder.pid} writes its journal, and two runs '
         f'cannot share it; wait until that run has ended, or stop it with "kill {holder.pid}"'

@@ -168,7 +168,7 @@ def test_a_long_run_keeps_its_first_pictures_and_says_what_it_left_out(tmp_path,
     assert frames.problem == "missing pictures: 1 because of a full queue"
 
 
-def test_pictures_that_cannot_be_written_are_told_and_break_nothing(tmp_path):
+def test_pictures_that_cannot_be_written_are_reported_and_the_run_continues(tmp_path):
     (tmp_path / "frames").write_text("a file, no folder")
     frames = shown(tmp_path / "frames", look(1, CUBE), decision())
     frames.close()

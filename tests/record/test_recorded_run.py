@@ -69,7 +69,7 @@ def test_leaves_a_directory_that_explains_the_run(run, tmp_path):
     assert (type(events[0].event), type(events[-1].event)) == (RunStarted, RunEnded)
 
 
-def test_a_view_is_told_the_tree_first_and_the_end_last(run):
+def test_a_view_receives_the_tree_first_and_the_end_last(run):
     view, other = Watcher(), Watcher()
     run(view, other, saves_pictures=False)
     assert view.seen == other.seen

@@ -25,7 +25,7 @@ def full(*args):
     raise OSError(28, "No space left on device")
 
 
-def test_a_picture_that_cannot_be_drawn_is_told_and_ends_nothing(directory, monkeypatch):
+def test_a_picture_that_cannot_be_drawn_is_reported_and_the_run_continues(directory, monkeypatch):
     # No event can be asked for its data.
     monkeypatch.setattr(PictureRecorder, "__call__", lambda self, event: event["kind"])
     recorder = Recorder(directory)

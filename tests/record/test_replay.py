@@ -69,7 +69,7 @@ def edited(path: Path, old: str, new: str) -> Path:
     return file
 
 
-def test_the_first_decision_of_an_edited_mission_that_differs_is_told(missions: Path, tmp_path: Path) -> None:
+def test_the_first_other_decision_of_an_edited_mission_is_reported(missions: Path, tmp_path: Path) -> None:
     path = recorded(missions, tmp_path, "inspect_then_sort")
     done = again(path, edited(path, "try: {SelectTarget: {prefer: surest}}", "try: SelectTarget"))
     assert done.edited

@@ -219,7 +219,7 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["Detect", "Grasp"])
-def test_a_run_that_a_bug_has_ended_goes_on_once_it_is_mended(missions: Path, tmp_path: Path, name) -> None:
+def test_a_run_that_a_bug_ended_resumes_after_the_repair(missions: Path, tmp_path: Path, name) -> None:
     skills = discover()
     buggy = {**skills, name: make_raising(skills[name], ZeroDivisionError("a bug"), delay_steps=3)}
     first = run_of(load(missions, "sort_overhead"), tmp_path, skills=buggy)

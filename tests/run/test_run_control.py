@@ -48,7 +48,7 @@ def test_a_paused_run_can_be_stopped(missions: Path) -> None:
     assert run.tick >= 50
 
 
-def test_what_the_tool_holds_at_the_end_is_told(missions: Path) -> None:
+def test_the_held_item_is_reported_at_the_end(missions: Path) -> None:
     def stop(timed: TimedEvent) -> None:
         if isinstance(timed.event, ItemChanged) and timed.event.state == "held":
             run.control.stop()
@@ -92,7 +92,7 @@ def test_something_is_done_between_ticks_and_while_the_run_stands_still() -> Non
     assert done == [False, True, True, True]
 
 
-def test_what_is_asked_for_is_told_once_in_order() -> None:
+def test_requests_are_recorded_once_in_order() -> None:
     control = RunControl()
     assert control.take_request() is None
     control.add_request("cube")

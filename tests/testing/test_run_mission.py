@@ -64,7 +64,7 @@ def test_the_cell_is_arranged_before_the_run(look: Path) -> None:
     assert (list(result.events), [row.item for row in result.accounts.summaries()]) == (seen, ["duck-1"])
 
 
-def test_what_was_entered_and_what_failed_is_told_in_order() -> None:
+def test_entered_and_failed_nodes_are_listed_in_order() -> None:
     result = run_mission("sort_overhead", faults=[during("*/Grasp", seal_fails(), nth=1)])
     assert len(result.list_activated_nodes("*/Grasp")) == result.items["placed"] + 1
     assert (result.list_activated_nodes("tree/look*")[0], result.list_failure_reasons()[0]) == (

@@ -118,7 +118,7 @@ def test_a_run_without_a_yield_is_done_at_once(fake: FakeCell) -> None:
     assert (result.outputs, result.ticks, result.commands) == ({"made": "at once"}, 0, ["tool.open"])
 
 
-def test_what_a_look_commands_is_told_in_words(fake: FakeCell, target: Target) -> None:
+def test_the_commands_of_a_look_are_listed_as_texts(fake: FakeCell, target: Target) -> None:
     look = run_skill(Detect, fake, inputs={"view": "full"})
     assert look.commands == ["camera.capture", "embedded.request frame 2 full"]
     located = run_skill(Localize, fake, inputs={"detections": look.outputs["detections"]})
@@ -127,7 +127,7 @@ def test_what_a_look_commands_is_told_in_words(fake: FakeCell, target: Target) -
     assert chosen.commands == ["decided cube-1 red_bin"]
 
 
-def test_what_a_pick_commands_is_told_in_words(fake: FakeCell, target: Target) -> None:
+def test_the_commands_of_a_pick_are_listed_as_texts(fake: FakeCell, target: Target) -> None:
     approach = run_skill(Approach, fake, inputs={"target": target})
     assert approach.commands == [
         "arm.plan (0.5, 0.0, 0.035)", "arm.start", "arm.stop", "ledger.record_touch cube-1",
@@ -142,7 +142,7 @@ def test_what_a_pick_commands_is_told_in_words(fake: FakeCell, target: Target) -
     assert release.commands == ["tool.open", "ledger.record_placement cube-1 red_bin"]
 
 
-def test_a_named_pose_and_a_question_to_the_operator_are_told_too(fake: FakeCell) -> None:
+def test_a_named_pose_and_a_question_to_the_operator_are_listed(fake: FakeCell) -> None:
     class GoHome(Skill):
         """Plan to go home, in keywords."""
 

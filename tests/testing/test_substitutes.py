@@ -49,7 +49,7 @@ def test_it_fails_the_first_times_and_then_does_its_work(fake: FakeCell, target:
     assert (results[2].outputs, fake.tool.holding) == ({"held": "cube-1"}, True)
 
 
-def test_it_succeeds_with_what_it_was_given_when_it_was_told_to(fake: FakeCell) -> None:
+def test_a_substitute_succeeds_with_given_outputs_at_the_given_tick(fake: FakeCell) -> None:
     quick = make_succeeding(Release, {"placed": "cube-7"}, delay_steps=12)
     result = run_skill(quick, fake, inputs={"held": "cube-7", "bin": "red_bin"})
     assert (result.status, result.outputs, result.ticks) == ("SUCCESS", {"placed": "cube-7"}, 12)
@@ -77,7 +77,7 @@ def test_a_bug_comes_up_in_mid_work_and_the_skill_cleans_up(fake: FakeCell, targ
     assert fake.arm.commands == ["start", "stop"]
 
 
-def test_a_bug_comes_up_in_time_and_as_often_as_it_was_told_to(fake: FakeCell) -> None:
+def test_a_bug_is_raised_at_the_given_times(fake: FakeCell) -> None:
     late, once = (
         make_raising(Wait, ValueError("a bug"), **when)
         for when in ({"delay_steps": 1000}, {"start_count": 1})

@@ -54,15 +54,15 @@ def test_a_training_tells_of_every_batch_and_of_every_epoch(monkeypatch):
     del sys.modules["executive.training.report"]
     from executive.training.report import Report
 
-    told = []
-    report = Report(lambda *epoch: told.append(epoch), lambda *batch: told.append(batch))
+    reported = []
+    report = Report(lambda *epoch: reported.append(epoch), lambda *batch: reported.append(batch))
     trainer = SimpleNamespace(max_epochs=2, num_training_batches=3, callback_metrics={"loss": 1})
     for trainer.current_epoch in range(2):
         for batch in range(3):
             report.on_train_batch_end(trainer, None, None, None, batch)
         report.on_train_epoch_end(trainer, None)
     one, two = (1, {"loss": 1.0}), (2, {"loss": 1.0})
-    assert told == [(1, 6), (2, 6), (3, 6), one, (4, 6), (5, 6), (6, 6), two]
+    assert reported == [(1, 6), (2, 6), (3, 6), one, (4, 6), (5, 6), (6, 6), two]
 
 
 def test_the_labels_of_an_exported_model_lie_beside_it_under_its_name(tmp_path):

@@ -63,7 +63,7 @@ def test_every_wait_is_the_next_one_of_the_backoff(leaf: Any, site: Any, clock: 
     assert (began, clock.now) == ([0.0, 0.25, 0.75, 1.5], 1.5)
 
 
-def test_the_wait_is_told_and_is_in_the_details(leaf: Any, site: Any, clock: Any, events: Any) -> None:
+def test_the_wait_is_reported_and_shown_in_the_detail(leaf: Any, site: Any, clock: Any, events: Any) -> None:
     node = retry(site(), leaf("A", "lost"), 3, [("A", "lost")], None, make_backoff(0.5, 2, 8), clock)
     node.tick_once()
     assert (events[-1].choice, events[-1].reason) == ("attempt 2 of 3 in 0.5 s", "A.lost")

@@ -68,7 +68,7 @@ def test_labels_gather_on_the_way_up(leaf: Any, site: Any, ticks: Any) -> None:
     assert not node.failure.matches(names_of([("B", "lost"), ("A", "stuck")]))
 
 
-def test_every_change_of_status_is_told_once(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
+def test_every_change_of_status_is_reported_once(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
     ticks(sequence(site("tree"), [leaf("A", "R R lost")]))
     assert events == [
         NodeStarted("tree"),

@@ -48,7 +48,7 @@ def make(site: Any, scope: Blackboard, used: list[Any]) -> Any:
     return make
 
 
-def told(events: Any) -> list[str]:
+def list_choices(events: Any) -> list[str]:
     return [event.choice for event in events if isinstance(event, BranchChosen)]
 
 
@@ -70,10 +70,10 @@ def test_the_list_is_the_one_of_the_start(make: Any, scope: Blackboard, ticks: A
     assert (ticks(node), used) == ("RS", ["a", "b", "other"])
 
 
-def test_the_element_at_hand_is_told(make: Any, ticks: Any, events: Any) -> None:
+def test_the_current_element_is_reported(make: Any, ticks: Any, events: Any) -> None:
     target = Target("cube-2", "cube", np.zeros(3), 0.9, 1, 0, 0.0)
     ticks(make(["cube", None, target, {"a": 1}]))
-    assert told(events) == [
+    assert list_choices(events) == [
         "element 1 of 4: cube", "element 2 of 4: None", "element 3 of 4: cube-2", "element 4 of 4: dict",
     ]  # fmt: skip
     assert BranchChosen("loop", "element 1 of 4: cube") in events

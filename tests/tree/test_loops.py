@@ -12,7 +12,7 @@ from executive.errors import InputError
 from executive.events import BranchChosen
 
 
-def test_a_failed_condition_is_a_success_that_is_told(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
+def test_a_failed_condition_is_a_success_with_a_report(leaf: Any, site: Any, ticks: Any, events: Any) -> None:
     node = while_loop(site("here"), leaf("more", "none"), leaf("A"))
     assert ticks(node) == "S"
     assert node.failure is None

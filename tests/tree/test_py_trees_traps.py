@@ -26,7 +26,7 @@ class Terminated(Leaf):
 
 
 class Returning(Behaviour):
-    """Returns from `update` whatever it is told to."""
+    """Leaf whose `update` returns a given status."""
 
     def __init__(self, value: Any) -> None:
         super().__init__("odd")
@@ -45,9 +45,9 @@ def test_children_that_finished_are_not_terminated_by_a_new_round_nor_by_a_halt(
     node.tick_once()
     halt(node)
     status = Status.FAILURE if kind is Fallback else Status.SUCCESS
-    told = [line for line in log if line.startswith("A: ")]
+    messages = [line for line in log if line.startswith("A: ")]
     # Its own end, once a round, and nothing else.
-    assert told == [f"A: INVALID to {status.value}", f"A: {status.value} to {status.value}"]
+    assert messages == [f"A: INVALID to {status.value}", f"A: {status.value} to {status.value}"]
 
 
 def test_halting_does_not_reach_a_child_that_never_ran(leaf: Any, site: Any) -> None:
@@ -60,7 +60,7 @@ def test_halting_does_not_reach_a_child_that_never_ran(leaf: Any, site: Any) -> 
     assert log == []
 
 
-def test_the_old_status_of_a_child_that_was_not_ticked_decides_nothing_and_is_told_to_nobody(
+def test_the_old_status_of_an_unticked_child_has_no_effect_and_is_not_reported(
     leaf: Any, site: Any, ticks: Any, events: Any
 ) -> None:
     tried = sequence(site("tried"), [leaf("A", "lost", "S", "lost")])

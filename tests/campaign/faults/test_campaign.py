@@ -92,7 +92,7 @@ def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: F
     )  # fmt: skip
 
 
-def test_a_way_that_no_run_took_is_told_with_its_place(figures: FaultFigures, small: Subject) -> None:
+def test_a_recovery_without_a_run_is_listed_with_its_position(figures: FaultFigures, small: Subject) -> None:
     without = [trial for trial in figures.trials if "Grasp missed" not in " ".join(trial.descriptions)]
     without = [trial for trial in without if not trial.what.startswith("no seal")]
     assert [branch.what for branch in find_branches(small.loaded.tree, without) if not branch.entered] == [
@@ -126,14 +126,14 @@ def interrupt(*progress: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("sigint")
-def test_after_ctrl_c_the_trials_so_far_are_told(small: Subject) -> None:
-    told: list[str] = []
-    campaign = Campaign(small, workers=1, progress=interrupt, halting=lambda: told.append("halting"))
+def test_after_ctrl_c_the_finished_trials_are_reported(small: Subject) -> None:
+    messages: list[str] = []
+    campaign = Campaign(small, workers=1, progress=interrupt, halting=lambda: messages.append("halting"))
     figures = campaign.try_singles()
-    assert (len(figures.trials), figures.complete, told) == (1, False, ["halting"])
+    assert (len(figures.trials), figures.complete, messages) == (1, False, ["halting"])
 
 
-def test_a_number_that_there_is_not_is_told_with_those_that_there_are(campaign: Campaign) -> None:
+def test_an_unknown_number_is_refused_with_the_valid_range(campaign: Campaign) -> None:
     with pytest.raises(InputError) as caught:
         campaign.select((1, 9999))
     assert str(caught.value) == (

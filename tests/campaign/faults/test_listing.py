@@ -36,17 +36,17 @@ def test_a_node_that_runs_often_goes_wrong_in_the_middle_too(campaign: Campaign)
 
 
 def test_detectors_objects_and_the_tool_go_wrong_too(campaign: Campaign) -> None:
-    def told(name: str) -> set[str]:
+    def list_effects(name: str) -> set[str]:
         return {fault.what for fault in campaign.faults if fault.name == name and not fault.is_reason}
 
     ways = ("hangs", "dead", "unsure")
     lasting = {f"{way} for {time}" for way in ways for time in ("0.5 s", "5 s")}
     ever = {f"{way} for ever" for way in ways}
-    assert told("detector") == {"slow by 0.5 s", "slow by 5 s"} | lasting | ever
-    assert told("object") == {"taken", "bumped"}
-    assert told("Approach") >= {"target taken", "target bumped"}
-    assert told("Transit") >= {"lets go", "lets go over another bin"}
-    assert told("tool") >= {"no seal for 5 s", "no seal on object 1"}
+    assert list_effects("detector") == {"slow by 0.5 s", "slow by 5 s"} | lasting | ever
+    assert list_effects("object") == {"taken", "bumped"}
+    assert list_effects("Approach") >= {"target taken", "target bumped"}
+    assert list_effects("Transit") >= {"lets go", "lets go over another bin"}
+    assert list_effects("tool") >= {"no seal for 5 s", "no seal on object 1"}
 
 
 def test_a_reason_is_brought_about_in_the_cell_and_else_said_by_the_skill(campaign: Campaign) -> None:

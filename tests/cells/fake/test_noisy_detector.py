@@ -90,8 +90,8 @@ def test_it_errs_the_same_for_the_same_seed_and_otherwise_for_another():
         ({"classes": ["cube"]}, 'option "of" of a detector of kind noisy: field required'),
     ],
 )
-def test_what_keeps_it_from_being_built_is_told(options, sentence):
+def test_the_cause_of_a_failed_construction_is_reported(options, sentence):
     wrong = DetectorConfig(kind="noisy", **options)
     others = {"noisy": wrong, "known": DetectorConfig(kind="embedded")}
-    ((_, told),) = NoisyDetector.check(wrong, Path(), others)
-    assert told.startswith(sentence)
+    ((_, message),) = NoisyDetector.check(wrong, Path(), others)
+    assert message.startswith(sentence)

@@ -28,7 +28,7 @@ def test_it_follows_a_motion_to_a_hundredth_of_a_degree(rig: Rig) -> None:
     assert np.allclose(rig.arm.tool_pose.position, OVER.position, atol=1e-4)
 
 
-def test_a_plan_takes_its_time_on_the_clock_and_is_told(rig: Rig) -> None:
+def test_a_plan_takes_time_on_the_clock_and_is_recorded(rig: Rig) -> None:
     planning = rig.arm.plan(OVER)
     waited = 0
     while not planning.ready:

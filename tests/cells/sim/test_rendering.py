@@ -127,12 +127,12 @@ def test_what_is_dropped_comes_to_lie_on_the_table_or_in_a_bin(overhead: CellCon
 
 def make(out: Path, workers: int = 1, images: int = 1, **cells: CellConfig) -> list[tuple[int, int]]:
     """Make a small data set and return what was reported on the way."""
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     generate(
         cells, out, images=images, seed=3, layout="coco", workers=workers, valid=0.25,
-        progress=lambda made, total: told.append((made, total)),
+        progress=lambda made, total: reported.append((made, total)),
     )  # fmt: skip
-    return told
+    return reported
 
 
 class Here(ThreadPoolExecutor):

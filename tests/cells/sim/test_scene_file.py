@@ -137,7 +137,7 @@ def test_number_gap_and_stacks_are_those_of_the_scene(world: Build, overhead: Ce
     assert max(piled.object_pose(body).position[2] for body in piled.bodies) > 0.06
 
 
-def test_looks_change_no_place_and_size_is_the_truth_that_the_ledger_is_not_told(
+def test_appearance_changes_no_position_and_the_ledger_does_not_know_the_true_size(
     world: Build, cell: Callable[..., SimCell], overhead: CellConfig
 ) -> None:
     looks = {"objects": {"any": {"colours": [BLACK]}, "duck": {}}, "light": {"brightness": 0.3}}
@@ -335,7 +335,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("section", "expected"), WRONG.values(), ids=WRONG)
-def test_a_mistake_is_told_with_its_place_and_what_is_allowed(
+def test_a_mistake_is_reported_with_its_position_and_the_allowed_values(
     overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, section: str, expected: str
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -120,7 +120,7 @@ def with_one_pixel(detection, frame):
         ),
     ],
 )
-def test_what_keeps_an_object_from_being_localized_is_told(localizer, spoil, text):
+def test_the_cause_of_a_failed_localization_is_reported(localizer, spoil, text):
     with pytest.raises(NoDepth) as caught:
         localizer.locate(*spoil(*showing_cube(IN_THE_MIDDLE)))
     assert str(caught.value).startswith(text)

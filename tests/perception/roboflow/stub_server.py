@@ -105,7 +105,7 @@ class _Handler(BaseHTTPRequestHandler):
             threading.Thread(target=self.stub.stop).start()
             self.stub.over.wait()
         elif fault == "drip":
-            self._drip(json.dumps(self._told({**answer, "predictions": found})).encode())
+            self._drip(json.dumps(self._messages({**answer, "predictions": found})).encode())
         elif fault.isdecimal():
             # A server may say anything: this one tells the key that it was given.
             key = self.headers.get("Authorization", "").removeprefix("Bearer ")
@@ -114,9 +114,9 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(BODIES[fault].encode(), "text/html" if fault == "html" else "application/json")
         else:
             spoilt = SPOILT[fault](found, answer) if fault else found
-            self._json(self._told({**answer, "predictions": spoilt}))
+            self._json(self._messages({**answer, "predictions": spoilt}))
 
-    def _told(self, answer: dict[str, Any]) -> dict[str, Any]:
+    def _messages(self, answer: dict[str, Any]) -> dict[str, Any]:
         """Return the answer of a model, or the answer of a workflow with it."""
         if self.path != WORKFLOW:
             return answer

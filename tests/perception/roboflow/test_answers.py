@@ -179,7 +179,7 @@ def test_a_sentence_about_a_workflow_names_its_options(failure, sentence):
     assert describe_failure(failure, WORKFLOW) == f"{HOST} {sentence}"
 
 
-def test_an_answer_that_cannot_be_right_is_told_with_what_to_check():
+def test_an_impossible_answer_is_reported_with_the_advice_to_check():
     beginning = f"{HOST} gave an answer that cannot be right: no box; "
     assert (
         describe_invalid_answer("no box", OPTIONS) == f"{beginning}is shapes/1 a model that detects objects?"
@@ -188,7 +188,7 @@ def test_an_answer_that_cannot_be_right_is_told_with_what_to_check():
     assert describe_invalid_answer("no box", WORKFLOW) == beginning + question
 
 
-def test_a_deadline_that_has_passed_is_told_with_what_the_server_said_meanwhile():
+def test_a_passed_deadline_is_reported_with_the_answers_of_the_server():
     for repeats, end in (
         ((), "; look at its log and the network, or give it a longer deadline"),
         (

@@ -94,7 +94,7 @@ def test_failures_leave_no_process_thread_or_pipe_behind(start):
         ("ends", Fault, r"ended with status 3: ZeroDivisionError: \*\*\*"),
     ],
 )
-def test_a_process_that_ends_or_is_never_ready_is_told_without_the_key_and_replaced(
+def test_a_process_that_ends_or_is_never_ready_is_reported_without_the_key_and_replaced(
     start, monkeypatch, how, kind, text
 ):
     if how == "never ready":

@@ -253,8 +253,8 @@ def test_a_server_that_is_gone_and_comes_back(detector, server):
     ],
 )
 def test_an_address_or_key_that_does_not_work_is_said(make, server, options, text):
-    told = {name: value.format(port=server.port) for name, value in options.items()}
-    assert_unavailable(make(deadline=30.0, **told), text)
+    formatted = {name: value.format(port=server.port) for name, value in options.items()}
+    assert_unavailable(make(deadline=30.0, **formatted), text)
 
 
 def test_closing_does_not_wait_for_a_server_that_hangs(server):

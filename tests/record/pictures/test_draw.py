@@ -67,8 +67,8 @@ def test_a_choice_at_the_edge_of_an_image_is_drawn_and_the_image_left_alone():
 
 
 def test_what_the_strip_says_is_written_on_it():
-    silent, told = (draw_picture(scene(mission=mission))[480:] for mission in ("", "sort"))
-    assert np.any(silent != told)
+    silent, labelled = (draw_picture(scene(mission=mission))[480:] for mission in ("", "sort"))
+    assert np.any(silent != labelled)
 
 
 def test_hidden_parts_are_darker():

@@ -34,7 +34,7 @@ def at_most(count: int):
         ({"failure": "SelectTarget.unseen"}, "SelectTarget.unseen", ()),
     ],
 )  # fmt: skip
-def test_a_decision_is_told_with_its_bin_and_a_failure_with_its_reason(scene, title, lines):
+def test_a_decision_shows_its_bin_and_a_failure_its_reason(scene, title, lines):
     fates = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
     said = make_status_bar_text(PictureScene(IMAGE, outcomes=fates, **scene))
     assert (said.title, said.lines) == (title, lines)

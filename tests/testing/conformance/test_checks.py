@@ -1,4 +1,4 @@
-"""Every check against the skills that make its mistake, told word for word; and every shipped skill."""
+"""Every check against the skills that make its mistake, with the exact messages; and every shipped skill."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def check_of(skill: type[Skill], name: str) -> Check:
     return next(check for check in list_conformance_checks(skill) if check.name == name)
 
 
-def told(check: Check) -> list[str]:
+def find_problems(check: Check) -> list[str]:
     """Return the problems without what depends on the machine, or on a line in a file."""
     patterns = ((r"\.py:\d+", ".py:N"), (r"\d+ ms", "N ms"))
     problems = list(check.run().problems)
@@ -171,8 +171,8 @@ def told(check: Check) -> list[str]:
 
 
 @pytest.mark.parametrize(("check", "skill", "problems"), FAULTY, ids=lambda one: getattr(one, "__name__", ""))
-def test_a_mistake_is_told(check: str, skill: type[Skill], problems: list[str]) -> None:
-    assert told(check_of(skill, check))[: len(problems)] == problems
+def test_a_mistake_is_reported(check: str, skill: type[Skill], problems: list[str]) -> None:
+    assert find_problems(check_of(skill, check))[: len(problems)] == problems
 
 
 def test_every_check_has_a_skill_that_fails_it() -> None:
@@ -246,7 +246,7 @@ def test_a_tick_that_does_not_come_back_is_broken_off_once(monkeypatch: pytest.M
         "return for 0.3 s, at faulty_skills.py:N. "
         "A long tick blocks the arm: yield in each loop that waits, and do long computations in a detector."
     )
-    assert told(checks["terminates"]) == told(checks["halts_in_one_tick"]) == [problem]
+    assert find_problems(checks["terminates"]) == find_problems(checks["halts_in_one_tick"]) == [problem]
     assert [checks[name].run().status for name in ("halts_in_one_tick", "has_allowed_defaults")] == [
         "not run",
         "ok",

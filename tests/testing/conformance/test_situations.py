@@ -119,7 +119,7 @@ def broken(scene: SkillScene) -> dict[str, Any]:
         ((EMPTY, EMPTY), broken, "the function `arrange` raised KeyError: 'cube'"),
     ],
 )
-def test_a_skill_that_cannot_be_arranged_is_told_why(state: Any, arrange: Arrange, text: str) -> None:
+def test_a_skill_without_a_situation_has_a_cause(state: Any, arrange: Arrange, text: str) -> None:
     skill = type("Odd", (faulty.Pause,), {"tool_state": state, "__annotations__": {}})
     with pytest.raises(ArrangementFailed) as raised:
         names(skill, arrange)

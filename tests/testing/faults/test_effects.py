@@ -247,7 +247,7 @@ def test_no_way_is_found_after_the_usual_time(is_blocked: bool, error: type[Exce
     assert (result.status, cell.fake.arm.commands) == ("FAILURE", [])
 
 
-def test_nothing_that_the_arm_hides_is_believed_and_it_is_told_once_a_control_step() -> None:
+def test_an_occluded_object_is_not_seen_and_occlusion_is_recorded_once_per_control_step() -> None:
     cell: Any = cell_with(effects.workspace_occluded())
     assert run_skill(Detect, cell).reason == "hidden"
     assert not cell.cell.camera.sees_table() and not cell.cell.camera.capture().visible.any()

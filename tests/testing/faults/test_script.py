@@ -110,7 +110,7 @@ def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again(
     assert pickle.loads(pickle.dumps(script)) == script
 
 
-def test_what_happens_to_a_node_is_told_with_node_item_and_object() -> None:
+def test_a_fault_of_a_node_is_recorded_with_node_item_and_object() -> None:
     result = sorted_with(during("*/Transit", effects.seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
     (fault,) = result.list_injected_faults()
     assert (fault.name, fault.node.rpartition("/")[2]) == ("seal_breaks", "Transit")

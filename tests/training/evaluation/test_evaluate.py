@@ -60,7 +60,7 @@ def test_a_miss_lowers_recall_and_a_phantom_lowers_precision(saying, sample, bot
     assert counts(imagining) == [(0, 2), (0, 2), (1, 1)]
 
 
-def test_the_right_place_with_the_wrong_class_is_wrong_both_ways_and_told_apart(saying, sample, both):
+def test_a_wrong_class_at_the_right_position_counts_as_miss_and_false_detection(saying, sample, both):
     measured = evaluate(saying((("duck", 0.9, sample.boxes[0]), both[1])), [sample])
     assert (measured.precision, measured.recall) == (0.5, 0.5)
     assert measured.confusion == {"cube": {"duck": 1}, "duck": {"duck": 1}}

@@ -19,7 +19,7 @@ def matches(sample, *found):
     return match([Detection(*one) for one in found], sample)
 
 
-def told(sample, *found):
+def find_misses(sample, *found):
     return list(misses(matches(sample, *found), sample))
 
 
@@ -47,13 +47,13 @@ def test_an_ignored_object_is_one_that_a_box_fits_better_than_any_other(sample):
     assert not is_ignored(on_cube, replace(sample, ignored=(right_by(sample.boxes[0], 3),)))
 
 
-def test_every_kind_of_mistake_is_told_in_words_and_weighed(sample, knowing):
+def test_every_kind_of_mistake_has_a_text_and_a_weight(sample, knowing):
     cube, duck = sample.boxes
     phantom = ("duck", 0.7, (150.0, 200.0, 180.0, 230.0))
-    found = told(knowing(visible_fraction=[0.62, 1.0]), ("cube", 0.91, duck), phantom)
+    found = find_misses(knowing(visible_fraction=[0.62, 1.0]), ("cube", 0.91, duck), phantom)
     # A box off its place is as bad as its share of the object; what is cut off weighs half.
-    found += told(sample, ("duck", 0.9, duck), ("cube", 0.8, right_by(cube, 3, down=4)))[1:]
-    found += told(replace(sample, labels=("cube",), boxes=((0.0, 10.0, 30.0, 40.0),)))
+    found += find_misses(sample, ("duck", 0.9, duck), ("cube", 0.8, right_by(cube, 3, down=4)))[1:]
+    found += find_misses(replace(sample, labels=("cube",), boxes=((0.0, 10.0, 30.0, 40.0),)))
     assert [(miss.text, pytest.approx(miss.severity)) for miss in found] == [
         ("cube overlooked, 62% visible", 0.62),
         ("duck taken for cube 0.91", 0.91),
@@ -71,7 +71,7 @@ def test_the_worst_come_first_and_the_others_are_forgotten(knowing):
 
 
 def test_the_sheet_shows_the_true_and_the_found_box(sample):
-    shown = told(sample, ("cube", 0.9, right_by(sample.boxes[0], 6)))
+    shown = find_misses(sample, ("cube", 0.9, right_by(sample.boxes[0], 6)))
     assert [miss.text for miss in shown] == ["duck overlooked", "cube off by 6.0 px"]
     picture = draw_sheet(shown, "overhead")
     tiles = picture[34:274, 10:250], picture[34:274, 260:500]
@@ -82,13 +82,13 @@ def test_the_sheet_shows_the_true_and_the_found_box(sample):
 
 def test_a_sheet_without_mistakes_is_narrow_and_more_than_a_row_of_them_make_two(sample):
     assert draw_sheet([], "overhead").shape == (34 + 290, 10 + 3 * 250, 3)
-    assert draw_sheet(told(sample) * 4, "overhead").shape == (34 + 2 * 290, 10 + 6 * 250, 3)
+    assert draw_sheet(find_misses(sample) * 4, "overhead").shape == (34 + 2 * 290, 10 + 6 * 250, 3)
 
 
 def test_a_sheet_is_written_where_it_is_asked_for_or_that_is_explained(sample, tmp_path):
     path = tmp_path / "new" / "sheet.png"
-    save_image(path, draw_sheet(told(sample), "overhead"))
-    assert np.array_equal(cv2.imread(str(path))[..., ::-1], draw_sheet(told(sample), "overhead"))
+    save_image(path, draw_sheet(find_misses(sample), "overhead"))
+    assert np.array_equal(cv2.imread(str(path))[..., ::-1], draw_sheet(find_misses(sample), "overhead"))
     (tmp_path / "sheet.png").mkdir()
     with pytest.raises(InputError, match=r"sheet\.png could not be written; is the disk full"):
-        save_image(tmp_path / "sheet.png", draw_sheet(told(sample), "overhead"))
+        save_image(tmp_path / "sheet.png", draw_sheet(find_misses(sample), "overhead"))

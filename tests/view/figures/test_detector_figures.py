@@ -36,7 +36,7 @@ def printed(capsys):
     return lines
 
 
-def test_rates_classes_confusions_who_answered_and_the_rates_for_the_ledger_are_told(printed):
+def test_rates_classes_confusions_and_answering_detectors_are_printed(printed):
     lines = printed(MEASURED)
     assert lines[0] == "overhead, detector eye"
     assert set(lines) >= {

@@ -63,7 +63,7 @@ def test_a_cell_of_several_runs_tells_how_many_were_ok_and_the_worst_of_the_othe
     assert cell(MISSED, replace(MISSED, happened=False)) == "ok"
 
 
-def test_what_went_wrong_and_what_was_never_entered_is_told_with_its_place() -> None:
+def test_problems_and_recoveries_never_entered_are_printed_with_their_positions() -> None:
     assert format_results(FIGURES).splitlines()[8:] == [
         "  as without faults: 2; fewer objects sorted: 1; failed: 1; ended as FAULT: 0; "
         "fault did not occur: 1; wrong: 1",

@@ -130,7 +130,7 @@ STORY = SimpleNamespace(verdict="Grasp failed: no seal")
         (None, ("CUT OFF", "the record ends here; the result of the run is unknown", "")),
     ],
 )
-def test_an_end_is_told_by_the_story_else_the_message_and_the_items(result, ending) -> None:
+def test_the_end_shows_the_diagnosis_or_the_message_and_the_items(result, ending) -> None:
     assert describe_result(result) == ending
 
 

@@ -66,7 +66,7 @@ def test_a_round_is_over_where_its_root_begins_again_or_succeeds(events, opened,
     assert (state.active_paths, statuses(state)) == (opened, known)
 
 
-def test_a_failure_with_an_item_is_told_for_a_while(state: FilmRunState) -> None:
+def test_a_failure_with_an_item_is_shown_for_some_time(state: FilmRunState) -> None:
     state.advance_to(240, 1.0)
     assert state.failure_text == "Grasp.missed: no seal"
     state.advance_to(300, 1.25)
@@ -92,7 +92,7 @@ def test_of_a_tree_that_ended_what_ended_last_stays_open(state: FilmRunState) ->
     ("event", "sentence"),
     [(FaultRaised("Traceback"), "fault"), (RunHalted(True), "halt"), (RunResumed(0, "", {}), "resumed")],
 )
-def test_what_befalls_a_whole_run_is_told(event: Event, sentence: str) -> None:
+def test_events_of_the_whole_run_are_shown(event: Event, sentence: str) -> None:
     state = FilmRunState([at(1, event, 0.0)], NODES, [])
     state.advance_to(1, 0.0)
     assert state.failure_text == sentence

@@ -35,15 +35,15 @@ def copy(filmed_run: RunDirectory, tmp_path: Path) -> RunDirectory:
 
 
 def test_a_run_becomes_a_film(filmed_run: RunDirectory, tmp_path: Path) -> None:
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     source = FilmSource(filmed_run)
     frames = write_film(
-        source, tmp_path / "film", MP4, speed=12.0, workers=1, progress=lambda *done: told.append(done)
+        source, tmp_path / "film", MP4, speed=12.0, workers=1, progress=lambda *done: reported.append(done)
     )
     with av.open(str(tmp_path / "film")) as container:
         images = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
     assert len(images) == frames
-    assert told == [(done, frames) for done in range(1, frames + 1)]
+    assert reported == [(done, frames) for done in range(1, frames + 1)]
     assert images[0].shape == (720, 1280, 3)
     # The end stands still; before it the robot moved and the tree ran.
     assert np.abs(images[-1].astype(int) - images[-2]).mean() < 0.5

@@ -162,7 +162,7 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_page_that_hangs_is_told_no_more_than_so_much_and_costs_a_few_seconds(monkeypatch) -> None:
+def test_a_hanging_page_receives_a_limited_queue_and_costs_a_few_seconds(monkeypatch) -> None:
     monkeypatch.setattr("executive.view.live.page.SHUTDOWN_TIMEOUT", 0.2)
     page = LivePage()
     asyncio.run(_answered(page.address))

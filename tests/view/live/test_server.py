@@ -123,7 +123,7 @@ def test_serves_the_page_to_the_page_and_nothing_else() -> None:
     assert (HEADERS["Referrer-Policy"], HEADERS["Cache-Control"]) == ("no-referrer", "no-store")
 
 
-def test_a_watcher_is_told_everything_then_news_and_is_heard() -> None:
+def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> None:
     async def look(site: Site) -> None:
         site.board.apply(at(0, run_started(mission="sort", seed=3)))
         origin = {"Origin": site.address}
@@ -172,16 +172,16 @@ PLACE = (0.5, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0)
 
 
 class Built:
-    """Stands for a scene, and notes what it is told."""
+    """Stand-in for a scene that records its calls."""
 
     made: ClassVar[list[Built]] = []
 
     def __init__(self, path: Path, shapes: object) -> None:
-        self.told: list[object] = [path, shapes]
+        self.received: list[object] = [path, shapes]
         self.made.append(self)
 
     def move(self, bodies: object) -> None:
-        self.told.append(bodies)
+        self.received.append(bodies)
 
 
 @pytest.mark.parametrize("looked_at", [True, False])
@@ -202,4 +202,4 @@ def test_the_scene_is_built_once_when_somebody_looks_and_there_is_one(monkeypatc
             tunnel.move({})
 
     asyncio.run(work())
-    assert [one.told for one in Built.made] == [[Path("socket"), (BOX,), {"tool": PLACE}, {}]] * looked_at
+    assert [one.received for one in Built.made] == [[Path("socket"), (BOX,), {"tool": PLACE}, {}]] * looked_at

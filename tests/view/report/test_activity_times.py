@@ -35,7 +35,7 @@ def near(row: dict[str, float]) -> object:
     return pytest.approx(row, abs=1e-9)
 
 
-def test_a_failed_attempt_a_look_ahead_and_a_wait_are_told_apart():
+def test_a_failed_attempt_a_look_ahead_and_a_wait_are_distinguished():
     course = [
         ran("MoveToScan", 0.0, 1.0), ran("Detect", 1.0, 1.1), ran("SelectTarget", 1.1, 1.1, "cube-1"),
         ran("Approach", 1.1, 2.0, "cube-1"), ran("Grasp", 2.0, 2.2, "cube-1", "FAILURE"),

@@ -32,7 +32,7 @@ def without_end(run: Path) -> None:
     (run / "journal.jsonl").write_text("".join(lines[:-1]))
 
 
-def test_a_run_that_ended_is_told_by_its_result(failed):
+def test_a_run_that_ended_is_described_by_its_result(failed):
     facts = ReportFacts(failed)
     assert to_json(facts.result) == json.loads((failed / "result.json").read_text())
     assert (facts.status, facts.timeline.clock) == ("FAILURE", facts.result.robot_time_s)
@@ -42,7 +42,7 @@ def test_a_run_that_ended_is_told_by_its_result(failed):
 
 
 @pytest.mark.slow
-def test_a_run_that_was_cut_off_and_taken_up_again_is_told_as_one(killed, copy):
+def test_an_interrupted_and_resumed_run_is_described_as_one(killed, copy):
     run = copy(killed)
     assert ReportFacts(run).status == CUT_OFF
     resume_run(run, discover(), RunOptions(3, kind=FakeCell), RecordOptions(saves_pictures=False))
@@ -67,7 +67,7 @@ def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, 
     assert facts.resume_command == shlex.join(["executive", "run", "--resume", str(run)])
 
 
-def test_a_run_whose_end_the_disk_did_not_take_is_told_by_its_result(failed, copy):
+def test_a_run_whose_end_was_not_written_is_described_by_its_result(failed, copy):
     run = copy(failed)
     without_end(run)
     result = json.loads((run / "result.json").read_text()) | {"status": "FAULT"}

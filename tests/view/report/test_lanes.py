@@ -61,7 +61,7 @@ def test_a_bar_is_as_long_as_it_took_and_says_what_happened():
     ]
 
 
-def test_what_cannot_be_told_apart_is_one_bar_in_the_colour_of_the_worst():
+def test_indistinguishable_activations_share_a_bar_in_the_colour_of_the_worst():
     course = [ran("Detect", 0.02 * n, 0.02 * n + 0.01) for n in range(3)]
     course[1] = replace(course[1], status="FAILURE", reason="unsure", message="too dark")
     lane = lanes([*course, ran("Detect", 1.0, 1.01)], 90.0)["tree/Detect"]
@@ -69,7 +69,7 @@ def test_what_cannot_be_told_apart_is_one_bar_in_the_colour_of_the_worst():
     assert said(lane)[0] == "Detect: 2 done, 1 failed\n0.00 s to 0.05 s (0.05 s)\nunsure: too dark"
 
 
-def test_bars_that_can_be_told_apart_stay_apart_and_what_took_no_time_can_be_seen():
+def test_distinguishable_bars_stay_separate_and_short_activations_are_visible():
     course = [ran("Wait", 0.0, 1.0), ran("Wait", 1.0, 2.0), ran("Wait", 2.0, 2.0), ran("Wait", 2.1, 2.1)]
     widths = [width for _, width in bars(lanes(course, 90.0)["tree/Wait"])]
     assert widths == [45.0, 45.0, THINNEST, THINNEST]

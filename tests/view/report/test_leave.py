@@ -23,7 +23,7 @@ def test_a_run_that_ended_leaves_its_report(done, copy):
         ("frames/000001_odd.jpg", None, "IsADirectoryError: "),
     ],
 )  # fmt: skip
-def test_why_there_is_none_is_told(done, copy, file: str, content: str | None, sentence: str):
+def test_a_missing_report_is_explained(done, copy, file: str, content: str | None, sentence: str):
     run = copy(done)
     if content is None:
         (run / file).mkdir()

@@ -67,13 +67,13 @@ def test_a_success_has_no_story_and_says_what_is_in_the_bins(done):
     assert found.texts["header"].startswith("SUCCESS 1 of 2 objects are in their bins, 1 skipped.")
 
 
-def test_every_object_is_there_with_its_fate_its_time_its_picture_and_what_went_wrong(failed):
+def test_every_object_has_its_outcome_time_picture_and_problems(failed):
     found, facts = page(failed), ReportFacts(failed)
-    told = found.texts["objects"]
-    assert all(f"{row.item} rejected" in told for row in facts.objects)
+    text = found.texts["objects"]
+    assert all(f"{row.item} rejected" in text for row in facts.objects)
     assert [row.item for row in facts.objects] == ["sphere-1", "sphere-2"]
-    assert "2 seen, 0 placed, 2 rejected" in told
-    assert "0.81 s Grasp.missed no seal on sphere-1" in told
+    assert "2 seen, 0 placed, 2 rejected" in text
+    assert "0.81 s Grasp.missed no seal on sphere-1" in text
     alts = [attributes["alt"] for tag, attributes in found.elements if tag == "img"]
     assert alts.count("Image for the decision about sphere-1") == 1
     assert alts.count("sphere-1: missed") == 2
@@ -107,7 +107,7 @@ def test_params_versions_and_the_commands_that_repeat_it_are_there(failed):
     assert "resume" not in commands
 
 
-def test_a_run_that_was_killed_is_told_as_far_as_it_came_with_the_command_that_goes_on(killed):
+def test_a_killed_run_is_reported_up_to_its_end_with_the_command_to_resume_it(killed):
     assert not (killed / "result.json").exists()
     found = page(killed)
     assert found.texts["header"].startswith(

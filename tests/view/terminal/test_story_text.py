@@ -34,14 +34,14 @@ GO_ON = "go on       executive run --resume runs/latest\n"
 
 def text(run: FailedRun, *, numbered: bool = True, tail: str = TAIL) -> str:
     """Execute a run; return its story up to its tail, lines of code and shipped missions unnumbered."""
-    told = "\n".join(diagnosis_lines(run.tell(), "runs/latest", "executive run trial")) + "\n"
-    assert told.endswith(tail)
-    told = re.sub(r"py:\d+", "py:N", told.removesuffix(tail))
-    return told if numbered else unnumbered(told)
+    text = "\n".join(diagnosis_lines(run.tell(), "runs/latest", "executive run trial")) + "\n"
+    assert text.endswith(tail)
+    text = re.sub(r"py:\d+", "py:N", text.removesuffix(tail))
+    return text if numbered else unnumbered(text)
 
 
-def unnumbered(told: str) -> str:
-    return re.sub(r"(\bline |\.yaml:)\d+", r"\1N", told)
+def unnumbered(text: str) -> str:
+    return re.sub(r"(\bline |\.yaml:)\d+", r"\1N", text)
 
 
 def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
