@@ -114,9 +114,8 @@ def command(
         if problem and (views or result.story is not None):
             click.echo(f"note: {problem}", err=True)
         if terminal_view is not None:
-            click.echo(
-                format_summary(result, terminal_view.timeline.items.now(), repeat, report), err=True, nl=False
-            )
+            items = terminal_view.timeline.items.list_items()
+            click.echo(format_summary(result, items, repeat, report), err=True, nl=False)
         elif result.story is not None:
             click.echo("\n".join(diagnosis_lines(result.story, result.run, repeat, report)), err=True)
         elif result.status == "INCOMPLETE" or describe_disagreement(result):

@@ -13,7 +13,7 @@ from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawer import PictureDrawer
 from executive.record.pictures.scene import PictureScene
-from executive.record.timeline.activation import skill_name
+from executive.record.timeline.activation import to_skill_name
 from executive.record.timeline.timeline import Timeline
 
 MAX_LOOKS = 24
@@ -38,7 +38,7 @@ class PictureRecorder:
 
     def __init__(self, folder: Path) -> None:
         self._drawer = PictureDrawer(folder)
-        self._timeline = Timeline(history=False)
+        self._timeline = Timeline(keeps_history=False)
         self._last_frame: Frame | None = None
         self._looks: dict[int, tuple[Frame, FrameSearched]] = {}
         self._selected_frame: int | None = None
@@ -117,21 +117,22 @@ class PictureRecorder:
         timeline = self._timeline
         item = selection.item if selection else ""
         history = timeline.items.by_name.get(item)
+        position = history.last_change.position if history else None
         return PictureScene(
             image=frame.image,
             visible=frame.visible,
             detections=[_to_detection(found) for found in searched.found],
-            selected=_find_selected(selection, searched.found, history.now.position if history else None),
+            selected=_find_selected(selection, searched.found, position),
             mission=timeline.started.mission if timeline.started else "",
             clock=timed.clock,
             camera=frame.camera,
             detector=searched.detector,
             age=timed.clock - frame.stamp,
-            phase=" + ".join(skill_name(last.node) for last in timeline.find_running() if last.skill),
+            phase=" + ".join(to_skill_name(last.node) for last in timeline.find_running() if last.skill),
             item=item,
             bin=selection.bin if selection else "",
-            attempts=history.now.attempts if history else 0,
-            failure=f"{skill_name(failure.node)}.{failure.reason}" if failure else "",
+            attempts=history.last_change.attempts if history else 0,
+            failure=f"{to_skill_name(failure.node)}.{failure.reason}" if failure else "",
             message=failure.message if failure else "",
             outcomes=_group_items(timeline),
             classes=tuple(timeline.items.classes),
@@ -142,12 +143,12 @@ def _group_items(timeline: Timeline) -> dict[str, list[str]]:
     """Return the placed items by bin, then other items by state, in the order of their last state changes."""
     placed: dict[str, list[str]] = defaultdict(list)
     others: dict[str, list[str]] = defaultdict(list)
-    for item in sorted(timeline.items.by_name.values(), key=lambda item: item.changed):
-        state = item.now.state
+    for item in sorted(timeline.items.by_name.values(), key=lambda item: item.last_change_number):
+        state = item.last_change.state
         if state == "placed":
-            placed[item.now.bin].append(item.now.item)
+            placed[item.last_change.bin].append(item.last_change.item)
         elif state in _UNPLACED_STATES:
-            others["in the tool" if state == "held" else state].append(item.now.item)
+            others["in the tool" if state == "held" else state].append(item.last_change.item)
     return placed | others
 
 

@@ -151,7 +151,7 @@ class Recording:
     start_message: str = ""
 
     def __post_init__(self) -> None:
-        self._timeline = Timeline(history=False)
+        self._timeline = Timeline(keeps_history=False)
 
     def execute(self, seed: int, start_time: float) -> Result:
         """Execute the run, write its result into the run directory, and return the result.

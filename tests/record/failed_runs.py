@@ -57,7 +57,7 @@ class FailedRun:
             file = Path("trial.yaml")
             file.write_text(HEAD + mission)
         self.loaded = load_mission(file, discover(), overrides or {})
-        self.timeline = Timeline(history=False)
+        self.timeline = Timeline(keeps_history=False)
         options = RunOptions(3, requests, kind=FakeCell)
         self.run = assemble(self.loaded, discover(), options, [self.timeline])
         assert isinstance(self.run.workcell, FakeCell)

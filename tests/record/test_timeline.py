@@ -26,7 +26,12 @@ from executive.events import (
     TimedEvent,
 )
 from executive.record.journal import Journal, read_journal
-from executive.record.timeline.activation import count_ends, find_last_failure, group_by_node, skill_name
+from executive.record.timeline.activation import (
+    describe_ends,
+    find_last_failure,
+    group_by_node,
+    to_skill_name,
+)
 from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 
@@ -48,12 +53,13 @@ def test_the_journal_of_a_run_gives_the_timeline_that_was_observed(mission, tmp_
     run.slip(2)
     run.run.execute()
     journal.close()
-    recorded = Timeline.of(read_journal(Path("journal.jsonl")))
+    recorded = Timeline.from_events(read_journal(Path("journal.jsonl")))
     assert live.activations and live.items.by_name and live.items.look and live.ended
     assert recorded == live
     # Without history, only the past is missing.
     assert (
-        replace(run.timeline, history=True, activations=live.activations, selections=live.selections) == live
+        replace(run.timeline, keeps_history=True, activations=live.activations, selections=live.selections)
+        == live
     )
 
 
@@ -84,7 +90,7 @@ def test_an_end_without_a_start_is_no_activation() -> None:
 
 def test_an_activation_that_ran_at_the_end_of_the_record_lasts_until_then() -> None:
     events = [at(0, NodeStarted("tree")), at(600, read("arm.q", []))]
-    (tree,) = Timeline.of(events).activations
+    (tree,) = Timeline.from_events(events).activations
     assert (tree.status, tree.start, tree.end) == ("RUNNING", 0, 2.5)
 
 
@@ -103,17 +109,17 @@ def test_the_ends_of_a_node_are_counted_and_its_last_failure_is_found() -> None:
         skill_started("tree/Wait"),
     )  # fmt: skip
     grasp, wait = group_by_node(timeline.activations).values()
-    assert (count_ends(grasp), find_last_failure(grasp)) == ("1 done, 2 failed, 1 halted", "blocked")
-    assert (count_ends(wait), find_last_failure(wait)) == ("1 under way", "")
-    assert timeline.counts == {"tree/Grasp": {"FAILURE": 2, "INVALID": 1, "SUCCESS": 1}}
+    assert (describe_ends(grasp), find_last_failure(grasp)) == ("1 done, 2 failed, 1 halted", "blocked")
+    assert (describe_ends(wait), find_last_failure(wait)) == ("1 running", "")
+    assert timeline.end_counts == {"tree/Grasp": {"FAILURE": 2, "INVALID": 1, "SUCCESS": 1}}
 
 
 def test_an_activation_is_current_until_an_ancestor_starts_again() -> None:
     timeline = folded(NodeStarted("tree"), skill_started("tree/do/Grasp"), skill_ended("tree/do/Grasp"))
-    assert timeline.current("tree/do/Grasp") == timeline.nodes["tree/do/Grasp"]
+    assert timeline.find_current("tree/do/Grasp") == timeline.nodes["tree/do/Grasp"]
     timeline(at(960, NodeStarted("tree")))
-    assert timeline.current("tree/do/Grasp") is None
-    assert timeline.current("tree") == timeline.nodes["tree"]
+    assert timeline.find_current("tree/do/Grasp") is None
+    assert timeline.find_current("tree") == timeline.nodes["tree"]
 
 
 def test_the_failures_that_a_control_node_handled_are_counted_with_their_last_message() -> None:
@@ -123,7 +129,10 @@ def test_the_failures_that_a_control_node_handled_are_counted_with_their_last_me
     )  # fmt: skip
     retry = timeline.nodes["tree/retry"]
     assert (retry.choice, retry.last_handled) == ("attempt 3 of 3", "Grasp.missed")
-    assert (retry.handled, retry.messages) == ({"Grasp.missed": 2}, {"Grasp.missed": "too far"})
+    assert (retry.handled_counts, retry.message_by_reason) == (
+        {"Grasp.missed": 2},
+        {"Grasp.missed": "too far"},
+    )
 
 
 def test_a_control_node_knows_the_skills_that_it_halted() -> None:
@@ -159,7 +168,7 @@ def test_skills_that_run_are_in_the_order_of_their_starts() -> None:
     [("tree/do/Grasp", "Grasp"), ("tree/do/2:Detect", "Detect"), ("tree/recover/look/pick", "pick")],
 )
 def test_a_skill_has_its_name_or_label(path: str, name: str) -> None:
-    assert skill_name(path) == name
+    assert to_skill_name(path) == name
 
 
 def test_an_item_has_its_last_sighting_and_the_number_of_looks_since_then() -> None:
@@ -169,14 +178,14 @@ def test_an_item_has_its_last_sighting_and_the_number_of_looks_since_then() -> N
         frame_searched(frame=8), frame_searched(frame=9),
     )  # fmt: skip
     item = timeline.items.by_name["cube-1"]
-    assert (item.sighting.frame, item.sighting.confidence, item.unseen) == (7, 0.8, 2)
+    assert (item.sighting.frame, item.sighting.confidence, item.unseen_look_count) == (7, 0.8, 2)
     assert (timeline.items.look.frame, timeline.items.look.found) == (9, 0)
 
 
 def test_an_item_has_the_times_at_which_the_tool_got_and_lost_it() -> None:
     states = ("seen", "held", "held", "dropped")
     item = folded(*(item_changed("cube-1", state) for state in states)).items.by_name["cube-1"]
-    assert (item.held, item.dropped) == (1.0, 3.0)
+    assert (item.pick_time, item.drop_time) == (1.0, 3.0)
 
 
 def test_the_accounts_after_the_end_of_the_tree_leave_the_final_states_as_they_were() -> None:
@@ -221,7 +230,7 @@ def test_the_memory_of_a_live_run_grows_only_with_its_items(tmp_path, monkeypatc
     run.run.add_observer(events.append)
     run.slip(2)
     run.run.execute()
-    timeline, sizes = Timeline(history=False), []
+    timeline, sizes = Timeline(keeps_history=False), []
     for number in range(40):
         for timed in events:
             if not isinstance(timed.event, FrameCaptured):

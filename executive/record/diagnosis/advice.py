@@ -57,9 +57,9 @@ def give_advice(case: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator
 
 
 def _describe_position(item: ItemTimeline) -> str:
-    if item.dropped is not None and (item.sighting is None or item.sighting.clock < item.dropped):
+    if item.drop_time is not None and (item.sighting is None or item.sighting.clock < item.drop_time):
         return "below where it was dropped"
-    return "around ({:.2f}, {:.2f}) m".format(*item.now.position)
+    return "around ({:.2f}, {:.2f}) m".format(*item.last_change.position)
 
 
 def _suggest_changes(case: FailedRun) -> Iterator[str]:

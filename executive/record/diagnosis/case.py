@@ -8,7 +8,7 @@ from executive.errors import RecordLost
 from executive.events import RunEnded
 from executive.mission.model.nodes import Node, SkillNode
 from executive.record.diagnosis.chain import find_nodes_on_path, trace_failure
-from executive.record.timeline.activation import skill_name
+from executive.record.timeline.activation import to_skill_name
 from executive.record.timeline.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class FailedRun:
         self.lost = {
             name: item
             for name, item in timeline.items.by_name.items()
-            if failed and not end.node and item.now.state == "lost"
+            if failed and not end.node and item.last_change.state == "lost"
         }
         self.decided = timeline.nodes.get(end.node)
         self.node = next(iter(find_nodes_on_path(loaded.tree, end.node)[-1:]), None)
@@ -58,7 +58,7 @@ class FailedRun:
     def name_skill(self, path: str) -> str:
         """Return the name of a skill with the item of its last activation: `Grasp of cube-1`."""
         ran = self.timeline.nodes.get(path)
-        return skill_name(path) + (f" of {ran.item}" if ran is not None and ran.item else "")
+        return to_skill_name(path) + (f" of {ran.item}" if ran is not None and ran.item else "")
 
     def locate(self, node: Node) -> str:
         """Return the line of a node, and the file if it is not that of the mission."""

@@ -88,8 +88,8 @@ def _make_passed_failure(
 
     return PropagatedFailure(
         next((child for child in children if node_of(child) is below), None),
-        ran.reason, reasons, ran.handled, ran.messages, ran.last_handled, ran.choice, ran.end - ran.start,
-        has_failed,
+        ran.reason, reasons, ran.handled_counts, ran.message_by_reason, ran.last_handled, ran.choice,
+        ran.end - ran.start, has_failed,
     )  # fmt: skip
 
 

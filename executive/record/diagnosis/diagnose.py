@@ -17,7 +17,7 @@ from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFa
 from executive.record.picture_recorder import find_picture
 from executive.record.result import FINAL_STATUSES
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline.activation import Reading, skill_name
+from executive.record.timeline.activation import Reading, to_skill_name
 from executive.record.timeline.items import ItemTimeline, Look, Sighting
 from executive.record.timeline.timeline import Timeline
 from executive.skill import Skill
@@ -82,7 +82,7 @@ def diagnose(
         look=_last_look(case),
         lost=[_lost_item(name, item) for name, item in case.lost.items()],
         running=[case.name_skill(path) for path in case.running],
-        left=[name for name, item in left.items() if item.now.label in loaded.routes],
+        left=[name for name, item in left.items() if item.last_change.label in loaded.routes],
         arm=arm,
         holds=end.holds,
         raised_at=_place_of_exception(timeline.traceback),
@@ -120,14 +120,14 @@ def _last_look(case: FailedRun) -> Sighting | Look | None:
     item = case.timeline.items.by_name.get(case.item)
     if item is None or item.sighting is None:
         return case.timeline.items.look
-    return replace(item.sighting, attempts=item.now.attempts)
+    return replace(item.sighting, attempts=item.last_change.attempts)
 
 
 def _lost_item(name: str, item: ItemTimeline) -> LostItem:
     failure, failed = item.failure, None
     if failure is not None:
-        failed = ItemFailure(f"{skill_name(failure.node)}.{failure.reason}", failure.message, failure.end)
-    return LostItem(name, item.sighting, item.unseen, item.held, item.dropped, failed)
+        failed = ItemFailure(f"{to_skill_name(failure.node)}.{failure.reason}", failure.message, failure.end)
+    return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failed)
 
 
 def _picture(case: FailedRun, run: Path) -> str:

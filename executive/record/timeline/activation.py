@@ -1,4 +1,4 @@
-"""Execution of a node, and the answers of the cell before it failed."""
+"""Executions of a node, and the values that were read from the cell before a failure."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-_WORDS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted", "RUNNING": "under way"}
+_STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted", "RUNNING": "running"}
 
 
 @dataclass(frozen=True)
 class Reading:
-    """Answer of the cell that is a number, a truth value or a text.
+    """Number, truth value or string that was read from the cell.
 
     Attributes:
         name: Name of the input.
-        value: The answer, or the message of the exception.
-        raised: Name of the exception that the cell raised; "" for an answer.
-        tick: Control step in which the answer was read first.
+        value: The value, or the message of the exception.
+        raised: Name of the exception that the cell raised; "" for a value.
+        tick: Control step in which this value was read first.
         clock: Time of this control step [s].
     """
 
@@ -34,19 +34,19 @@ class Activation:
 
     Attributes:
         node: Path of the node.
-        number: Number of the activation in the run, from 1.
+        number: Number of this activation among all activations in the run, from 1.
         skill: Name of the skill; "" for a control node.
         item: Item that the skill works on, or "".
         status: `RUNNING`, `SUCCESS`, `FAILURE` or `INVALID`.
-        start_tick, end_tick: Control steps of start and end; the end is the start while the node runs.
-        start, end: Times of start and end [s].
+        start_tick, end_tick: Control steps of start and end; equal while the node runs.
+        start, end: Times of start and end [s]; equal while the node runs.
         reason, message: Reason and message of the failure or fault, or "".
-        choice: Last decision of a control node.
-        handled: Number of failures that a control node has handled, by reason.
-        messages: Message of the last handled failure, by reason.
-        last_handled: Reason of the failure that was handled last, or "".
-        halted: Paths of the skills that the control node halted just before it ended.
-        readings: Last answers of the cell when the skill failed, the latest at the end.
+        choice: Last decision of a control node, or "".
+        handled_counts: Number of failures that a control node handled, by reason.
+        message_by_reason: Message of the last handled failure, by reason.
+        last_handled: Reason of the last handled failure, or "".
+        halted: Paths of the skills that the control node halted before it ended.
+        readings: Last value of each input before the failure of a skill, the latest at the end.
     """
 
     node: str
@@ -61,8 +61,8 @@ class Activation:
     reason: str = ""
     message: str = ""
     choice: str = ""
-    handled: Counter[str] = field(default_factory=Counter)
-    messages: dict[str, str] = field(default_factory=dict)
+    handled_counts: Counter[str] = field(default_factory=Counter)
+    message_by_reason: dict[str, str] = field(default_factory=dict)
     last_handled: str = ""
     halted: tuple[str, ...] = ()
     readings: tuple[Reading, ...] = ()
@@ -74,30 +74,30 @@ class Activation:
 
     @property
     def note(self) -> str:
-        """Reason of the failure, else the item."""
+        """Reason of the failure, or else name of the item."""
         return self.reason or self.item
 
 
 def group_by_node(activations: Iterable[Activation]) -> dict[str, list[Activation]]:
     """Return the activations of each node by its path."""
-    grouped: dict[str, list[Activation]] = {}
+    activations_by_node: dict[str, list[Activation]] = {}
     for activation in activations:
-        grouped.setdefault(activation.node, []).append(activation)
-    return grouped
+        activations_by_node.setdefault(activation.node, []).append(activation)
+    return activations_by_node
 
 
-def count_ends(activations: Iterable[Activation]) -> str:
-    """Return the number of activations for each status in words: `3 done, 1 failed`."""
-    ends = Counter(activation.status for activation in activations)
-    return ", ".join(f"{ends[status]} {word}" for status, word in _WORDS.items() if ends[status])
+def describe_ends(activations: Iterable[Activation]) -> str:
+    """Return a text with the number of activations in each status: `3 done, 1 failed`."""
+    counts = Counter(activation.status for activation in activations)
+    return ", ".join(f"{counts[status]} {text}" for status, text in _STATUS_TEXTS.items() if counts[status])
 
 
 def find_last_failure(activations: Sequence[Activation]) -> str:
-    """Return reason and message of the last activation that failed; "" if none failed."""
+    """Return reason and message of the last failed activation, or "" if no activation failed."""
     failures = (activation.failure for activation in reversed(activations) if activation.status == "FAILURE")
     return next(failures, "")
 
 
-def skill_name(path: str) -> str:
-    """Return the name or label of the skill at the end of the path of a node."""
+def to_skill_name(path: str) -> str:
+    """Return the name or label of the skill in the node at `path`."""
     return path.rpartition("/")[2].rpartition(":")[2]

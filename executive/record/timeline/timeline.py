@@ -1,4 +1,4 @@
-"""Timeline of a run: the fold of its events, for running and recorded runs."""
+"""Timeline of a running or recorded run: state and history of nodes and items, computed from the events."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from executive.record.timeline.items import ItemsTimeline
 
 @dataclass
 class PlanningTotals:
-    """Planned motions, including repeated plans and plans without a solution.
+    """Statistics of motion planning.
 
     Attributes:
-        motions: Number of planned motions.
-        ahead: Number of motions that were planned before a skill asked for them.
-        waited_s: Time that was spent waiting for plans [s].
+        motions: Number of planned motions, including repeated plans and plans without a solution.
+        ahead: Number of motions that were planned before a skill requested them.
+        waited_s: Total time spent waiting for plans [s].
     """
 
     motions: int = 0
@@ -28,35 +28,35 @@ class PlanningTotals:
 
 @dataclass
 class Timeline:
-    """Fold of the events of a run; an observer.
+    """Observer that computes the state and the history of a run from its events.
 
     Attributes:
-        history: True to keep all activations and selections; otherwise the memory depends only on the size of
-            the mission and on the number of items.
-        started, ended: Start and end of the run, or None.
+        keeps_history: True to store all activations and selections; otherwise the memory depends only on the
+            number of nodes and items.
+        started, ended: Events of the start and the end of the run, or None.
         tick, clock: Control step and time of the last event [s].
         nodes: Last activation of each node, by path.
-        counts: Number of ended activations of each node by status, by path.
+        end_counts: Number of ended activations by status, for each node by path.
         last_end: The activation that ended last, or None.
-        halted: Paths of the skills that were halted since a node last started, succeeded or failed.
+        halted: Paths of the skills that were halted since the last start, success or failure of a node.
         activations: All activations in the order of their starts.
-        items: Events of the items.
-        targets: Last selection of each item, by name.
-        selections: Time of each selection [s], and its item.
-        planning: Counts of the planned motions.
-        question: The question that the operator has not answered, or None.
+        items: History of the items.
+        targets: Last selection of each item as a target, by name of the item.
+        selections: Time [s] and item of each selection of a target.
+        planning: Statistics of motion planning.
+        question: Question to the operator that is not yet answered, or None.
         requests: Requests of the operator; None for the request to quit.
-        faults: Time of each injected fault [s], and its name.
+        faults: Time [s] and name of each injected fault.
         traceback: Traceback of the exception that ended the run, or "".
     """
 
-    history: bool = True
+    keeps_history: bool = True
     started: events.RunStarted | None = None
     ended: events.RunEnded | None = None
     tick: int = 0
     clock: float = 0.0
     nodes: dict[str, Activation] = field(default_factory=dict)
-    counts: dict[str, Counter[str]] = field(default_factory=dict)
+    end_counts: dict[str, Counter[str]] = field(default_factory=dict)
     last_end: Activation | None = None
     halted: tuple[str, ...] = ()
     activations: list[Activation] = field(default_factory=list)
@@ -69,12 +69,12 @@ class Timeline:
     faults: list[tuple[float, str]] = field(default_factory=list)
     traceback: str = ""
     _root: str = ""
-    _count: int = 0
+    _activation_count: int = 0
     _readings: dict[str, Reading] = field(default_factory=dict)
 
     @staticmethod
-    def of(recorded: Iterable[events.TimedEvent]) -> Timeline:
-        """Return the timeline of a recorded run; running activations last until the last event."""
+    def from_events(recorded: Iterable[events.TimedEvent]) -> Timeline:
+        """Return the timeline of a recorded run; activations without end last until the last event."""
         timeline = Timeline()
         for timed in recorded:
             timeline(timed)
@@ -90,18 +90,18 @@ class Timeline:
             case events.InputRead():
                 self._add_reading(event)
             case events.NodeStarted():
-                self._start(event)
+                self._start_activation(event)
             case events.NodeEnded():
-                self._end(event)
+                self._end_activation(event)
             case events.BranchChosen():
-                self._choose(event)
+                self._add_choice(event)
             case events.ItemChanged():
-                self.items.change(event, self.clock, is_final=self._is_over())
+                self.items.add_change(event, self.clock, is_final=self._has_tree_ended())
             case events.FrameSearched():
                 self.items.add_look(event, self.clock)
             case events.TargetSelected():
                 self.targets[event.item] = event
-                if self.history:
+                if self.keeps_history:
                     self.selections.append((self.clock, event.item))
             case events.MotionPlanned():
                 self.planning.motions += 1
@@ -123,40 +123,40 @@ class Timeline:
 
     def find_running(self) -> list[Activation]:
         """Return the activations that have not ended, in the order of their starts."""
-        found = (last for last in self.nodes.values() if last.status == "RUNNING")
-        return sorted(found, key=lambda last: last.number)
+        running = (last for last in self.nodes.values() if last.status == "RUNNING")
+        return sorted(running, key=lambda last: last.number)
 
-    def current(self, path: str) -> Activation | None:
-        """Return the last activation of a node, or None if an ancestor of the node has started since then."""
+    def find_current(self, path: str) -> Activation | None:
+        """Return the last activation of a node, or None if an ancestor of the node was started after it."""
         last = self.nodes.get(path)
-        above = path.rpartition("/")[0]
-        while last is not None and above:
-            ancestor = self.nodes.get(above)
+        ancestor_path = path.rpartition("/")[0]
+        while last is not None and ancestor_path:
+            ancestor = self.nodes.get(ancestor_path)
             if ancestor is not None and ancestor.number > last.number:
                 return None
-            above = above.rpartition("/")[0]
+            ancestor_path = ancestor_path.rpartition("/")[0]
         return last
 
-    def _is_over(self) -> bool:
+    def _has_tree_ended(self) -> bool:
         """Return True if the tree has ended."""
         root = self.nodes.get(self._root)
         return root is not None and root.status != "RUNNING"
 
-    def _start(self, event: events.NodeStarted) -> None:
+    def _start_activation(self, event: events.NodeStarted) -> None:
         interrupted = self.nodes.get(event.node)
         if interrupted is not None and interrupted.status == "RUNNING":
-            # A resumed run restarts the nodes that were running.
+            # A resumed run restarts the nodes that were running at the interruption.
             self._close(interrupted, "INVALID")
         self._root = self._root or event.node
-        self._count += 1
-        now = (self.tick, self.clock)
-        started = Activation(event.node, self._count, event.skill, event.item, "RUNNING", *now, *now)
-        self.nodes[event.node] = started
+        self._activation_count += 1
+        number, now = self._activation_count, (self.tick, self.clock)
+        activation = Activation(event.node, number, event.skill, event.item, "RUNNING", *now, *now)
+        self.nodes[event.node] = activation
         self.halted = ()
-        if self.history:
-            self.activations.append(started)
+        if self.keeps_history:
+            self.activations.append(activation)
 
-    def _end(self, event: events.NodeEnded) -> None:
+    def _end_activation(self, event: events.NodeEnded) -> None:
         ended = self.nodes.get(event.node)
         if ended is None or ended.status != "RUNNING":
             return
@@ -174,22 +174,22 @@ class Timeline:
 
     def _close(self, activation: Activation, status: str) -> None:
         activation.status, activation.end_tick, activation.end = status, self.tick, self.clock
-        self.counts.setdefault(activation.node, Counter())[status] += 1
+        self.end_counts.setdefault(activation.node, Counter())[status] += 1
         self.last_end = activation
 
-    def _choose(self, event: events.BranchChosen) -> None:
+    def _add_choice(self, event: events.BranchChosen) -> None:
         node = self.nodes.get(event.node)
         if node is None:
             return
         node.choice = event.choice
         if event.reason:
-            node.handled[event.reason] += 1
-            node.messages[event.reason] = event.message
+            node.handled_counts[event.reason] += 1
+            node.message_by_reason[event.reason] = event.message
             node.last_handled = event.reason
 
     def _add_reading(self, event: events.InputRead) -> None:
         self._readings.pop(event.name, None)
-        # The diagnosis quotes values of these types, but no poses, images or lists.
+        # The diagnosis quotes only values of these types, not poses, images or lists.
         if isinstance(event.value, (bool, int, float, str)):
             reading = Reading(event.name, event.value, event.raised, self.tick, self.clock)
             self._readings[event.name] = reading

@@ -69,7 +69,7 @@ def draw_page(
     _draw_header(page, source.start.mission, subtitle, state.time, duration)
     top = HEIGHT - _BOTTOM_MARGIN - panel.compute_height(source.item_count)
     ImageDraw.Draw(page).line((LEFT, top - 10, RIGHT, top - 10), LINE, 1)
-    panel.draw_items(page, (LEFT, top, RIGHT, HEIGHT), state.timeline.items.now(), source.bin_colours)
+    panel.draw_items(page, (LEFT, top, RIGHT, HEIGHT), state.timeline.items.list_items(), source.bin_colours)
     panel.draw_tree(page, (LEFT, _TREE_TOP, RIGHT, top - 18), source.nodes, state)
     return page
 

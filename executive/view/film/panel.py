@@ -56,7 +56,7 @@ def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state:
     for row, (node, prefix) in enumerate(zip(shown, draw_line_prefixes(shown), strict=True)):
         middle = top + NODE_ROW * (row + 0.5)
         _draw_lines(draw, prefix, left, middle)
-        last = state.timeline.current(node.path)
+        last = state.timeline.find_current(node.path)
         status = last.status if last else ""
         x = left + INDENT * (len(prefix) // _CHARACTERS_PER_LEVEL)
         draw_mark(image, status, (x + MARK_SIZE / 2, middle), MARK_SIZE)
@@ -81,7 +81,7 @@ def select_nodes(nodes: Sequence[OutlineNode], state: FilmRunState, max_count: i
 
     def rank(index: int) -> tuple[bool, bool, int]:
         path = shown[index].path
-        last = state.timeline.current(path)
+        last = state.timeline.find_current(path)
         return path in active_paths, last is not None and last.status in STATUS_COLOURS, -index
 
     kept_indices = sorted(sorted(range(len(shown)), key=rank, reverse=True)[:max_count])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from executive.events import FaultRaised, NodeEnded, RunHalted, RunResumed, TimedEvent
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation, skill_name
+from executive.record.timeline.activation import Activation, to_skill_name
 from executive.record.timeline.timeline import Timeline
 from executive.view.tree.outline import find_skill_names
 
@@ -32,7 +32,7 @@ class FilmRunState:
     def __init__(
         self, events: Sequence[TimedEvent], nodes: Sequence[OutlineNode], pictures: Sequence[Path]
     ) -> None:
-        self.timeline = Timeline(history=False)
+        self.timeline = Timeline(keeps_history=False)
         self.picture_file: Path | None = None
         self.time = 0.0
         self._events = list(events)[::-1]
@@ -63,7 +63,7 @@ class FilmRunState:
             last = timeline.nodes.get(path)
             if last is not None and last.status == "RUNNING":
                 item, target = timeline.items.by_name.get(last.item), timeline.targets.get(last.item)
-                is_held = item is not None and item.now.state == "held"
+                is_held = item is not None and item.last_change.state == "held"
                 bin_text = f"to {target.bin}" if target is not None and is_held else ""
                 return " ".join(part for part in (name, last.item, bin_text) if part)
         return ""
@@ -89,7 +89,7 @@ def _describe_failure(timed: TimedEvent) -> str:
     """Return a text about the failure of a skill with an item, a halt, a fault or a resumption; else ""."""
     match timed.event:
         case NodeEnded(status="FAILURE", skill=skill, item=item) as ended if skill and item:
-            return f"{skill_name(ended.node)}.{ended.reason}: {ended.message}"
+            return f"{to_skill_name(ended.node)}.{ended.reason}: {ended.message}"
         case RunHalted():
             return "halt"
         case FaultRaised():

@@ -33,7 +33,7 @@ class Board:
     def __init__(self) -> None:
         self.state: Json = {"paused": False, "over": False, "nodes": {}, "items": {}}
         self._changes: Json = {}
-        self._timeline = Timeline(history=False)
+        self._timeline = Timeline(keeps_history=False)
 
     def apply(self, message: Message) -> None:
         """Update the state of the page by a message."""
@@ -70,7 +70,7 @@ class Board:
                 self._set(asking=None, over=True)
 
     def _describe_node(self, path: str) -> Json:
-        last, counts = self._timeline.nodes[path], self._timeline.counts.get(path, Counter())
+        last, counts = self._timeline.nodes[path], self._timeline.end_counts.get(path, Counter())
         ends = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
         return {
             **{word: counts[status] for word, status in ends.items()},

@@ -55,8 +55,8 @@ class ReportFacts:
         self.end = self.result or find_end(events)
         self.status = CUT_OFF if self.end is None else self.end.status
         self.nodes = read_tree(directory.tree)
-        self.timeline = Timeline.of(events)
-        items = self.timeline.items.now()
+        self.timeline = Timeline.from_events(events)
+        items = self.timeline.items.list_items()
         self.objects = [item for item in items if item.state != "phantom"]
         self.activity_times = compute_activity_times(self.timeline, self.nodes)
         self.pictures = collect_pictures(directory.pictures, [item.item for item in items])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation, count_ends, find_last_failure, group_by_node
+from executive.record.timeline.activation import Activation, describe_ends, find_last_failure, group_by_node
 from executive.record.timeline.timeline import Timeline
 from executive.view.text import fit_text, measure_text, render_template
 
@@ -120,7 +120,7 @@ def _make_bar(node: OutlineNode, group: Sequence[Activation]) -> Bar:
     first, end = group[0], group[-1].end
     has_one_item = len({activation.item for activation in group}) == 1
     item = f" of {first.item}" if first.item and has_one_item else ""
-    status = first.status if len(group) == 1 else count_ends(group)
+    status = first.status if len(group) == 1 else describe_ends(group)
     times = f"{first.start:.2f} s to {end:.2f} s ({end - first.start:.2f} s)"
     tooltip = "\n".join(filter(None, (f"{node.name}{item}: {status}", times, find_last_failure(group))))
     worst = min((activation.status for activation in group), key=_STATUSES_BY_SEVERITY.index)

@@ -17,7 +17,7 @@ from executive.record.diagnosis import text
 from executive.record.pictures.palette import PALETTE
 from executive.record.result import describe_disagreement
 from executive.record.run_directory import RunDirectory, convert_os_errors
-from executive.record.timeline.activation import count_ends, find_last_failure, group_by_node
+from executive.record.timeline.activation import describe_ends, find_last_failure, group_by_node
 from executive.view.report.activity_times import LOOK, RETRY, WAITING
 from executive.view.report.facts import ReportFacts
 from executive.view.report.lanes import draw_lanes
@@ -127,6 +127,8 @@ def _choose_colours(activities: Sequence[str]) -> dict[str, str]:
 def _make_notes(facts: ReportFacts) -> dict[str, NodeNote]:
     """Return the note of each node that ran, for the drawing of the tree."""
     return {
-        path: NodeNote(group[-1].status, tuple(filter(None, (count_ends(group), find_last_failure(group)))))
+        path: NodeNote(
+            group[-1].status, tuple(filter(None, (describe_ends(group), find_last_failure(group))))
+        )
         for path, group in group_by_node(facts.timeline.activations).items()
     }

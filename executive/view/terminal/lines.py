@@ -29,7 +29,7 @@ class LineView:
         self._stream = stream
         self._names_by_path: dict[str, str] = {}
         self._skill_names_by_path: dict[str, str] = {}
-        self.timeline = Timeline(history=False)
+        self.timeline = Timeline(keeps_history=False)
 
     def open(self, run: Run) -> None:
         """Store the names of the nodes of a run."""
@@ -79,7 +79,7 @@ class LineView:
     def _describe_change(self, change: events.ItemChanged) -> str:
         """Return the text about a changed item; "" if only its position or its counts changed."""
         item = self.timeline.items.by_name.get(change.item)
-        if item is not None and _get_described_fields(item.now) == _get_described_fields(change):
+        if item is not None and _get_described_fields(item.last_change) == _get_described_fields(change):
             return ""
         bin_text = f" in {change.bin}" if change.state == "placed" and change.bin else ""
         return f"{change.item} {change.state}{bin_text}" + (f": {change.why}" if change.why else "")

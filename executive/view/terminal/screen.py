@@ -51,7 +51,7 @@ class TerminalView:
         self._key_reader: KeyReader | None = None
         self._nodes: Sequence[OutlineNode] = ()
         self._lock = threading.Lock()
-        self.timeline = Timeline(history=False)
+        self.timeline = Timeline(keeps_history=False)
         self._live = Live(
             console=console, get_renderable=self.render, refresh_per_second=REDRAWS_PER_SECOND, transient=True
         )
@@ -118,7 +118,7 @@ class TerminalView:
         table = Table(box=None, header_style="dim", padding=(0, 1))
         for column in ("item", "class", "state", "bin"):
             table.add_column(column)
-        for item in self.timeline.items.now():
+        for item in self.timeline.items.list_items():
             state = Text(item.state, style=_STATE_STYLES.get(item.state, ""))
             table.add_row(Text(item.item), Text(item.label), state, Text(item.bin))
         return table

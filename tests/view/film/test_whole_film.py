@@ -74,7 +74,7 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
     state.advance_to(grasped, 0.0)
     grasp = state.timeline.nodes["tree/Grasp"]
     assert grasp.status == "SUCCESS"
-    assert state.timeline.items.by_name[grasp.item].now.state == "held"
+    assert state.timeline.items.by_name[grasp.item].last_change.state == "held"
     assert holds[grasped]
     assert not any(holds[: closed + 1])
     # The last thing that the journal tells of happened after the last step.

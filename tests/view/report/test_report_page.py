@@ -116,7 +116,7 @@ def test_a_killed_run_is_reported_up_to_its_end_with_the_command_to_resume_it(ki
     assert f"resume executive run --resume {shlex.quote(str(killed))}" in found.texts["commands"]
     assert "Transit Transit of sphere-1: RUNNING" in found.texts["timeline"]
     assert "sphere-1 held" in found.texts["objects"]
-    assert "1 under way" in found.texts["tree"]
+    assert "1 running" in found.texts["tree"]
 
 
 def test_a_run_whose_result_is_gone_has_the_verdict_of_its_journal(failed, done, copy):
