@@ -13,11 +13,11 @@ from executive.geometry import Array, Pose
 
 
 class Motion(Protocol):
-    """A planned and checked arm trajectory, at rest at both ends."""
+    """A planned, collision-checked arm trajectory from rest to rest."""
 
     @property
     def duration(self) -> float:
-        """Time from the start to the final rest [s]."""
+        """Time from the start of the motion to rest at its end [s]."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Goal:
 
     Attributes:
         position: Position of the tool centre point `(x, y, z)` [m].
-        yaw: Rotation about the vertical [rad], or None for any rotation.
+        yaw: Rotation about the vertical axis [rad]; None: any rotation.
         guarded: Length of the guarded last part, straight down [m]; 0 for none.
         speed: Largest tool speed of the guarded part [m/s].
     """
@@ -57,13 +57,13 @@ class Planning(Protocol):
 
     @property
     def ready(self) -> bool:
-        """True from the control step in which the planning is finished."""
+        """True once the motion, or the reason why there is none, is available."""
 
     def result(self) -> Motion:
-        """Return the motion, once `ready` is True.
+        """Return the planned motion; only allowed while `ready` is True.
 
         Raises:
-            Unreachable: The goal has no joint solution inside the limits.
+            Unreachable: No joint configuration within the limits reaches the goal.
             Blocked: Every path comes too close to an obstacle.
         """
 
@@ -85,7 +85,7 @@ class Arm(Protocol):
 
     @property
     def destination(self) -> Array:
-        """Position of the tool `(3,)` [m] at the end of the present motion, or now if there is none."""
+        """Tool position `(3,)` [m] at the end of the current motion; without one, the current position."""
 
     @property
     def at_rest(self) -> bool:
@@ -96,23 +96,23 @@ class Arm(Protocol):
         """Description of the collision that ended the last motion, or None."""
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Planning:
-        """Begin to plan a motion from the present position to a goal, or to a named pose of the cell file.
+        """Start to plan a motion from the current position to a goal, or to a named pose of the cell file.
 
-        The planning is finished at once if `plan_ahead` had the same arguments and the same start.
+        The motion is available at once if `plan_ahead` planned it: same arguments, same start position.
         """
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
-        """Plan a motion from the end of the present motion, for a later call of `plan`."""
+        """Plan a motion from the end of the current motion, for a later call of `plan`."""
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow `motion`; the arm must be at rest at the start of `motion`."""
+        """Start to follow `motion`; the arm must be at rest at the start position of `motion`."""
 
     def stop(self) -> None:
-        """Brake along the path of the present motion, if any; return at once."""
+        """Start to brake along the path of the current motion, if any; return at once."""
 
 
-def refuse_steps(motion: object) -> None:
-    """Check that a motion is not a generator whose caller forgot `yield from`.
+def reject_generator(motion: object) -> None:
+    """Raise an error if a caller passed a generator as a motion because it forgot `yield from`.
 
     Raises:
         Fault: The motion is a generator.

@@ -1,4 +1,4 @@
-"""Bin with its drop slots."""
+"""Bin with its drop positions (slots)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Bin:
         name: Name in the cell file.
         position: Centre of its floor `(3,)` [m].
         size: Inner length, width and wall height `(3,)` [m].
-        slots: Drop positions over the floor `(N, 2)` [m], used in turn.
+        slots: Drop positions over the floor `(N, 2)` [m], used one after the other.
     """
 
     name: str
@@ -29,5 +29,5 @@ class Bin:
     slots: Array
 
     def contains(self, position: Array, margin: float = 0.0) -> bool:
-        """Return True if a point `(3,)` [m] lies over the floor, or at most `margin` [m] beside it."""
+        """Return True if a point `(3,)` [m] is over the floor, or horizontally at most `margin` [m] away."""
         return bool(np.all(np.abs(position[:2] - self.position[:2]) <= self.size[:2] / 2 + margin))

@@ -12,7 +12,7 @@ from executive.cell.workcell import Accounts, Workcell
 
 
 def _do_nothing() -> None:
-    """Do nothing."""
+    """Do nothing after a control step."""
 
 
 @dataclass(eq=False)
@@ -20,16 +20,16 @@ class CellWrapper:
     """Forwards everything to another work cell, unless a subclass overrides it; implements `Workcell`.
 
     Attributes:
-        inner: The work cell inside this wrapper.
-        after: Called after every control step.
+        inner: The wrapped work cell.
+        after_step: Function that is called after every control step.
     """
 
     inner: Workcell
-    after: Callable[[], None] = _do_nothing
+    after_step: Callable[[], None] = _do_nothing
 
     @property
     def cell(self) -> Cell:
-        """The cell that skills see."""
+        """The cell that skills use."""
         return self.inner.cell
 
     @property
@@ -48,16 +48,16 @@ class CellWrapper:
         return self.inner.last_command
 
     def log_to(self, path: Path) -> None:
-        """Start a log file from which the simulated world can be rebuilt."""
+        """Start a log file from which the simulated world can be reconstructed."""
         self.inner.log_to(path)
 
     def advance(self) -> None:
-        """Let one control step pass, and then call `after`."""
+        """Execute one control step, then call `after_step`."""
         self.inner.advance()
-        self.after()
+        self.after_step()
 
     def visuals(self) -> Visuals | None:
-        """Return the scene for viewers, or None if the cell has none."""
+        """Return shapes and poses for displays, or None if the cell has none."""
         return self.inner.visuals()
 
     def audit(self) -> Mapping[str, int] | None:

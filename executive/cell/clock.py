@@ -1,4 +1,4 @@
-"""Length of a control step, and a clock that gets its time from a function."""
+"""Duration of a control step, and a clock that reads its time from a function."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ STEP = 1 / 240
 
 
 class StepClock:
-    """Clock that gets its time from a function; implements `executive.cell.protocols.Clock`.
+    """Clock that reads its time from a function; implements `executive.cell.protocols.Clock`.
 
     Args:
-        read: Returns the time since the run began [s].
+        get_time: Function that returns the time since the start of the run [s].
         step: Length of one control step [s].
     """
 
-    def __init__(self, read: Callable[[], float], step: float = STEP) -> None:
-        self._read = read
+    def __init__(self, get_time: Callable[[], float], step: float = STEP) -> None:
+        self._get_time = get_time
         self.step = step
 
     @property
     def now(self) -> float:
-        """Time since the run began [s]."""
-        return self._read()
+        """Time since the start of the run [s]."""
+        return self._get_time()
 
     def sleep(self, duration: float) -> Iterator[None]:
         """Yield until `duration` [s] has passed on this clock."""

@@ -19,8 +19,8 @@ class Detection:
     Attributes:
         label: Class name.
         confidence: Confidence, 0 to 1.
-        box: Bounding box of the whole object [pixel] in the frame's image.
-        rival: Confidence of the second class for this box, 0 to 1; 0 if unknown.
+        box: Bounding box of the whole object in the image [pixel].
+        rival: Confidence of the second most likely class for this box, 0 to 1; 0 if unknown.
     """
 
     label: str
@@ -37,17 +37,17 @@ class Detection:
 
 @dataclass(frozen=True)
 class Answer:
-    """Answer of a detector to a frame; it may be empty.
+    """Detections of a detector in a frame, maybe none.
 
-    A detector reports all detections at or above its floor in `found`. Before a skill reads the answer, the
-    cell moves some of them to `doubtful` and `unknown` (`executive.perception.detectors.screening`).
+    A detector puts all detections into `found`. Before a skill reads the answer, the cell moves some
+    of them to `doubtful` and `unknown` (`executive.perception.detectors.screening`).
 
     Attributes:
         detector: Name of the detector in the cell file.
         found: Confident detections of known classes, most confident first.
         error_rates: Error rates of the detector.
-        doubtful: Detections below the threshold or less than twice as likely as another class.
-        unknown: Detections at or above the threshold with labels that the cell does not know.
+        doubtful: Detections below the threshold, or with a second class that is more than half as likely.
+        unknown: Detections at or above the threshold with labels that the cell file does not declare.
     """
 
     detector: str
@@ -57,10 +57,10 @@ class Answer:
     unknown: tuple[Detection, ...] = ()
 
     def describe_doubt(self, detection: Detection) -> str:
-        """Return a sentence about the best doubtful detection and the reason of the doubt."""
+        """Return a message: nothing certain was found, and why `detection`, the best one, is doubtful."""
         threshold = self.error_rates.threshold
-        second = f"with another class at {detection.rival:.2f}"
-        limit = f"< {threshold:.2f}" if detection.confidence < threshold else second
+        second_class = f"with another class at {detection.rival:.2f}"
+        limit = f"< {threshold:.2f}" if detection.confidence < threshold else second_class
         return (
             f"detector {self.detector} found nothing certain: at best a {detection.label} "
             f"at {detection.confidence:.2f} {limit}"
@@ -69,12 +69,12 @@ class Answer:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Detections(Answer):
-    """Answer of a detector together with the frame that it searched.
+    """Answer of a detector, with the frame and the region that the detector searched.
 
     Attributes:
-        frame: The searched image.
-        view: Name of the searched part of the frame: `table` or `full`.
-        area: Searched part of the frame [pixel].
+        frame: The searched frame.
+        view: Name of the searched region of the image: `table` (the workspace) or `full`.
+        area: Searched region of the image [pixel].
     """
 
     frame: Frame
@@ -82,14 +82,14 @@ class Detections(Answer):
     area: Box
 
     def is_in_area(self, points: Array, margin: float = 0.0) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the points `(N, 3)` [m] of the world that lie in the searched area.
+        """Return a mask `(N,)` of the points `(N, 3)` [m] in the world that the searched region shows.
 
-        `margin` is the smallest distance of a point to the border of the area [pixel].
+        `margin` is the minimum distance of an image point to the border of the region [pixel].
         """
         return self.frame.is_in_area(points, self.area, margin)
 
     def is_searched(self, points: Array) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the points `(N, 3)` [m] at which an object would be seen completely."""
+        """Return a mask `(N,)` of the points `(N, 3)` [m] at which an object would be completely visible."""
         return self.is_in_area(points) & self.frame.is_unoccluded(points)
 
 
@@ -101,8 +101,8 @@ class Observation:
         detection: The detection.
         position: Centre of the object `(3,)` [m] in the world.
         std: Standard deviation of the random error of the position along each axis [m].
-        confident: False for a low-confidence detection: a doubtful or a contradicted one.
-        contradiction: Evidence against the detected class as a sentence, or "".
+        confident: False if the detection is doubtful or contradicted.
+        contradiction: Sentence with the evidence against the detected class, or "".
     """
 
     detection: Detection

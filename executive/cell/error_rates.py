@@ -1,4 +1,4 @@
-"""Error rates of a detector, with which the ledger weights looks."""
+"""Error rates of a detector, by which the ledger weights its detections."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ class ErrorRates:
     """Error rates of a detector in its cell, measured by `executive evaluate` or assumed.
 
     Attributes:
-        threshold: Confidence from which a detection counts.
-        miss_rate: Share of the objects in full view that one look misses.
-        confusion_rate: Share of the found objects that get a wrong class.
-        false_detections: Number of false detections per look.
-        jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
-        repeated: Share of the errors that a second look from the same pose repeats.
+        threshold: Minimum confidence of a detection that is not doubtful, 0 to 1.
+        miss_rate: Fraction of the completely visible objects that one look (search of a frame) misses.
+        confusion_rate: Fraction of the found objects that get a wrong class.
+        false_detections: Mean number of false detections per look.
+        jitter: Standard deviation of the random error of the centre of a box, along each axis [pixel].
+        repeated: Fraction of the errors that a second look from the same camera pose repeats.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
-        doubt: Reason why the rates are assumed and not measured, or "".
+        doubt: Reason why the rates are assumed; "" if they are measured.
     """
 
     threshold: float
@@ -31,7 +31,7 @@ class ErrorRates:
 
 
 def assume_rates(threshold: float, doubt: str) -> ErrorRates:
-    """Return conservative error rates for a detector that was not measured under the present conditions.
+    """Return conservative error rates for a detector without a measurement under the current conditions.
 
     On 26 kinds of unusual scenes, the first embedded detector missed 4 % and confused 5 % of the objects on
     average, and repeated most errors in every look. The rates below are at least as high.

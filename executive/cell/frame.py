@@ -1,4 +1,4 @@
-"""Camera image with the pose, time and visibility that belong to it."""
+"""Camera image with camera pose, capture time and visibility mask."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Box = tuple[float, float, float, float]
 OBJECT_RADIUS = 0.03
 """Typical distance from the centre of an object to its outline [m]."""
 OBJECT_POINTS = OBJECT_RADIUS * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], float)
-"""Points of an object relative to its centre `(5, 3)` [m]; a detector finds the object if all are visible."""
+"""Points `(5, 3)` [m] of an object, relative to its centre; an object is detectable if all are visible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,9 @@ class Frame:
             without depth.
         matrix: Camera matrix `(3, 3)` [pixel].
         X_WC: Camera pose in the world at capture, OpenCV convention (z forward, y down).
-        stamp: Capture time on the run's clock [s].
-        visible: `(H, W)` bool, False for pixels in which the arm, by its kinematics, hides the scene.
-        epoch: Number of changes of the table at capture (`Ledger.epoch`).
+        stamp: Capture time on the clock of the run [s].
+        visible: `(H, W)` bool, False for pixels in which the arm may occlude the scene, from its kinematics.
+        epoch: Version of the scene at capture: how often the robot had changed the objects on the table.
     """
 
     id: int
@@ -47,46 +47,46 @@ class Frame:
     epoch: int
 
     def compute_visible_fraction(self, box: Box) -> float:
-        """Return the share of a box (0 to 1) in which the arm does not hide the scene."""
+        """Return the fraction of a box (0 to 1) that the arm does not occlude."""
         height, width = self.visible.shape
         left, right = (min(max(round(x), 0), width) for x in box[::2])
         top, bottom = (min(max(round(y), 0), height) for y in box[1::2])
-        part = self.visible[top:bottom, left:right]
-        return float(part.mean()) if part.size else 0.0
+        crop = self.visible[top:bottom, left:right]
+        return float(crop.mean()) if crop.size else 0.0
 
     def is_in_area(self, points: Array, area: Box, margin: float = 0.0) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the points `(N, 3)` [m] of the world that lie in an area of the image.
+        """Return a mask `(N,)` of the points whose images are in a region of the image.
 
         Args:
             points: Points in the world `(N, 3)` [m].
-            area: Part of the image [pixel].
-            margin: Smallest distance of a point to the border of the area [pixel].
+            area: Region of the image [pixel].
+            margin: Minimum distance of an image point to the border of the region [pixel].
         """
-        pixels, is_ahead = self._project(points)
+        pixels, is_in_front = self._project(points)
         left, top, right, bottom = area
         inside = (pixels >= (left + margin, top + margin)) & (pixels < (right - margin, bottom - margin))
-        return np.asarray(is_ahead & inside.all(axis=1))
+        return np.asarray(is_in_front & inside.all(axis=1))
 
     def is_unoccluded(self, points: Array) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the points `(N, 3)` [m] at which the arm hides no part of an object."""
+        """Return a mask `(N,)` of the points `(N, 3)` [m] at which the arm occludes no part of an object."""
         mask = np.ones(len(points), dtype=bool)
         height, width = self.visible.shape
         for offset in OBJECT_POINTS:
-            pixels, is_ahead = self._project(points + offset)
+            pixels, is_in_front = self._project(points + offset)
             columns, rows = pixels.astype(int).clip(0, (width - 1, height - 1)).T
-            mask &= is_ahead & self.visible[rows, columns]
+            mask &= is_in_front & self.visible[rows, columns]
         return mask
 
     def compute_depth(self, position: Array) -> float:
-        """Return the distance [m] of a point `(3,)` [m] from the camera, along the optical axis."""
+        """Return the distance [m] of a world point `(3,)` [m] from the camera, along the optical axis."""
         return float(self.X_WC.inverse().apply(position)[2])
 
     def to_opencv(self) -> tuple[Array, Array, Array]:
-        """Return the camera in OpenCV's form: matrix `(3, 3)`, rvec `(3,)` [rad] and tvec `(3,)` [m].
+        """Return the camera parameters of OpenCV: matrix `(3, 3)`, rvec `(3,)` [rad] and tvec `(3,)` [m].
 
-        `cv2.projectPoints(points, rvec, tvec, matrix, None)` then returns world points in OpenCV's pixels.
-        The centres of OpenCV's pixels have integer coordinates: add 0.5 for the coordinates used here, in
-        which pixel i covers [i, i + 1).
+        `cv2.projectPoints(points, rvec, tvec, matrix, None)` then returns the pixels of world points. Pixel
+        centres have integer coordinates in OpenCV: add 0.5 to get the coordinates of this project, in which
+        pixel i covers [i, i + 1).
         """
         matrix = self.matrix.copy()
         matrix[:2, 2] -= 0.5
@@ -94,7 +94,7 @@ class Frame:
         return matrix, X_CW.rotation_vector, X_CW.position
 
     def _project(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the image positions of points `(N, 2)` [pixel], and a mask of those ahead of the camera."""
+        """Return the images `(N, 2)` [pixel] of points, and a mask of the points in front of the camera."""
         in_camera = self.X_WC.inverse().apply(points) @ self.matrix.T
         depth = in_camera[:, 2:]
         return in_camera[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
@@ -102,7 +102,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class FrameCaptured(Event):
-    """Image of the next `FrameSearched`; only for observers in this process.
+    """A frame was captured; the next event `FrameSearched` has its detections. Not written to the journal.
 
     Attributes:
         frame: The frame with its image.

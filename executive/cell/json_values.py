@@ -1,4 +1,4 @@
-"""Conversion of values to plain JSON for records: numbers are rounded, images left out."""
+"""Conversion of values to JSON for records, with rounded numbers and without images."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ DIGITS = 6
 """Number of decimal places of floats: a micrometre, a microradian, a microsecond."""
 
 MAX_INTEGER_BITS = 2048
-"""Length of the largest integer that stays a number [bit]; Python guarantees to read 640 digits."""
+"""Length of the largest integer that is written as a number [bit]: 617 digits; Python reads at least 640."""
 
 
 def to_json(value: Any) -> Any:
-    """Return `value` as plain JSON: floats rounded to `DIGITS` places, a frame by its number.
+    """Return `value` as JSON: floats rounded to `DIGITS` places; of a frame, number, camera and time.
 
-    Values that JSON lacks become text: infinities, NaN, integers beyond `MAX_INTEGER_BITS`, and lone
-    surrogates, as in a file name that is not UTF-8. Any parser can read the result.
+    Values without a JSON form become text: infinities, NaN, integers beyond `MAX_INTEGER_BITS`, and lone
+    surrogates, as in a file name that is not UTF-8. Every JSON parser can read the result.
     """
-    return _rule(value.__class__)(value)
+    return _find_converter(value.__class__)(value)
 
 
 def to_json_or_type_name(value: Any) -> Any:
-    """Return `value` as plain JSON, or the name of its type if it cannot be converted.
+    """Return `value` as JSON, or the name of its type if the value cannot be converted.
 
     Skills set outputs of any type; an output that cannot be converted must not end the run.
     """
@@ -47,11 +47,11 @@ def round_values(values: Iterable[float], digits: int) -> list[float]:
     return [round(float(value), digits) + 0.0 for value in values]
 
 
-def _text(value: str) -> str:
+def _escape(value: str) -> str:
     return value if value.isascii() else value.encode(errors="backslashreplace").decode()
 
 
-def _number(value: Any) -> float | str:
+def _round_number(value: Any) -> float | str:
     number = float(value)
     if not math.isfinite(number):
         return str(number)
@@ -59,29 +59,32 @@ def _number(value: Any) -> float | str:
     return round(number, DIGITS) + 0.0
 
 
-_RULES: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
+_CONVERTERS: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
     (Enum, lambda value: to_json(value.value)),
-    (str, _text),
+    (str, _escape),
     (int, lambda value: value if value.bit_length() <= MAX_INTEGER_BITS else hex(value)),
     (type(None), lambda value: value),
-    ((float, np.floating), _number),
+    ((float, np.floating), _round_number),
     (np.generic, lambda value: to_json(value.item())),
     (np.ndarray, lambda value: to_json(value.tolist())),
-    (Frame, lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _number(frame.stamp)}),
+    (Frame, lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _round_number(frame.stamp)}),
     (Pose, lambda pose: pose.to_rounded_list(DIGITS)),
-    (Mapping, lambda mapping: {_text(str(key)): to_json(value) for key, value in mapping.items()}),
+    (
+        Mapping,
+        lambda mapping: {_escape(str(key)): to_json(value) for key, value in mapping.items()},
+    ),
     ((list, tuple), lambda values: [to_json(value) for value in values]),
     ((set, frozenset), lambda values: sorted((to_json(value) for value in values), key=repr)),
-    (PurePath, lambda path: _text(str(path))),
+    (PurePath, lambda path: _escape(str(path))),
 )
-"""Types, and functions that make values of these types plain; the first matching type counts."""
+"""Types, and functions that convert their values to JSON; the first matching type applies."""
 
 
 @functools.cache
-def _rule(kind: type) -> Callable[[Any], Any]:
-    """Return the function for a type; cached, because events are recorded within a control step."""
-    if rule := next((rule for known, rule in _RULES if issubclass(kind, known)), None):
-        return rule
+def _find_converter(kind: type) -> Callable[[Any], Any]:
+    """Return the conversion for a type; cached, because it is needed in every control step."""
+    if converter := next((converter for known, converter in _CONVERTERS if issubclass(kind, known)), None):
+        return converter
     if dataclasses.is_dataclass(kind):
         names = [field.name for field in dataclasses.fields(kind)]
         return lambda value: {name: to_json(getattr(value, name)) for name in names}

@@ -1,4 +1,4 @@
-"""Protocol of the ledger: the items of a run, their state and their position."""
+"""Protocol of the ledger: the items (tracked objects) of a run with their states and positions."""
 
 from __future__ import annotations
 
@@ -12,56 +12,56 @@ from executive.geometry import Array
 
 
 class Ledger(Protocol):
-    """Items of a run: the only part that decides identity, freshness and final state of an object."""
+    """Tracker of the items of a run; it alone decides on identity, state and position of each object."""
 
     @property
     def epoch(self) -> int:
-        """Number of changes of the table by the robot."""
+        """Version of the scene: how often the robot has changed the objects on the table."""
 
     @property
     def unknown(self) -> Mapping[str, int]:
-        """Largest number of boxes in one look for each label that the cell does not know."""
+        """Maximum number of boxes in one look, by label, for labels that the cell file does not declare."""
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
-        """Update all items with one search of a frame, and return all targets (`find_targets`).
+        """Update all items with one look (the detections in a frame), and return the new `find_targets`.
 
-        Objects in bins are no targets. Detections at positions that the robot changed after the capture do
-        not count. A second search of the same frame does not count either.
+        Objects in bins are no targets. Ignored: detections at positions that the robot changed after the
+        capture, and a second search of the same frame.
 
         Args:
-            detections: The frame, the searched area, and the detector's error rates.
+            detections: The frame, the searched region, and the error rates of the detector.
             observations: The localized detections.
         """
 
     def find_targets(self) -> Sequence[Target]:
-        """Return one target per open item on the table whose position is known now."""
+        """Return a target for each item that is still to be sorted (`is_open`) at a known position."""
 
     def find_objects_on_table(self) -> Sequence[Target]:
         """Return all items that lie on the table with a probability of at least 0.5."""
 
     def find_uncertain_items(self) -> Sequence[Item]:
-        """Return the open items in the workspace that a further look may confirm or show to be gone."""
+        """Return the items to be sorted in the workspace that another look may confirm or refute."""
 
     def find_held_item(self) -> Item | None:
         """Return the item in the tool, or None."""
 
     def is_current(self, frame: Frame) -> bool:
-        """Return True if no change after the capture of a frame has put all positions in doubt."""
+        """Return True unless the robot may have moved any of the objects since the capture of a frame."""
 
     def is_fresh(self, target: Target) -> bool:
-        """Return True if no change after the last detection of a target may have moved it."""
+        """Return True if the robot cannot have moved a target since its last detection."""
 
     def is_open(self, item: Item) -> bool:
-        """Return True if an item is still to be sorted: not placed, rejected, held or lost."""
+        """Return True if an item is still to be sorted: neither placed, rejected, held nor lost."""
 
-    def is_sure(self, item: Item) -> bool:
+    def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough to pick it."""
 
     def is_table_empty(self, label: str | None = None) -> bool:
-        """Return True if no object with a route is left on the visible table, with the required probability.
+        """Return True if probably no object with a route is left in the visible part of the table.
 
         Args:
-            label: Only objects of this class count; None: those of all classes.
+            label: Class of the counted objects; None: all classes with a route.
         """
 
     def get_label(self, item: Item) -> str:
@@ -70,33 +70,33 @@ class Ledger(Protocol):
     def count_attempts(self, item: Item) -> int:
         """Return the number of failed attempts to pick an item."""
 
-    def count_in(self, bin: str) -> int:
+    def count_objects_in(self, bin: str) -> int:
         """Return the number of objects in a bin, which is the index of its next free slot."""
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
-        """Record that the tool touched an item, and return True if it may be of its class.
+        """Record that the tool touched an item, and return True if the item may be of its assumed class.
 
         Args:
             item: The item.
-            contradiction: How the height of the touch contradicts the class, or ""; a rejection reports it.
-            may_miss_top: True if the touch may have missed the top of the object.
+            contradiction: Sentence: how the height of the touch contradicts the class; "" if it does not.
+            may_miss_top: True if the cup may have touched the object beside its top.
         """
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
-        """Record a failed attempt to pick an item; all positions are in doubt now.
+        """Record a failed attempt to pick an item, which may have moved any object on the table.
 
         Args:
             item: The item.
-            found_table: True if the tool descended almost to the table there without a contact.
+            found_table: True if the tool descended almost to the table at the item without a contact.
         """
 
     def record_grasp(self, item: Item) -> None:
-        """Record that the tool holds an item; its neighbours may have been moved."""
+        """Record that the tool holds an item; the grasp may have moved neighbouring objects."""
 
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
-        """Record that the tool lost an item on the way; all positions are in doubt now.
+        """Record that the tool lost an item, which may have moved any object on the table.
 
-        `landing` `(3,)` [m] is the predicted position of the item, None if it is unknown.
+        `landing` `(3,)` [m] is the predicted position of the item; None if unknown.
         """
 
     def record_placement(self, item: Item, bin: str) -> None:
@@ -109,7 +109,7 @@ class Ledger(Protocol):
         """Reject an item: it is reported and not tried again."""
 
     def invalidate_positions(self) -> None:
-        """Record that any object on the table may have been moved."""
+        """Record that the robot may have moved any object on the table."""
 
     def lose_track(self) -> None:
         """Record that the tool may have moved any item that is not in a bin."""
@@ -117,13 +117,13 @@ class Ledger(Protocol):
     def mark_unseen_as_dropped(self) -> None:
         """Record as dropped every item that no look has shown since `lose_track`.
 
-        Looks search for the item on the table and in the bins. An item that is not found is rejected at the
-        end of the run, because its place is unknown.
+        Later looks search for these items on the table and in the bins. An item that they do not show is
+        rejected at the end of the run, because its position is unknown.
         """
 
     def record_bin_contents(self) -> None:
-        """Record an item for each object that most full looks since `lose_track` have shown in a bin.
+        """Record the objects that most looks at the full image since `lose_track` have shown in bins.
 
-        Objects that the ledger knows to be in the bin do not count. Each other object is assigned to a
+        Objects that the ledger knows to be in the bin are ignored. Each other object is assigned to a
         dropped item, or becomes a new item.
         """

@@ -18,10 +18,10 @@ class Target:
     Attributes:
         item: The item.
         label: Class name.
-        position: Centre of the object `(3,)` [m] in the world, at half its known height.
+        position: Centre of the object `(3,)` [m] in the world, at half the height of its class.
         confidence: Confidence of the last detection, 0 to 1.
         frame: Id of the last frame that showed the item.
-        epoch: Number of changes of the table at the capture of this frame.
+        epoch: Version of the scene at the capture of this frame (`Frame.epoch`).
         stamp: Capture time of this frame [s].
     """
 
@@ -41,8 +41,8 @@ class ObjectClass:
     Attributes:
         label: Class name that the detectors use.
         height: Height of the object as it lies on the table [m].
-        radius: Radius of the circle around its outline seen from above [m].
-        ring: Distance of the contact point from the centre [m]; more than 0 for parts with a hole.
+        radius: Radius of the circle around the outline of the object, seen from above [m].
+        ring: Distance of the contact point from the centre [m]; above 0 only for parts with a hole.
         mass: Mass [kg].
     """
 

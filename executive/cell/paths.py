@@ -1,16 +1,16 @@
-"""Checks that paths in files of the user stay below a folder."""
+"""Checks that paths in files of the user do not lead out of a folder."""
 
 from __future__ import annotations
 
 from pathlib import Path, PurePosixPath
 
 
-def leaves_folder(written: str) -> bool:
-    """Return True if a path is absolute or contains `..` or a backslash."""
-    path = PurePosixPath(written)
-    return path.is_absolute() or ".." in path.parts or "\\" in written
+def is_outside_path(path_text: str) -> bool:
+    """Return True if a path may lead out of its folder: it is absolute, or contains `..` or a backslash."""
+    path = PurePosixPath(path_text)
+    return path.is_absolute() or ".." in path.parts or "\\" in path_text
 
 
-def links_out(folder: Path, written: str) -> bool:
-    """Return True if a path below a folder leads out of it through a link."""
-    return not (folder / written).resolve().is_relative_to(folder.resolve())
+def has_outside_link(folder: Path, path_text: str) -> bool:
+    """Return True if a relative path leads out of a folder through a symbolic link."""
+    return not (folder / path_text).resolve().is_relative_to(folder.resolve())

@@ -20,29 +20,29 @@ from executive.cell.objects import ObjectClass, Target
 from executive.geometry import Array
 
 Steps = Iterator[None]
-"""Generator that yields None once per control step."""
+"""Iterator that yields None once per control step, until a call is finished."""
 
 Routes = Mapping[str, tuple[str, ...]]
-"""Class label to the bins that are right for it, in the order of the mission."""
+"""Names of the permitted bins by class label, in the order of the mission."""
 
 
 class Clock(Protocol):
-    """The only clock of the run; in simulation it advances with the physics steps."""
+    """The only clock of the run; in simulation, it shows simulated time."""
 
     @property
     def now(self) -> float:
-        """Time since the run began [s]."""
+        """Time since the start of the run [s]."""
 
     @property
     def step(self) -> float:
-        """Length of one control step [s]."""
+        """Duration of one control step [s]."""
 
     def sleep(self, duration: float) -> Steps:
         """Yield until `duration` [s] has passed on this clock."""
 
 
 class Tool(Protocol):
-    """A suction tool with a contact and a vacuum sensor."""
+    """A suction tool with a contact sensor and a vacuum sensor."""
 
     @property
     def touching(self) -> bool:
@@ -54,17 +54,17 @@ class Tool(Protocol):
 
     @property
     def holding_force(self) -> float:
-        """Largest force that the seal withstands, by the vacuum gauge [N]; 0 without a seal."""
+        """Maximum force that the seal withstands, from the measured vacuum [N]; 0 without a seal."""
 
     def close(self) -> None:
-        """Switch the vacuum on, which seals the touched object to the cup if its surface allows."""
+        """Switch the vacuum on; the touched object is held if its surface allows a seal."""
 
     def open(self) -> None:
         """Switch the vacuum off and release the object."""
 
 
 class Camera(Protocol):
-    """A camera that returns a frame in any control step."""
+    """A camera that can capture a frame in every control step."""
 
     @property
     def name(self) -> str:
@@ -75,52 +75,52 @@ class Camera(Protocol):
         """Names of the arm poses from which the camera sees the table, best first."""
 
     def next_pose(self) -> str:
-        """Return the next scan pose in turn, for a look from another viewpoint."""
+        """Advance to the next scan pose, cyclically, and return its name."""
 
     def get_view_box(self, view: str) -> Box:
-        """Return the part of the image [pixel] that a view shows: `table` (the workspace) or `full`."""
+        """Return the region of the image [pixel] of a view: `table` (the workspace) or `full`."""
 
     def sees_table(self) -> bool:
-        """Return True if the whole workspace is in view now, and the arm does not hide any part of it."""
+        """Return True if the whole workspace is now in the image and the arm occludes no part of it."""
 
     def capture(self) -> Frame:
-        """Return a new frame."""
+        """Capture and return a new frame."""
 
     def describe_displacement(self, frame: Frame) -> str:
-        """Return a sentence about the displacement of the camera that a frame shows, or ""."""
+        """Return a sentence about the displacement of the camera from its declared pose in a frame, or ""."""
 
 
 class Request(Protocol):
-    """Search of a frame by a detector, in progress or finished."""
+    """Search of a frame by a detector, running or finished."""
 
     @property
     def ready(self) -> bool:
-        """True from the control step in which the answer is due."""
+        """True once the answer, or the reason why there is none, is available."""
 
     def result(self) -> Answer:
-        """Return the answer of the detector, once `ready` is True.
+        """Return the answer of the detector; only allowed while `ready` is True.
 
         Raises:
-            Crowded: The detector found more boxes than there can be objects.
+            Crowded: The detector found more boxes than there can be objects in the cell.
             Unavailable: The detector gave no usable answer.
         """
 
 
 class Detector(Protocol):
-    """Finds objects in frames, in parallel to the tick loop."""
+    """Finds objects in frames, in parallel with the control loop."""
 
     def request(self, frame: Frame, view: str) -> Request:
-        """Begin to search a view of a frame: `table` (the workspace) or `full` (the whole image)."""
+        """Start to search a view of a frame: `table` (the workspace) or `full` (the whole image)."""
 
 
 class Localizer(Protocol):
-    """Finds the positions of detected objects in the world."""
+    """Computes the positions of detected objects in the world."""
 
     def locate(self, detection: Detection, frame: Frame) -> Array:
-        """Return the centre of the detected object `(3,)` [m] in the world, by the camera pose of the frame.
+        """Return the centre `(3,)` [m] of the detected object in the world.
 
         Raises:
-            NoDepth: The frame has no usable depth at the detection.
+            NoDepth: The depth image has no usable values at the detection.
         """
 
     def localize(self, detections: Detections) -> Sequence[Observation]:
@@ -130,46 +130,43 @@ class Localizer(Protocol):
         of its top contradicts its class.
 
         Raises:
-            NoDepth: The frame has no usable depth at a detection.
+            NoDepth: The depth image has no usable values at a detection.
         """
 
 
 class Operator(Protocol):
-    """The person or script that requests objects."""
+    """The person or script that requests classes of objects."""
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the next request: one of `choices` (classes), `rescan`, or None to quit.
+        """Wait for and return a request: one of `choices` (classes), `rescan`, or None to quit.
 
-        The clock of the run stands still until the answer.
+        The clock of the run stops while the operator decides.
 
         Raises:
-            Stopped: The run has to halt.
+            Stopped: The run was halted while it waited.
         """
 
 
 class MinTimes(Protocol):
-    """Lower bounds of the times of actions in a cell [s].
-
-    An action with a shorter timeout always fails.
-    """
+    """Minimum times of actions in a cell; an action with a shorter timeout always fails."""
 
     @property
     def descent_time(self) -> float:
-        """Time of the guarded last part of an approach to an object on the table [s]."""
+        """Minimum time of the guarded descent at the end of an approach to an object on the table [s]."""
 
     def get_transport_time(self, bin: str | None) -> float:
-        """Return the time from the workspace to a bin [s], from rest to rest; None: the nearest bin.
+        """Return the minimum time of a transport from the workspace to a bin [s], from rest to rest.
 
-        0 for a bin that the cell lacks.
+        None: to the nearest bin. 0 for a bin that does not exist.
         """
 
     def get_answer_time(self, detector: str) -> float:
-        """Return the time from a frame to the answer [s]; "": the first detector; 0 for an unknown one."""
+        """Return the minimum time from a frame to the answer [s]; "": first detector; 0 if unknown."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A work cell: everything a skill may use.
+    """A work cell: everything that a skill may use.
 
     Attributes:
         clock: The clock of the run.
@@ -178,14 +175,14 @@ class Cell:
         camera: The camera that sees the table.
         detectors: Detectors by name; the first is the default.
         ledger: The items of the run.
-        operator: The person or script that requests objects.
+        operator: The person or script that requests classes of objects.
         bins: Bins by name.
         classes: Known properties of each class of objects, by label.
-        routes: Class label to the names of the bins that are right for it, by the mission.
-        localizer: Finds the positions of detections.
-        safe_place: Place on the table for a put-down `(3,)` [m].
-        descent: Length of the guarded last part of an approach above the expected surface [m].
-        descent_speed: Tool speed of the guarded part [m/s].
+        routes: Names of the permitted bins by class label, from the mission.
+        localizer: Computes the positions of detections.
+        safe_place: Position on the table for putting down a held object `(3,)` [m].
+        descent: Height above the expected surface at which the guarded descent of an approach starts [m].
+        descent_speed: Tool speed of the guarded descent [m/s].
         report_selection: Reports a target that a skill has selected, and the name of its bin, to the run.
     """
 

@@ -1,7 +1,7 @@
-"""Proxy between a skill and its cell: every attribute read and every call goes through one interceptor.
+"""Proxies of the parts of a cell: every attribute read and every call goes through an interceptor.
 
-Recorder, replay, test kit and fault scripts use the proxy to record, replace, observe or change answers.
-Proxies can be nested: the cell that `intercept` returns can be intercepted again.
+Recorder, replay, test kit and fault scripts use proxies to record, replace, observe or change results.
+The cell that `intercept` returns can be intercepted again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _PROTOCOLS: Mapping[str, type] = {
     "localizer": Localizer,
 }
 _RETURNED_ROLES = {"arm.plan": "plan", "detector.request": "request"}
-"""Role of the object that a call returns, by `Access.name`; this object gets a proxy, too."""
+"""Role of the object that a call returns, by `Access.name`; the object gets a proxy, too."""
 
 IS_METHOD: Mapping[str, Mapping[str, bool]] = {
     role: {name: callable(member) for name, member in vars(protocol).items() if not name.startswith("_")}
@@ -41,10 +41,10 @@ class Access:
     """One read of an attribute, or one call of a method, of a part of a cell.
 
     Attributes:
-        role: Role of the part: `arm`, `tool`, `detector`, ..., `plan` or `request`.
-        detector: Name of the detector that is accessed, or that returned the request; "" for other parts.
+        role: Role of the part, a key of `IS_METHOD`: `arm`, `tool`, `detector`, `request`, ...
+        detector: Name of the accessed detector, or of the detector of the request; "" for other parts.
         member: Name of the attribute or method.
-        proceed: Performs the access on the part itself and returns the result.
+        proceed: Function that performs the access on the part itself and returns the result.
         arguments: Positional arguments of the call.
         keywords: Keyword arguments of the call.
     """
@@ -79,7 +79,7 @@ Interceptor = Callable[[Access], Any]
 def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> Cell:
     """Return a copy of the cell in which each access to the parts in `roles` goes through the interceptor.
 
-    Each access to the `Planning` and `Request` objects that these parts return does so, too.
+    The same applies to the `Planning` and `Request` objects that these parts return.
     """
     parts: dict[str, Any] = {
         role: _Proxy(role, "", getattr(cell, role), interceptor) for role in roles if role != "detector"
@@ -92,9 +92,9 @@ def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> C
 
 
 class _Proxy:
-    """A part of a cell that offers the members of its protocol, each through an interceptor.
+    """Stands for a part of a cell: has the members of its protocol, each through an interceptor.
 
-    The part may be None if the interceptor never proceeds.
+    The part may be None if the interceptor never calls `Access.proceed`.
     """
 
     def __init__(self, role: str, detector: str, part: Any, interceptor: Interceptor) -> None:
@@ -103,7 +103,7 @@ class _Proxy:
 
     def __getattr__(self, member: str) -> Any:
         if member.startswith("_") or member not in IS_METHOD[self._role]:
-            # Names with an underscore are tested first: `copy` looks them up before `_role` is set.
+            # Underscores are tested first, because `copy` reads such names before `_role` is set.
             raise AttributeError(f"{type(self).__name__} has no attribute {member!r}")
         if IS_METHOD[self._role][member]:
             return partial(self._call, member)
@@ -118,7 +118,7 @@ class _Proxy:
             return getattr(self._part, member)(*arguments, **keywords)
 
         access = Access(self._role, self._detector, member, proceed, arguments, keywords)
-        answer = self._intercept(access)
-        if returned := _RETURNED_ROLES.get(access.name):
-            return _Proxy(returned, self._detector, answer, self._intercept)
-        return answer
+        result = self._intercept(access)
+        if returned_role := _RETURNED_ROLES.get(access.name):
+            return _Proxy(returned_role, self._detector, result, self._intercept)
+        return result

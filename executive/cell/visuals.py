@@ -1,6 +1,6 @@
 """Shapes and poses of the bodies in a cell, for displays.
 
-Skills never use these true poses; the robot knows objects only from its cameras.
+Skills do not use these true poses: they know the objects only from camera images.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ Colour = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Shape:
-    """A solid that is fixed to a body.
+    """A solid shape that is rigidly attached to a body.
 
     Attributes:
-        body: Name of the body; "" for a solid that never moves.
+        body: Name of the body; "" for a shape that never moves.
         kind: `box`, `cylinder`, `sphere` or `mesh`.
         size: Size along x, y and z [m]; for a mesh, scale factors along x, y and z.
         X_BS: Pose of the shape in the frame of the body.
-        colour: Colour.
-        file: File of a mesh, whose suffix names the format; "" for other kinds.
+        colour: Colour of the surface.
+        file: File of a mesh, with the suffix of its format; "" for other kinds.
     """
 
     body: str
@@ -37,11 +37,11 @@ class Shape:
 
 
 class Visuals(Protocol):
-    """Everything that displays show of a cell."""
+    """Shapes of a cell and their poses, for displays."""
 
     @property
     def shapes(self) -> Sequence[Shape]:
-        """All solids."""
+        """All shapes of the cell."""
 
     def poses(self) -> Mapping[str, Pose]:
-        """Return the present pose of each body by name; removed bodies are left out."""
+        """Return the current pose `X_WB` of each body by name, without removed bodies."""

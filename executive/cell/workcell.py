@@ -1,4 +1,4 @@
-"""Protocols of a work cell: the cell that skills use, the world around it, and the kinds of cells."""
+"""Protocols for the run: a work cell with its world, its ledger, and the kinds of work cells."""
 
 from __future__ import annotations
 
@@ -12,90 +12,90 @@ from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
 
 PLACES = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
-"""Keys of the counts of an audit; the last two count objects that are also among the first four."""
+"""Keys of the counts of an audit; the last two counts are subsets of the first four."""
 
 
 class Accounts(Protocol):
-    """The part of a ledger that a run uses at its end and when it is resumed."""
+    """The methods of a ledger that a run uses at its end and at a resumption."""
 
     def close(self, *, completed: bool) -> None:
-        """Decide the final state of each item; `completed` is True if the tree succeeded."""
+        """Set the final state of each item; `completed` is True if the tree succeeded."""
 
     def reopen(self) -> None:
-        """Forget the items that were left on the table; the next look adds those that still lie there."""
+        """Remove the items that were left on the table; the next look adds visible objects again."""
 
     def count_states(self) -> dict[str, int]:
-        """Return the counts `seen, placed, rejected, skipped, lost, phantom`.
+        """Return the number of items by state: `placed`, `rejected`, `skipped`, `lost`, `phantom`.
 
-        `seen` is the sum of the next four.
+        The key `seen` has the sum of the first four.
         """
 
     @property
     def unknown(self) -> Mapping[str, int]:
-        """Largest number of boxes in one look for each label that the cell does not know."""
+        """Maximum number of boxes in one look, by label, for labels that the cell file does not declare."""
 
     @property
     def doubts(self) -> Sequence[str]:
-        """Reasons why error rates of detectors were assumed and not measured."""
+        """Reasons why error rates of detectors were assumed instead of measured."""
 
     def summaries(self) -> Sequence[ItemChanged]:
-        """Return the present state of each item, in the order of the first detection."""
+        """Return the current state of each item, in the order of the first detection."""
 
 
 class Workcell(Protocol):
-    """A cell together with its world, as a run drives it."""
+    """A cell with its world, as a run uses it."""
 
     @property
     def cell(self) -> Cell:
-        """The cell that skills see."""
+        """The cell that skills use."""
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger; at its end, the run closes the ledger and reads its counts and items."""
+        """The ledger, which the run closes and reads at its end."""
 
     @property
     def steps(self) -> int:
-        """Number of control steps since the run began, those before a resumption included."""
+        """Number of control steps since the start of the run, including those before a resumption."""
 
     @property
     def last_command(self) -> int:
         """Control step of the last start of a motion, or of the last opening or closing of the tool.
 
-        0 if there was none, or if the cell of an interrupted run cannot know it.
+        0 if there was none, or if it is unknown after an interruption of the run.
         """
 
     def log_to(self, path: Path) -> None:
-        """Start a log file from which the simulated world can be rebuilt at any control step.
+        """Start a log file from which the simulated world can be reconstructed at any control step.
 
-        The run calls this before the first control step; a hardware cell keeps no log.
+        The run calls this method before the first control step; a hardware cell writes no log.
 
         Raises:
             InputError: The file cannot be written.
         """
 
     def advance(self) -> None:
-        """Let one control step pass."""
+        """Execute one control step."""
 
     def visuals(self) -> Visuals | None:
-        """Return the scene for viewers, or None if the cell has none."""
+        """Return shapes and poses for displays, or None if the cell has none."""
 
     def audit(self) -> Mapping[str, int] | None:
         """Return the true final counts of the objects, or None if they are unknown, as on hardware."""
 
     def close(self) -> None:
-        """Release all resources; the cell cannot be used afterwards."""
+        """Release all resources; the cell is unusable afterwards."""
 
 
 @dataclass(frozen=True)
 class ResumePoint:
-    """State of a cell in which an interrupted run left it.
+    """State of a cell at the interruption of a run.
 
-    A simulated world is rebuilt from its log, with the arm braking; the log is continued.
+    A simulated world is reconstructed from its log, including the braking arm, and continues the log.
 
     Attributes:
-        log: File that `log_to` started.
-        frames: Number of images taken.
-        turns: Number of calls of the camera's `next_pose`.
+        log: The log file that `log_to` started.
+        frames: Number of captured frames.
+        turns: Number of calls of `Camera.next_pose`.
     """
 
     log: Path
@@ -108,12 +108,12 @@ class CellOptions:
     """Options of a run for its cell.
 
     Attributes:
-        operator: The operator beside the cell.
+        operator: The person or script that requests classes of objects.
         base: Folder to which paths in the cell file are relative.
         gui: True to show the simulated world in a window.
-        resume: State in which the interrupted run left the cell; None for a new run.
-        scene: File that changes the world of a simulated cell, and that only this cell reads; None: the world
-            is as the cell file declares.
+        resume: State of the cell at the interruption of a resumed run; None for a new run.
+        scene: Scene file that changes the world of a simulated cell; None: the world is as the cell file
+            declares.
     """
 
     operator: Operator
@@ -124,7 +124,7 @@ class CellOptions:
 
 
 KeyPath = tuple[str | int, ...]
-"""Keys that lead to a value in a cell file, outermost first."""
+"""Keys on the path from the top level of a cell file to a value, outermost first."""
 
 
 class CellKind(Protocol):
@@ -136,17 +136,17 @@ class CellKind(Protocol):
         """Return a cell for a cell file (`executive.cell.config.CellConfig`)."""
 
     def check(self, config: Any, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return the mistakes in a cell file of the right form, each as its key and a sentence.
+        """Return the errors of a cell file that passes validation, each with its key and a message.
 
         `base` is the folder to which paths in the file are relative.
         """
 
     def labels(self, config: Any, base: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return the classes that each detector of a cell file knows, with the labels of the cell.
+        """Return, by detector of a cell file, the labels in the cell of the classes that it can find.
 
-        None for a detector whose classes are unknown before its first answer. Never raises: `check` reports
-        errors.
+        None for a detector whose classes are unknown before its first answer. Never raises an error: `check`
+        reports errors.
         """
 
     def min_times(self, config: Any) -> MinTimes:
-        """Return the minimum times of actions in a cell for which `check` returns no finding."""
+        """Return the minimum times of actions in a cell whose file has no errors by `check`."""

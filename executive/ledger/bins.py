@@ -42,7 +42,7 @@ class Bins:
     bins: Mapping[str, Bin]
     routes: Routes
 
-    def count_in(self, bin: str, records: Iterable[Record]) -> int:
+    def count_objects_in(self, bin: str, records: Iterable[Record]) -> int:
         """Return the number of items that were released in a bin or have probably fallen into the bin."""
         return sum(bin in (record.bin, find_probable_bin(record)) for record in records)
 
@@ -54,7 +54,7 @@ class Bins:
         """
         error = MAX_STANDARD_DEVIATIONS * math.hypot(observation.std, bias_std)
         for name, bin in self.bins.items():
-            if bin.contains(observation.position, error if self.count_in(name, records) else 0.0):
+            if bin.contains(observation.position, error if self.count_objects_in(name, records) else 0.0):
                 return name
         return None
 

@@ -74,7 +74,7 @@ class Recovery:
         """
         for bin, looks in self._label_counts_by_bin.items():
             counts = {label: median_low(look[label] for look in looks) for label in set().union(*looks)}
-            unknown_count = sum(counts.values()) - self._bins.count_in(bin, self._records)
+            unknown_count = sum(counts.values()) - self._bins.count_objects_in(bin, self._records)
             permitted = {label for label in counts if bin in self._bins.routes.get(label, ())}
             for label in [*sorted(permitted), *sorted(counts.keys() - permitted)]:
                 known_count = sum(item.bin == bin and item.label == label for item in self._records)

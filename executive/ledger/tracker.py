@@ -142,7 +142,7 @@ class Tracker:
         record = self._records.find(item)
         return record.state in (State.SEEN, State.DROPPED) and not record.reason
 
-    def is_sure(self, item: Item) -> bool:
+    def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough."""
         return self._certainty.is_certain(self._records.find(item))
 
@@ -167,9 +167,9 @@ class Tracker:
         """Return the number of failed attempts to pick an item."""
         return self._records.find(item).attempt_count
 
-    def count_in(self, bin: str) -> int:
+    def count_objects_in(self, bin: str) -> int:
         """Return the number of objects in a bin."""
-        return self._bins.count_in(bin, self.records)
+        return self._bins.count_objects_in(bin, self.records)
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
         """Record a touch, which proves that an item exists; return False if the touch contradicts its class.

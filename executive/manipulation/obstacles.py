@@ -37,7 +37,7 @@ def count_used_slots(cell: Cell, bin: str, excluded: Item | None = None) -> int:
     """
     held = cell.ledger.find_held_item()
     is_arriving = held not in (None, excluded) and cell.bins[bin].contains(cell.arm.destination)
-    return cell.ledger.count_in(bin) + is_arriving
+    return cell.ledger.count_objects_in(bin) + is_arriving
 
 
 def make_obstacle(cell: Cell, target: Target) -> Obstacle:

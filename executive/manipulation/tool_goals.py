@@ -121,7 +121,7 @@ def nearest_first(cell: Cell, targets: Sequence[Target]) -> list[Target]:
         for target in targets
         if ledger.is_open(target.item)
         and ledger.is_fresh(target)
-        and ledger.is_sure(target.item)
+        and ledger.is_certain(target.item)
         and ledger.get_label(target.item) in cell.routes
     ]
     return sorted(possible, key=lambda t: (float(np.linalg.norm(t.position[:2] - here)), t.item))

@@ -12,7 +12,7 @@ import yaml
 from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
 from executive.cell.frame import Box
-from executive.cell.paths import leaves_folder, links_out
+from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import MAX_QUOTED, InputError
 
 COCO_FILE_NAME = "_annotations.coco.json"
@@ -203,11 +203,11 @@ def _find_image(folder: Path, name: str, place: str) -> Path:
         InputError: The image is missing, is not a regular file, or lies outside of the folder.
     """
     path = folder / name
-    if not name or leaves_folder(name):
+    if not name or is_outside_path(name):
         raise InputError(f'{place}: "{name}" is not below {folder}')
     if not os.path.isfile(path):
         raise InputError(f'{place}: "{name}" is not a file in {folder}')
-    if links_out(folder, name):
+    if has_outside_link(folder, name):
         raise InputError(f'{place}: "{name}" is a link to a file outside of {folder}')
     return path
 

@@ -56,11 +56,11 @@ def test_what_must_have_fallen_into_a_bin_takes_a_place_there_until_a_look_shows
 ) -> None:
     bench.look(CUBE)
     bench.drop("cube-1", OVER)
-    assert bench.ledger.count_in("red_bin") == 1
+    assert bench.ledger.count_objects_in("red_bin") == 1
     bench.look(view="full")
-    assert (bench.ledger.count_in("red_bin"), bench.states()["cube-1"][0]) == (0, "dropped")
+    assert (bench.ledger.count_objects_in("red_bin"), bench.states()["cube-1"][0]) == (0, "dropped")
     bench.look(IN_RED, view="full")
-    assert bench.ledger.count_in("red_bin") == 1
+    assert bench.ledger.count_objects_in("red_bin") == 1
     (row,) = bench.ledger.summaries()
     assert (row.state, row.bin, row.why) == ("placed", "red_bin", "")
 

@@ -15,7 +15,7 @@ PHANTOM = ("phantom", "more looks missed it than saw it")
 
 def test_an_object_with_uncertain_detections_only_is_an_item_in_doubt(bench: Bench) -> None:
     assert [target.item for target in bench.look(unsure=[THERE])] == ["cube-1"]
-    assert (bench.ledger.summaries()[0].looks, bench.ledger.is_sure("cube-1")) == (0, False)
+    assert (bench.ledger.summaries()[0].looks, bench.ledger.is_certain("cube-1")) == (0, False)
     assert bench.ledger.find_uncertain_items() == ["cube-1"]
     look = next(event for event in bench.events if isinstance(event, FrameSearched))
     assert (look.found, [one.label for one in look.unsure]) == ([], ["cube"])
@@ -76,7 +76,7 @@ def test_a_sure_look_makes_an_item_of_an_uncertain_detection_as_good_as_any(benc
     mine, others = bench.ledger.records[0], other.ledger.records[0]
     assert (mine.item, mine.label, mine.belief.class_error) == ("duck-1", "cube", others.belief.class_error)
     assert mine.belief.log_odds == pytest.approx(others.belief.log_odds, abs=2.0)
-    assert bench.ledger.is_sure("duck-1")
+    assert bench.ledger.is_certain("duck-1")
 
 
 def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) -> None:
@@ -109,7 +109,7 @@ def test_a_known_item_that_waits_its_turn_is_not_rejected_for_uncertain_looks(be
         bench.look(THERE, ("cube", 0.55, 0.0))
     for _ in range(MAX_UNCERTAIN_LOOKS + 5):
         bench.look(("cube", 0.55, 0.0), unsure=[THERE])
-    assert bench.ledger.is_sure("cube-1")
+    assert bench.ledger.is_certain("cube-1")
     bench.ledger.record_grasp("cube-2")  # its neighbour
     bench.look(unsure=[THERE])
     assert bench.states()["cube-1"] == ("seen", "")

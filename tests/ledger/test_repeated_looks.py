@@ -46,7 +46,7 @@ def test_an_item_whose_class_a_touch_can_prove_is_sure_enough_to_be_touched_afte
     sure = []
     for _ in range(3):
         bench.look(CUBE, by=DOUBTFUL)
-        sure.append(bench.ledger.is_sure("cube-1"))
+        sure.append(bench.ledger.is_certain("cube-1"))
     assert sure == [False, False, True]
 
 

@@ -243,7 +243,7 @@ def test_the_tool_holds_one_item_at_a_time(bench: Bench) -> None:
 def test_an_item_whose_class_looks_keep_contradicting_is_given_up_in_the_end(bench: Bench) -> None:
     for look in range(60):
         bench.look(("cube" if look % 2 else "duck", 0.50, 0.0))
-        assert look <= 2 or not bench.ledger.is_sure("duck-1")
+        assert look <= 2 or not bench.ledger.is_certain("duck-1")
     assert bench.states() == {"duck-1": ("rejected", "looks disagree about its class: 20 duck, 20 cube")}
 
 
@@ -252,7 +252,7 @@ def test_one_slip_about_the_class_costs_some_looks_and_no_more(bench: Bench) -> 
     sure = []
     for _ in range(6):
         bench.look(CUBE)
-        sure.append(bench.ledger.is_sure("duck-1"))
+        sure.append(bench.ledger.is_certain("duck-1"))
     assert bench.ledger.get_label("duck-1") == "cube"
     assert sure == [False, True, True, True, True, True]
 

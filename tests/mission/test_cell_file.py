@@ -47,13 +47,13 @@ def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
         ("0.06]}", "0.06], slots: [0, 3]}", "error[out-of-range]: bins.red_bin.slots[0] must be at least 1, not 0\n"),
         ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 748, 656]", "needs a table_view that is a square inside its image of 640 x 480 pixels, not [192, 100, 748, 656]\n"),
         ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 448, 350]", "needs a table_view that is a square inside its image"),
-        ("up: [1, 0, 0]", "up: [0, 0, 1]", "cameras.top needs a look_at other than its position, and an up that is not on its axis\n"),
+        ("up: [1, 0, 0]", "up: [0, 0, 1]", "cameras.top needs a look_at that differs from position, and an up that is not along its axis\n"),
         ("fov_deg: 55", "width: 640", "cameras.top needs fov_deg, or a calibration instead of position, look_at, up, fov_deg\n"),
-        ("fov_deg: 55", "calibration: {matrix: [[400, 0, 320], [0, 400, 240], [0, 0, 1]], mount_to_camera: {rotation: [0, 0, 0], translation: [0, 0, 1]}}", "cameras.top needs no position, look_at, up where it has a calibration, which says it all\n"),
-        ("fov_deg: 55", "calibration: {matrix: [[400, 0, 320], [0, 400, 240], [0, 0, 1]]}", "cameras.top.calibration needs either mount_to_camera or camera_to_mount, the one being the other's inverse\n"),
+        ("fov_deg: 55", "calibration: {matrix: [[400, 0, 320], [0, 400, 240], [0, 0, 1]], mount_to_camera: {rotation: [0, 0, 0], translation: [0, 0, 1]}}", "cameras.top must not have position, look_at, up besides calibration, which defines them\n"),
+        ("fov_deg: 55", "calibration: {matrix: [[400, 0, 320], [0, 400, 240], [0, 0, 1]]}", "cameras.top.calibration needs exactly one of mount_to_camera and camera_to_mount, its inverse\n"),
         ("fov_deg: 55", "fov_deg: 55\n    depth: {edge_dropout: 2}", "cameras.top.depth.edge_dropout must be at most 1, not 2\n"),
         ("y: [-0.2, 0.2]", "y: [-0.2, 0.2], stacked: 30", "table.stacked must be at most 1, not 30\n"),
-        ("kind: embedded", "kind: embedded, floor: 0.7", "needs a floor up to its threshold, 0.5, not 0.7\n"),
+        ("kind: embedded", "kind: embedded, floor: 0.7", "needs a floor of at most its threshold, 0.5, not 0.7\n"),
         ("safe_place:", "safeplace:", 'error[missing-key]: the file needs the key "safe_place"\n'),
     ],
 )  # fmt: skip
@@ -105,7 +105,7 @@ def test_the_name_of_a_class_becomes_part_of_file_names(small_cell: str) -> None
         complaint(text.replace("  cube:", "  a/b:", 1))
         .splitlines()[0]
         .endswith(
-            'error[bad-name]: objects.a/b must be named by at most 64 letters, digits, blanks, "_" and "-"'
+            'error[bad-name]: objects.a/b must be a name of at most 64 letters, digits, blanks, "_" and "-"'
         )
     )
 
@@ -173,7 +173,7 @@ def test_the_choice_of_a_base_holds_until_a_cell_makes_its_own(small_cell: str) 
     ("base", "text", "expected"),
     [
         ("{kind: fake}", "{first: {floor: 2}}", "c.yaml:2:28: error[out-of-range]: detectors.first.floor must be less than 1, not 2\n"),
-        ("{kind: fake, threshold: 0.6}", "{first: {floor: 0.7}}", "c.yaml:2:13: error[wrong-value]: detectors.first needs a floor up to its threshold, 0.6, not 0.7\n"),
+        ("{kind: fake, threshold: 0.6}", "{first: {floor: 0.7}}", "c.yaml:2:13: error[wrong-value]: detectors.first needs a floor of at most its threshold, 0.6, not 0.7\n"),
         ("{kind: fake, latency: -1}", "{first: {floor: 0.2}}", "base.yaml:26:42: error[out-of-range]: detectors.first.latency must be at least 0, not -1\n"),
         ("{kind: fake, latency: -1}", "{first: {kind: rfdetr}, other: {floor: 0.2}}", 'c.yaml:2:36: error[missing-key]: detectors.other needs the key "kind"\n'),
         ("{kind: fake}", "{other: }", "c.yaml:2:19: error[wrong-type]: detectors.other must be a mapping, not nothing\n"),

@@ -129,7 +129,7 @@ def test_a_hand_eye_calibration_is_the_way_back():
 
 
 TURN = {"rotation": [0, 0, 0], "translation": [0, 0, 1]}
-EITHER = "needs either mount_to_camera or camera_to_mount"
+EITHER = "needs exactly one of mount_to_camera and camera_to_mount"
 BOTH = {**PLAIN, "calibration": {"matrix": GIVEN, "mount_to_camera": TURN}}
 HALF = {key: value for key, value in PLAIN.items() if key not in ("up", "fov_deg")}
 
@@ -145,7 +145,7 @@ HALF = {key: value for key, value in PLAIN.items() if key not in ("up", "fov_deg
             r"needs a matrix \[\[fx, 0, cx\], \[0, fy, cy\], \[0, 0, 1\]\] with fx and fy above 0, "
             r"not \[\[400.0, 2.0, 320.0\]",
         ),
-        (CameraConfig, BOTH, "needs no position, look_at, up, fov_deg where it has"),
+        (CameraConfig, BOTH, "must not have position, look_at, up, fov_deg besides"),
         (CameraConfig, HALF, "needs up, fov_deg, or a calibration instead of position, look_at, up, fov_deg"),
     ],
 )

@@ -66,7 +66,7 @@ def test_an_object_too_high_for_its_class_in_the_depth_image_contradicts_it(fake
 def test_a_cube_on_a_duck_in_the_depth_image_is_a_cube(fake: FakeCell) -> None:
     fake.world.put("cube", 0.5, 0.0)
     look_in_depth(fake, 0.106, times=3)
-    assert fake.ledger.is_sure("cube-1")
+    assert fake.ledger.is_certain("cube-1")
 
 
 def test_an_object_in_a_bin_may_lie_at_any_height(fake: FakeCell, monkeypatch: pytest.MonkeyPatch) -> None:

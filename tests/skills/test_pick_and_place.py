@@ -113,7 +113,7 @@ def test_what_fell_before_it_was_let_go_is_not_placed(fake: FakeCell, held: str)
     fake.ledger.record_drop(held)
     result = run_skill(Release(held=held, bin="red_bin"), fake)
     assert (result.reason, result.message) == ("dropped", f"{held} is not in the tool any more")
-    assert fake.ledger.count_in("red_bin") == 0
+    assert fake.ledger.count_objects_in("red_bin") == 0
 
 
 def test_grasp_holds_and_the_ledger_knows(fake: FakeCell, held: str) -> None:
@@ -143,7 +143,7 @@ def test_items_hang_over_one_slot_after_the_other_and_are_placed(
     assert run_skill(Transit(held=held, bin="red_bin"), fake).status == "SUCCESS"
     assert fake.arm.tool_pose.position == pytest.approx([*slots[0], 0.065])
     assert run_skill(Release(held=held, bin="red_bin"), fake).outputs == {"placed": "cube-1"}
-    assert (fake.ledger.count_states()["placed"], fake.ledger.count_in("red_bin")) == (1, 1)
+    assert (fake.ledger.count_states()["placed"], fake.ledger.count_objects_in("red_bin")) == (1, 1)
     fake.world.put("cube", 0.5, 0.1)
     carry(fake, at_hand.pick(fake, look()[0]))
     assert np.allclose(fake.arm.tool_pose.position[:2], slots[1])
@@ -195,11 +195,11 @@ def test_move_to_scan_goes_to_the_cameras_first_pose_only_if_the_table_is_out_of
 def test_taken_away_while_it_lets_go_it_has_placed_what_fell(fake: FakeCell, held: str) -> None:
     result = run_skill(Release(held=held, bin="red_bin"), fake, halt_at=3)
     assert (result.status, fake.tool.holding) == ("HALTED", False)
-    assert (fake.ledger.find_held_item(), fake.ledger.count_in("red_bin")) == (None, 1)
+    assert (fake.ledger.find_held_item(), fake.ledger.count_objects_in("red_bin")) == (None, 1)
     # Started again it has nothing more to do.
     again = run_skill(Release(held=held, bin="red_bin"), fake)
     assert (again.status, again.outputs, again.ticks) == ("SUCCESS", {"placed": held}, 0)
-    assert fake.ledger.count_in("red_bin") == 1
+    assert fake.ledger.count_objects_in("red_bin") == 1
 
 
 def test_taken_away_while_it_puts_down_it_has_returned_what_lies_there(fake: FakeCell, held: str) -> None:

@@ -130,7 +130,7 @@ class _TrialRun:
 
     def _kind(self, *args: Any, **options: Any) -> Workcell:
         kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
-        return CellWrapper(kind(*args, **options), after=self._stop_if_due)
+        return CellWrapper(kind(*args, **options), after_step=self._stop_if_due)
 
     def _note(self, timed: TimedEvent) -> None:
         if not isinstance(timed.event, InputRead):

@@ -11,36 +11,36 @@ from executive.cell.config.section import MIN_LENGTH, Angle, Distance, Force, Le
 MIN_JOINT_RANGE = 2.0
 """Minimum range of a joint position [degree]; a joint with a smaller range is fixed."""
 Speed = Annotated[float, Field(ge=1, le=1000)]
-"""[degree/s]; the fastest arms turn a joint by 1000 degrees per second."""
+"""Joint velocity [degree/s]; the fastest arms reach 1000 degree/s."""
 Acceleration = Annotated[float, Field(ge=0.1, le=1000)]
-"""[rad/s²]; below 0.1 a motion takes minutes, and 1000 is ten times the acceleration of the fastest arms."""
+"""Joint acceleration [rad/s²]; below 0.1, a motion takes minutes, and the fastest arms reach about 100."""
 Jerk = Annotated[float, Field(ge=1, le=1e5)]
-"""[rad/s³]; the lower bound reaches 0.1 rad/s² in 0.1 s, the upper bound 1000 rad/s² in 0.01 s."""
+"""Joint jerk [rad/s³]; the bounds reach 0.1 rad/s² in 0.1 s and 1000 rad/s² in 0.01 s."""
 
 
 class LimitsConfig(Section):
     """Joint limits of the arm, one value for each joint, and their source."""
 
     source: str
-    """Source of the limits."""
+    """Source of the limits, for instance a data sheet."""
     min_position_deg: tuple[Angle, ...] = ()
-    """Smallest joint angles [degree]; if empty, the negative of `position_deg`."""
+    """Minimum joint positions [degree]; if empty, the negatives of `position_deg`."""
     position_deg: tuple[Angle, ...] = Field(min_length=1)
-    """Largest joint angles [degree]."""
+    """Maximum joint positions [degree]."""
     velocity_deg: tuple[Speed, ...]
-    """Largest velocity [degree/s]."""
+    """Maximum joint velocities [degree/s]."""
     acceleration: tuple[Acceleration, ...]
-    """Largest acceleration [rad/s²]."""
+    """Maximum joint accelerations [rad/s²]."""
     jerk: tuple[Jerk, ...]
-    """Largest jerk [rad/s³]."""
+    """Maximum joint jerks [rad/s³]."""
     stop_acceleration: tuple[Acceleration, ...]
-    """Largest acceleration while braking [rad/s²]."""
+    """Maximum joint accelerations while the arm brakes [rad/s²]."""
     stop_jerk: tuple[Jerk, ...]
-    """Largest jerk while braking [rad/s³]."""
+    """Maximum joint jerks while the arm brakes [rad/s³]."""
 
     @property
     def position_ranges_deg(self) -> tuple[tuple[float, float], ...]:
-        """Smallest and largest angle of each joint [degree]."""
+        """Minimum and maximum position of each joint [degree]."""
         lower = self.min_position_deg or tuple(-upper for upper in self.position_deg)
         return tuple(zip(lower, self.position_deg, strict=True))
 
@@ -72,7 +72,7 @@ class ArmConfig(Section):
     limits: LimitsConfig
     """Joint limits of the arm."""
     poses_deg: dict[Name, tuple[Angle, ...]] = Field(min_length=1)
-    """Named joint poses, one angle for each joint [degree]; a run begins in `home`."""
+    """Named joint configurations, one position for each joint [degree]; a run starts in `home`."""
 
     @property
     def joint_count(self) -> int:
@@ -100,15 +100,15 @@ class ToolConfig(Section):
     cup_radius: Length
     """Radius of the lip [m]."""
     reach: Length = 0.002
-    """Largest distance from a surface at which the lip still seals [m]."""
+    """Maximum distance from a surface at which the lip still seals [m]."""
     force: Force
     """Breakaway force of a perfect seal [N]."""
     gap: Length
-    """Rim gap at which the breakaway force has fallen to zero [m]."""
+    """Gap between lip and surface at which the breakaway force is zero [m]."""
     tilt_deg: float = Field(ge=1, lt=90)
-    """Angle between surface normal and tool axis at which the breakaway force has fallen to zero [degree]."""
+    """Angle between surface normal and tool axis at which the breakaway force is zero [degree]."""
     min_force: Force
-    """Breakaway force under which the vacuum sensor reports no seal [N]."""
+    """Minimum breakaway force at which the vacuum sensor reports a seal [N]."""
     source: str
     """Source of the constants."""
 
@@ -117,18 +117,17 @@ class MotionConfig(Section):
     """Parameters of motion planning."""
 
     margin: Distance = 0.005
-    """Smallest distance of arm, tool and load from all obstacles during a motion [m]."""
+    """Minimum distance of arm, tool and load from all obstacles during a motion [m]."""
     clearance: Length = 0.04
-    """Clearance above the highest wall and pile in the fallback motion, which stops at every corner and is
-    used if no direct motion or detour is collision-free [m]."""
+    """Clearance over the highest wall and pile in the fallback motion [m]. This motion stops at every corner;
+    it is used if no other motion is collision-free."""
     descent: float = Field(0.005, ge=MIN_LENGTH, le=0.1)
-    """Length of the guarded last part of an approach above the expected surface [m]."""
+    """Height above the expected surface at which the slow, guarded descent of an approach starts [m]."""
     descent_speed: float = Field(0.035, ge=0.001, le=0.25)
-    """Tool speed of the guarded last part of an approach [m/s]; at most the reduced speed of ISO 10218."""
+    """Tool speed of the guarded descent [m/s]; at most the reduced speed of ISO 10218."""
     straight: float = Field(0.0, ge=0, le=0.2)
-    """Length of the straight vertical segment at the end of a motion into a bin and at the start of a motion
-    upwards [m]."""
+    """Length of the straight vertical segment at the end of a motion into a bin, and at the start of a motion
+    that begins upwards [m]."""
     planning_time: float = Field(0.1, ge=0.1, le=60)
-    """Time for planning a motion on the clock of the run, unless the motion was planned ahead [s]. The lower
-    bound is the 99th percentile of the planning time measured on two cores, 94 ms, rounded up
-    (`tests/benchmarks/README.md`)."""
+    """Planning time of a motion that was not planned ahead, on the clock of the run [s]. The lower bound is
+    the measured 99th percentile of the planning time, 94 ms, rounded up (`tests/benchmarks/README.md`)."""

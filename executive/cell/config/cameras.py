@@ -1,4 +1,4 @@
-"""Cameras and their sensors."""
+"""Sections of a cell file: cameras with calibration, noise and depth sensor."""
 
 from __future__ import annotations
 
@@ -7,25 +7,34 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from executive.cell.config.section import Distance, GreyLevels, Length, Name, Natural, Section, Share, Vector
+from executive.cell.config.section import (
+    Distance,
+    Fraction,
+    GreyLevels,
+    Length,
+    Name,
+    Natural,
+    Section,
+    Vector,
+)
 
 Pixels = Annotated[float, Field(ge=-1e5, le=1e5)]
-"""An entry of a camera matrix [pixel]; with 100,000 pixels, a frame 640 pixels wide spans 0.4 degrees."""
+"""An entry of a camera matrix [pixel]; with a focal length of 100,000, 640 pixels span 0.4 degrees."""
 Row = tuple[Pixels, Pixels, Pixels]
-Turn = Annotated[float, Field(ge=-7, le=7)]
-"""A component of a rotation vector [rad], at most a whole turn."""
+RotationComponent = Annotated[float, Field(ge=-7, le=7)]
+"""A component of a rotation vector [rad]; 7 rad are more than one revolution."""
 
 POSE_AND_FOV_KEYS = ("position", "look_at", "up", "fov_deg")
-"""Keys for pose and field of view of a camera without a calibration."""
+"""Keys that a camera without a calibration needs for its pose and field of view."""
 
 
 class NoiseConfig(Section):
-    """Sensor noise of a camera, sampled for each frame with the seed of the run."""
+    """Image noise of a camera, sampled for each frame with the seed of the run."""
 
-    gain: Share = 0.02
-    """Standard deviation of a frame's brightness factor."""
+    gain: Fraction = 0.02
+    """Standard deviation of the brightness factor of a frame, whose mean is 1."""
     read: GreyLevels = 2.0
-    """Standard deviation of a pixel's value [grey level of 255]."""
+    """Standard deviation of the noise added to each pixel [grey level, 0 to 255]."""
 
 
 class DepthConfig(Section):
@@ -33,32 +42,32 @@ class DepthConfig(Section):
 
     The defaults model a RealSense D435 at 848 x 480 (focal length 425 pixels, baseline 50 mm). By Intel's
     "Tuning depth cameras for best performance" the RMS error of a stereo camera is
-    z² · subpixel / (focal length · baseline), here with a subpixel error of 0.08. The shares of pixels
-    without a measurement and the correlation of neighbouring pixels are assumed.
+    z² · subpixel / (focal length · baseline), here with a subpixel error of 0.08. The dropout fractions and
+    the correlation of neighbouring pixels are assumed.
     """
 
     floor: Distance = 0.0005
-    """Standard deviation at distance 0 [m]."""
-    growth: Share = 0.0038
-    """Coefficient of the square of the distance z [1/m]; the standard deviation is floor + growth · z²."""
+    """Standard deviation of the noise at distance 0 [m]."""
+    growth: Fraction = 0.0038
+    """Quadratic coefficient [1/m]: the standard deviation of the noise is floor + growth · distance²."""
     grain: float = Field(1.0, ge=0, le=100)
-    """Standard deviation of the window that correlates the noise of neighbours [pixel]; 0: no correlation."""
+    """Standard deviation of the Gaussian kernel that smooths the noise [pixel]; 0: independent pixels."""
     step: Distance = 0.001
     """Resolution of the distances [m]; 0: not rounded."""
     edge: Length = 0.02
-    """Difference between neighbouring distances that is an edge [m]."""
+    """Minimum difference between the distances of neighbouring pixels that counts as an edge [m]."""
     edge_width: Natural = 2
-    """Distance from an edge up to which pixels may lack a measurement [pixel]."""
-    edge_dropout: Share = 0.7
-    """Share of the pixels near an edge without a measurement."""
-    dropout: Share = 0.01
-    """Share of all pixels without a measurement."""
+    """Maximum distance from an edge at which `edge_dropout` applies [pixel]."""
+    edge_dropout: Fraction = 0.7
+    """Fraction of the pixels near an edge that have no measurement."""
+    dropout: Fraction = 0.01
+    """Fraction of all pixels that have no measurement."""
 
 
 class TransformConfig(Section):
     """A coordinate transformation in OpenCV's form: p' = R p + t."""
 
-    rotation: tuple[Turn, Turn, Turn]
+    rotation: tuple[RotationComponent, RotationComponent, RotationComponent]
     """Rotation vector, the axis times the angle [rad]: OpenCV's rvec, from R by `cv2.Rodrigues`."""
     translation: Vector
     """OpenCV's tvec t: x, y, z [m]."""
@@ -70,9 +79,10 @@ class CalibrationConfig(Section):
     matrix: tuple[Row, Row, Row]
     """[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] [pixel]; as in OpenCV, pixel centres have integer coordinates."""
     mount_to_camera: TransformConfig | None = None
-    """From the world (fixed camera) or the flange (wrist camera) to the camera, as by `cv2.solvePnP`."""
+    """Transformation of points from the mount, which is the world (fixed camera) or the flange (wrist
+    camera), to the camera, as from `cv2.solvePnP`."""
     camera_to_mount: TransformConfig | None = None
-    """Inverse of `mount_to_camera`, as by `cv2.calibrateHandEye`; exactly one of the two is required."""
+    """Inverse of `mount_to_camera`, as from `cv2.calibrateHandEye`; exactly one of the two is required."""
 
     @model_validator(mode="after")
     def _check_matrix_and_pose(self) -> CalibrationConfig:
@@ -83,16 +93,14 @@ class CalibrationConfig(Section):
                 f"not {[list(row) for row in self.matrix]}"
             )
         if (self.mount_to_camera is None) == (self.camera_to_mount is None):
-            raise ValueError(
-                "needs either mount_to_camera or camera_to_mount, the one being the other's inverse"
-            )
+            raise ValueError("needs exactly one of mount_to_camera and camera_to_mount, its inverse")
         return self
 
 
 class CameraConfig(Section):
     """A camera, fixed in the world or mounted on the wrist.
 
-    Pose and field of view are `position`, `look_at`, `up` and `fov_deg`, or follow from `calibration`.
+    Pose and field of view are defined by `position`, `look_at`, `up` and `fov_deg`, or by `calibration`.
     """
 
     mount: Literal["fixed", "wrist"]
@@ -112,16 +120,16 @@ class CameraConfig(Section):
     calibration: CalibrationConfig | None = None
     """Camera matrix and pose, instead of `position`, `look_at`, `up` and `fov_deg`."""
     table_view: tuple[int, int, int, int]
-    """Left, top, right, bottom side [pixel] of the square part of the image that shows the workspace."""
+    """Left, top, right and bottom side [pixel] of the square region of the image that shows the workspace."""
     scan_poses: tuple[Name, ...] = Field(min_length=1)
     """Arm poses from which the camera sees the table, best first."""
     noise: NoiseConfig = NoiseConfig()
-    """Sensor noise."""
+    """Image noise."""
     depth: DepthConfig | None = None
-    """Depth sensor; none by default. `depth: {}` is a depth sensor with the default noise."""
+    """Depth sensor; by default there is none. `depth: {}` is a depth sensor with the default noise."""
 
     def get_view_box(self, view: str) -> tuple[int, int, int, int]:
-        """Return the part of the image [pixel] of a `view` (`table` or `full`)."""
+        """Return the region of the image [pixel] of a `view` (`table` or `full`)."""
         return self.table_view if view == "table" else (0, 0, self.width, self.height)
 
     @model_validator(mode="after")
@@ -135,12 +143,14 @@ class CameraConfig(Section):
             )
         given = [key for key in POSE_AND_FOV_KEYS if getattr(self, key) is not None]
         if self.calibration is not None and given:
-            raise ValueError(f"needs no {', '.join(given)} where it has a calibration, which says it all")
+            raise ValueError(f"must not have {', '.join(given)} besides calibration, which defines them")
         if self.calibration is None and len(given) < len(POSE_AND_FOV_KEYS):
             lacking = ", ".join(key for key in POSE_AND_FOV_KEYS if key not in given)
             raise ValueError(f"needs {lacking}, or a calibration instead of {', '.join(POSE_AND_FOV_KEYS)}")
         if self.position is not None and self.look_at is not None and self.up is not None:
             axis = np.subtract(self.look_at, self.position)
             if np.linalg.norm(np.cross(axis, self.up)) < 1e-9:
-                raise ValueError("needs a look_at other than its position, and an up that is not on its axis")
+                raise ValueError(
+                    "needs a look_at that differs from position, and an up that is not along its axis"
+                )
         return self

@@ -1,4 +1,4 @@
-"""Content of a cell file."""
+"""Typed content of a whole cell file."""
 
 from __future__ import annotations
 
@@ -14,18 +14,20 @@ from executive.cell.config.section import Distance, Length, Name, Section, Vecto
 
 
 class LedgerConfig(Section):
-    """Limits of the ledger."""
+    """Thresholds of the ledger."""
 
     gate: Length = 0.025
-    """Largest distance between a precise detection and the item that it shows [m]."""
+    """Maximum distance between a detection and the item to which it is assigned [m]; up to twice the value if
+    the positions are uncertain."""
     neighbourhood: Distance = 0.07
-    """Radius around a picked item in which others may have been moved [m]."""
+    """Radius around a picked item within which other items may have been moved [m]."""
     max_miss_probability: float = Field(0.001, ge=1e-9, lt=1)
-    """Largest probability of an overlooked object at a position that counts as empty."""
+    """Maximum probability of a missed object at a position that is assumed to be empty."""
     max_class_error: float = Field(0.005, ge=1e-9, lt=1)
-    """Largest probability of a wrong class with which an item is sorted."""
+    """Maximum probability of a wrong class at which an item is sorted."""
     max_position_std: Length = 0.005
-    """Largest standard error of the position of an item to approach [m]; two thirds after a failed grasp."""
+    """Maximum standard error of the position at which an item is picked [m]; two thirds of the value after
+    a failed grasp."""
 
 
 class CellConfig(Section):
@@ -35,15 +37,15 @@ class CellConfig(Section):
     """
 
     base: str = Field("", exclude=True)  # "" after loading.
-    """Another cell file. This file inherits each missing top-level key, each missing detector and each
-    missing key of a detector from it."""
+    """Path of a base file, from which this file inherits each missing top-level key, each missing detector
+    and each missing key of a detector."""
     cell: Name
     """Name of the cell."""
     description: str = ""
     """Description of the cell in one sentence."""
     kind: str = "sim"
-    """Kind of cell: `sim`, a simulated cell; `fake`, a cell without physics for rehearsals; or an installed
-    kind (entry-point group `executive.cells`)."""
+    """Kind of cell: `sim`, a simulated cell; `fake`, a cell without physics, for tests of missions; or the
+    name of an entry point of the group `executive.cells`."""
     arm: ArmConfig
     """Robot arm."""
     tool: ToolConfig
@@ -51,36 +53,36 @@ class CellConfig(Section):
     motion: MotionConfig = MotionConfig()
     """Distances, speeds and times of motion planning."""
     table: TableConfig = TableConfig()
-    """Workspace, and the objects that a simulated run puts there."""
+    """Workspace, and the objects that a simulated run spawns there."""
     bins: dict[Name, BinConfig] = Field(min_length=1)
     """Bins by name."""
     cameras: dict[Name, CameraConfig] = Field(min_length=1, max_length=1)
-    """The camera, by its name."""
+    """The camera by name; a cell has one camera."""
     detector: str = ""
-    """Name of the default detector of missions; if not given, the first of `detectors`."""
+    """Name of the detector that skills use by default; if not given, the first of `detectors`."""
     detectors: dict[Name, DetectorConfig] = Field(min_length=1)
-    """Detectors by name. With a `base`, a detector of the same name and kind changes keys of the base's
-    detector, another kind replaces it, another name adds one, and a name without a value removes it."""
+    """Detectors by name. With a `base`: a detector with the name and kind of a base detector overrides single
+    keys, with another kind it replaces the base detector, and a name without a value removes it."""
     localization: Literal["plane", "depth", "ray"] = "plane"
-    """Height of a detected object: `plane`, from its class; `depth`, from the depth image; `ray`, from a ray
-    of the simulator."""
+    """Source of the height of a detected object: `plane`, its class; `depth`, the depth image; `ray`, a ray
+    test of the simulator."""
     objects: dict[Name, ObjectConfig] = Field(min_length=1)
-    """Classes of objects by name; their names are those that detectors report."""
+    """Classes of objects by label, as the detectors report it."""
     ledger: LedgerConfig = LedgerConfig()
-    """Limits of the ledger, which tracks every object."""
+    """Thresholds of the ledger, which tracks the objects."""
     safe_place: Vector
-    """Place on the table where `PutDown` puts an object: x, y, z [m]."""
+    """Position on the table at which `PutDown` puts down an object: x, y, z [m]."""
 
     @field_validator("detectors")
     @classmethod
     def _put_default_first(
         cls, detectors: dict[str, DetectorConfig], others: ValidationInfo
     ) -> dict[str, DetectorConfig]:
-        """Put the default detector before the others, because a mission that names none uses the first."""
+        """Put the default detector first, because skills use the first detector by default."""
         default = others.data.get("detector", "")
         if not default:
             return detectors
         if default not in detectors:
             names = ", ".join(detectors)
-            raise ValueError(f'must have the detector "{default}", which is to be used; they are: {names}')
+            raise ValueError(f'must contain the default detector "{default}"; there are: {names}')
         return {default: detectors[default], **detectors}

@@ -1,4 +1,4 @@
-"""Detectors: kinds, thresholds and declared error rates."""
+"""Sections of a cell file: detectors with kind, thresholds and declared error rates."""
 
 from __future__ import annotations
 
@@ -16,27 +16,29 @@ class DetectorConfig(Section):
     model_config = ConfigDict(extra="allow", frozen=True, use_attribute_docstrings=True)
 
     kind: str
-    """Name of an installed detector (entry-point group `executive.detectors`)."""
+    """Kind of detector: the name of an entry point of the group `executive.detectors`."""
     threshold: float = Field(0.5, gt=0, lt=1)
-    """Confidence from which a detection counts."""
+    """Minimum confidence of a detection that is not doubtful."""
     floor: float = Field(0.25, gt=0, lt=1)
-    """Confidence below which a box is ignored."""
+    """Minimum confidence of a box; boxes with a lower confidence are ignored."""
     latency: Seconds = 0.05
-    """Time from a frame to the answer on the clock of the run [s]."""
+    """Time from the frame to the answer, on the clock of the run [s]."""
     miss_rate: float = Field(0.03, gt=0, lt=1)
-    """Share of the objects in full view that one look misses. This and the next three keys are only for fake
-    detectors; `executive evaluate` measures the error rates of others."""
+    """Fraction of the completely visible objects that one look misses. This key, `confusion_rate`,
+    `false_detections` and `jitter` are only for fake detectors; `executive evaluate` measures others."""
     confusion_rate: float = Field(0.004, gt=0, lt=1)
-    """Share of the found objects that get a wrong class."""
+    """Fraction of the found objects that get a wrong class."""
     false_detections: float = Field(0.02, gt=0, le=100)
-    """Number of false detections per look."""
+    """Mean number of false detections per look."""
     jitter: float = Field(1.0, gt=0, le=1000)
-    """Standard deviation of the random error of a box's centre, along each axis [pixel]."""
+    """Standard deviation of the random error of the centre of a box, along each axis [pixel]."""
 
     @model_validator(mode="after")
     def _check_floor(self) -> DetectorConfig:
         if self.floor > self.threshold:
-            raise ValueError(f"needs a floor up to its threshold, {self.threshold:g}, not {self.floor:g}")
+            raise ValueError(
+                f"needs a floor of at most its threshold, {self.threshold:g}, not {self.floor:g}"
+            )
         return self
 
     @property
@@ -48,5 +50,5 @@ class DetectorConfig(Section):
 
     @property
     def options(self) -> dict[str, Any]:
-        """Keys that only this kind of detector has."""
+        """Options of this kind of detector: all keys that are not fields of this class."""
         return dict(self.model_extra or {})

@@ -1,4 +1,4 @@
-"""Classes of objects, bins, and the table."""
+"""Sections of a cell file: classes of objects, bins, and the table."""
 
 from __future__ import annotations
 
@@ -11,49 +11,48 @@ from executive.cell.config.section import (
     Colour,
     Count,
     Distance,
+    Fraction,
     Length,
     Natural,
     Range,
     Section,
-    Share,
     Vector,
     check_ascending,
 )
 
 
 class ObjectConfig(Section):
-    """A class of objects and its model in simulation: a URDF or a mesh."""
+    """A class of objects, with a URDF or a mesh as its model in simulation."""
 
     urdf: str = ""
     """Path of a URDF, relative to the cell file or to pybullet_data."""
     mesh: str = ""
-    """Path of a Wavefront mesh (`.obj`, z up or `upright_deg`), relative as for `urdf`.
-    Each group (`o`) collides as its convex hull: a part with a hole consists of convex groups around it."""
+    """Path of a Wavefront mesh (`.obj`, with z up, or see `upright_deg`), relative as for `urdf`.
+    The collision shape of each group (`o`) is its convex hull; a part with a hole needs several groups."""
     mass: float = Field(0.05, ge=1e-4, le=1000)
     """Mass of a mesh [kg]; a URDF contains its mass."""
     scale: float = Field(1.0, ge=1e-4, le=1e4)
-    """Factor on the model's size; a mesh at scale 1 is in metres."""
+    """Scale factor of the model; a mesh at scale 1 is in metres."""
     upright_deg: Angles = (0.0, 0.0, 0.0)
-    """Roll, pitch, yaw [degree] that set the model upright, if its z axis does not point up."""
+    """Rotation that makes the z axis of the model point up: roll, pitch, yaw [degree]."""
     height: Length
     """Height of the object as it lies on the table [m]."""
     radius: Length
-    """Radius of the circle around its outline seen from above [m]."""
+    """Radius of the circle around the outline of the object, seen from above [m]."""
     ring: Distance = 0.0
-    """Distance of the contact point from the centre [m]; for parts with a hole."""
+    """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
-    """Colours (r, g, b in 0..1) of spawned objects, chosen at random."""
+    """Colours (red, green, blue, each 0 to 1) of which each spawned object gets a random one."""
 
     @model_validator(mode="after")
     def _check_model(self) -> ObjectConfig:
         if bool(self.urdf) == bool(self.mesh):
             raise ValueError("needs either a urdf or a mesh" + (", not both" if self.urdf else ""))
         if self.urdf and "mass" in self.model_fields_set:
-            raise ValueError("has a mass, which only a mesh can be given; a URDF says its own")
+            raise ValueError("must not have a mass: the URDF contains it; only a mesh needs one")
         if self.ring >= self.radius:
             raise ValueError(
-                f"is to be touched {self.ring:g} m from its middle, but its radius is {self.radius:g} m; "
-                "ring must be smaller"
+                f"has a ring of {self.ring:g} m, which must be smaller than the radius, {self.radius:g} m"
             )
         return self
 
@@ -62,25 +61,25 @@ class BinConfig(Section):
     """A container with a floor and four walls."""
 
     position: Vector
-    """Centre of the floor's underside: x, y, z [m]."""
+    """Centre of the underside of the floor: x, y, z [m]."""
     size: tuple[Length, Length, Length]
     """Inner length along x, inner width along y, wall height [m]."""
     slots: tuple[Count, Count] = (2, 3)
-    """Drop positions along x and y."""
+    """Numbers of drop positions along x and along y."""
     colour: Colour = (0.6, 0.6, 0.6)
     """Colour of the walls."""
 
 
 class TableConfig(Section):
-    """The workspace, the part of the table in which objects lie, and the spawning of objects there."""
+    """The workspace, which is the region of the table with objects, and the spawning of objects."""
 
     x: Range = (0.42, 0.64)
     """Range of the workspace along x [m]."""
     y: Range = (-0.22, 0.22)
     """Range of the workspace along y [m]."""
     objects: Annotated[tuple[Natural, Natural], AfterValidator(check_ascending)] = (3, 6)
-    """Smallest and largest number of spawned objects."""
+    """Minimum and maximum number of spawned objects."""
     gap: Distance = 0.012
-    """Smallest distance between the outlines of two spawned objects [m]."""
-    stacked: Share = 0.0
-    """Share of the objects that are spawned on top of another object, if they stay there."""
+    """Minimum distance between the outlines of two spawned objects [m]."""
+    stacked: Fraction = 0.0
+    """Fraction of the objects that are spawned on top of another object, unless they fall down."""

@@ -1,4 +1,4 @@
-"""Base class of all sections of a cell file, and the types of their values."""
+"""Base class of the sections of a cell file, and types of values with their ranges."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def check_name(name: str) -> str:
     """Return the name of a class, bin, camera or detector unchanged if it can be part of a file name.
 
     Raises:
-        ValueError: The name has characters other than letters, digits, blanks, "_" and "-", or more than 64.
+        ValueError: The name does not match `NAME_PATTERN`.
     """
     if not NAME_PATTERN.fullmatch(name):
-        raise ValueError('must be named by at most 64 letters, digits, blanks, "_" and "-"')
+        raise ValueError('must be a name of at most 64 letters, digits, blanks, "_" and "-"')
     return name
 
 
@@ -43,26 +43,26 @@ Length = Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
 Distance = Annotated[float, Field(ge=0, le=MAX_LENGTH)]
 Coordinate = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]
 Count = Annotated[int, Field(ge=1, le=1000)]
-"""A positive count [1]; no bin, table or image holds more than 1000 objects."""
+"""A positive number of things; no bin, table or image has more than 1000 objects."""
 Natural = Annotated[int, Field(ge=0, le=1000)]
 Range = Annotated[tuple[Coordinate, Coordinate], AfterValidator(check_ascending)]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 """x, y, z [m]."""
 Angle = Annotated[float, Field(ge=-360, le=360)]
-"""An angle [degree]; a whole turn to either side covers all orientations."""
+"""An angle [degree], up to one revolution in each direction."""
 Angles = tuple[Angle, Angle, Angle]
 """Roll, pitch, yaw [degree]."""
 Force = Annotated[float, Field(ge=1e-3, le=1e4)]
-"""A force [N]: from the weight of a tenth of a gram to that of a ton."""
+"""A force [N]: from the weight of 0.1 g to the weight of 1 t."""
 Channel = Annotated[float, Field(ge=0, le=1)]
 Colour = tuple[Channel, Channel, Channel]
-Share = Annotated[float, Field(ge=0, le=1)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
 Seconds = Annotated[float, Field(ge=0, le=600)]
 """A duration [s]; more than ten minutes is an error in the cell file."""
 GreyLevels = Annotated[float, Field(ge=0, le=255)]
 
 
 class Section(BaseModel):
-    """A part of a cell file: unknown keys are errors, values do not change after loading."""
+    """A section of a cell file: unknown keys are errors, and the values are immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)

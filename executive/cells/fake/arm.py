@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from executive.cell.arm import Goal, Motion, Task, refuse_steps
+from executive.cell.arm import Goal, Motion, Task, reject_generator
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height, find_unreachable_places
@@ -129,7 +129,7 @@ class FakeArm:
         """
         if not self.at_rest:
             raise Fault("the arm was started while it moves")
-        refuse_steps(motion)
+        reject_generator(motion)
         if not isinstance(motion, FakeMotion):
             raise Fault(f"the fake arm follows its own planned motions, not a {type(motion).__name__}")
         self.commands.append("start")

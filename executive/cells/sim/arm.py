@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from executive.cell.arm import Goal, Motion, Task, refuse_steps
+from executive.cell.arm import Goal, Motion, Task, reject_generator
 from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Clock
@@ -147,7 +147,7 @@ class SimArm:
             Fault: The arm is moving, is not at the start, or did not plan `motion`.
         """
         self._require_rest("start a motion")
-        refuse_steps(motion)
+        reject_generator(motion)
         if not isinstance(motion, Trajectory):
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
         self._check_distance(motion.start, START_TOLERANCE, "the motion starts")

@@ -11,7 +11,7 @@ import numpy as np
 import pybullet_data
 from numpy.typing import NDArray
 
-from executive.cell.paths import leaves_folder, links_out
+from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.geometry import Array
 
@@ -77,7 +77,7 @@ def _check_name(urdf: Path, name: str) -> str:
         InputError: The file is outside of the folder of the URDF.
     """
     name = name.removeprefix("package://")
-    if leaves_folder(name) or links_out(urdf.parent, name):
+    if is_outside_path(name) or has_outside_link(urdf.parent, name):
         raise InputError(f'the model {urdf.name} names the file "{name}", which is outside of its folder')
     return name
 

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from executive.cell.config import CameraConfig, CellConfig, Colour, NoiseConfig, Section
-from executive.cell.config.section import Natural, Share, check_ascending
+from executive.cell.config.section import Fraction, Natural, check_ascending
 from executive.cells.sim.arrangements import DAMAGED_MODEL, UNKNOWN_COUNT
 from executive.cells.sim.camera import Light
 from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
@@ -87,7 +87,7 @@ class SceneTableConfig(Section):
     gap: float | None = Field(None, ge=0, le=0.5)
     """Smallest distance between the outlines of two objects [m]; 0: outlines may touch. By default
     as in the cell file."""
-    stacked: Share | None = None
+    stacked: Fraction | None = None
     """Share of the objects that are put on top of another one, 0 to 1; unstable stacks are undone. By
     default as in the cell file."""
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from executive.cell.config import CellConfig
-from executive.cell.paths import leaves_folder, links_out
+from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, error, in_file_order
 from executive.mission.parse.cell_layout import find_overlaps
@@ -219,7 +219,7 @@ def _resolve_models(config: CellConfig, models: Iterable[tuple[KeyPath, Path, st
 def _find_models_outside(file: CellFile, models: Iterable[tuple[KeyPath, Path, str]]) -> Iterator[Finding]:
     """Yield a finding for each model file outside the folder of the file that names it."""
     for keys, folder, model in models:
-        if leaves_folder(model):
+        if is_outside_path(model):
             yield file.finding(keys, "outside", f'"{model}" must be a relative path without ".."')
-        elif os.path.isfile(folder / model) and links_out(folder, model):
+        elif os.path.isfile(folder / model) and has_outside_link(folder, model):
             yield file.finding(keys, "outside", f'"{model}" is a link to a file outside of {folder}')

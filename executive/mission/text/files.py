@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
 import executive
-from executive.cell.paths import leaves_folder, links_out
+from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
 from executive.mission.findings import alternatives
 from executive.mission.source import Source
@@ -55,7 +55,7 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
     Raises:
         InputError: The reference leaves the folder, or the file does not exist.
     """
-    if leaves_folder(reference):
+    if is_outside_path(reference):
         raise InputError(
             f'"{reference}" is not below the folder of the file that names it; '
             'give a relative path without ".."'
@@ -64,7 +64,7 @@ def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
     for base in bases:
         path = base / reference
         if os.path.isfile(path):
-            if links_out(base, reference):
+            if has_outside_link(base, reference):
                 raise InputError(f'"{reference}" is a link to a file outside of {base}')
             return path
         if os.path.lexists(path):
