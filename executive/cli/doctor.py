@@ -206,7 +206,7 @@ def prepare_drawing(renderer: str) -> Callable[[], object]:
     """
     import pybullet
 
-    from executive.cells.sim.camera import CELL_LIGHT, camera_pose, render
+    from executive.cells.sim.camera import CELL_LIGHT, get_camera_pose, render
     from executive.cells.sim.world import World
     from executive.cli.cells import load_cells
     from executive.perception.camera_model import compute_calibration
@@ -221,7 +221,7 @@ def prepare_drawing(renderer: str) -> Callable[[], object]:
     camera = next(iter(config.cameras.values()))
     world = World(config)
     matrix, _ = compute_calibration(camera)
-    return lambda: render(world, matrix, camera_pose(world, camera), (0, 0, *FRAME_SIZE), CELL_LIGHT)
+    return lambda: render(world, matrix, get_camera_pose(world, camera), (0, 0, *FRAME_SIZE), CELL_LIGHT)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from executive.cells.audit import UNKNOWN
 from executive.cells.sim.camera import Image, SimCamera
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.silhouette import outline_box
+from executive.cells.sim.silhouette import compute_bounding_box
 from executive.cells.sim.world import World
 from executive.geometry import Array
 from executive.perception.camera_model import NEAR, project
@@ -62,7 +62,7 @@ class _Outline:
 
     def is_occluding(self, other: _Outline) -> bool:
         """Return True if this object is nearer than `other` and occludes the centre of the box of `other`."""
-        left, top, right, bottom = outline_box(other.pixels)
+        left, top, right, bottom = compute_bounding_box(other.pixels)
         hull = cv2.convexHull(self.pixels.astype(np.float32))
         centre = ((left + right) / 2, (top + bottom) / 2)
         return self.distance < other.distance and cv2.pointPolygonTest(hull, centre, False) > 0
@@ -90,16 +90,16 @@ class TruthCamera(SimCamera):
 
     def _find_true_detections(self) -> tuple[Detection, ...]:
         outlines = []
-        matrix, X_WC = self._true_view()
+        matrix, X_WC = self._get_true_view()
         for body, label in self._world.bodies.items():
             mesh = load_mesh(self._world.models[body])
-            outline = self._world.object_pose(body).apply(mesh.vertices)
+            outline = self._world.get_object_pose(body).apply(mesh.vertices)
             distances = X_WC.inverse().apply(outline)[:, 2]
             if np.all(distances > NEAR):
                 pixels = project(matrix, X_WC, outline)
                 outlines.append(_Outline(label, pixels, float(distances.mean())))
         return tuple(
-            Detection(outline.label, ORACLE_CONFIDENCE, outline_box(outline.pixels))
+            Detection(outline.label, ORACLE_CONFIDENCE, compute_bounding_box(outline.pixels))
             for outline in outlines
             if outline.label != UNKNOWN and not any(other.is_occluding(outline) for other in outlines)
         )

@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 import click
 
 from executive.campaign.subject import Subject
-from executive.cells.sim.command_log import is_log
+from executive.cells.sim.command_log import is_command_log
 from executive.cli.options import runs_option
 from executive.errors import ExecutiveError, InputError
 from executive.events import NodeEnded, RunResumed, TimedEvent
@@ -87,7 +87,7 @@ class Snapshots(StopAtFirstTick):
         if isinstance(timed.event, NodeEnded) and timed.event.skill:
             directory = RunDirectory(find_run(LATEST_LINK, self.runs))
             world = directory.world_log
-            self.worlds.append(world.stat().st_size if is_log(world) else world.read_bytes())
+            self.worlds.append(world.stat().st_size if is_command_log(world) else world.read_bytes())
             self.lengths.append(directory.journal.stat().st_size)
 
     def restore(self, number: int, path: Path) -> None:
@@ -228,7 +228,7 @@ def _resume_killed(subject: Subject, base: Path, case: int, snapshots: Snapshots
     path = find_run(LATEST_LINK, runs)
     lost = []
     for file in ("journal.jsonl", "world.log"):
-        if file == "journal.jsonl" or is_log(path / file):
+        if file == "journal.jsonl" or is_command_log(path / file):
             size = (path / file).stat().st_size
             kept = max(size - 1, 0) // BLOCK * BLOCK - BLOCK * rng.randrange(MAX_LOST_BLOCKS)
             # The header of the log of a world is on the disk before the run begins.

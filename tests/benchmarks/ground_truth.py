@@ -14,7 +14,7 @@ from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
 from executive.cells.audit import UNKNOWN
-from executive.cells.sim.audit import audit
+from executive.cells.sim.audit import audit_bodies
 from executive.cells.sim.cell import SimCell
 from executive.events import Emit, ItemChanged
 from executive.ledger.item import State
@@ -189,16 +189,16 @@ class AuditedCell(SimCell):
 
     def audit(self) -> dict[str, int]:
         """Return what really became of the objects, and keep it object by object."""
-        self.objects = tuple(map(self._find, self._initial))
+        self.objects = tuple(map(self._find, self._initial_positions))
         return super().audit()
 
     def _find(self, body: int) -> FoundObject:
         """Return the true end of a body."""
-        places = [self._initial[body], *self._world.stood.get(body, ())]
+        places = [self._initial_positions[body], *self._world.rest_positions.get(body, ())]
         gate = self.config.ledger.gate
-        counts = audit(
+        counts = audit_bodies(
             self._world, {body: places}, self.accounts.records, self.cell.bins, self.routes, gate,
-            held=self._tool.held_body, fallen=self._tool.fallen,
+            held=self._tool.held_body, dropped=self._tool.dropped_bodies,
         )  # fmt: skip
         seen_there = tuple(
             record.item
@@ -208,7 +208,7 @@ class AuditedCell(SimCell):
         carried = self._carried.get(body)
         inside = ""
         if body in self._world.bodies:
-            position = self._world.object_pose(body).position
+            position = self._world.get_object_pose(body).position
             bins = self.cell.bins.items()
             inside = next((name for name, bin in bins if bin.contains(position, BIN_THICKNESS)), "")
         return FoundObject(

@@ -66,7 +66,7 @@ class _MethodComparison:
 
     def plan_pair(self) -> None:
         """Draw one more pair and compute its motions by every method."""
-        self._world.set_arm(self._home)
+        self._world.set_joint_positions(self._home)
         scene, start = self._scenes.draw(), self._q
         try:
             duration, motions = self._plan(start, scene)

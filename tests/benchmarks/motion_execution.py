@@ -90,7 +90,7 @@ class ClearanceMonitor:
                     yield point[8], f"{world.name_link(point[3])} - {world.name_body(body)}"
             for point in near(held, body, MAX_MEASURED_DISTANCE) if load else ():
                 yield point[8], f"{load} - {world.name_body(body)}"
-        for one, other in world.robot.self_pairs:
+        for one, other in world.robot.self_collision_pairs:
             for point in near(world.arm, world.arm, MAX_MEASURED_DISTANCE, linkIndexA=one, linkIndexB=other):
                 yield point[8], f"{world.name_link(one)} - {world.name_link(other)}"
         for point in near(held, world.arm, MAX_MEASURED_DISTANCE) if load else ():
@@ -149,7 +149,7 @@ class _Execution:
             self._missed += 1
             return
         carrying = self._move(
-            scene.drop, scene.make_carry_task(self._tool.bears), scene, lambda: not self._tool.holding
+            scene.drop, scene.make_carry_task(self._tool.holding_force), scene, lambda: not self._tool.holding
         )
         if self._tool.holding:
             self._steps_per_pair.append(fetching + carrying)
@@ -189,7 +189,7 @@ class _Execution:
     def _locate_in_tool(self) -> Pose | None:
         """Return the pose of the held object in the tool's frame, or None."""
         held, world = self._tool.held_body, self._world
-        return None if held is None else world.tool_pose().inverse() @ world.object_pose(held)
+        return None if held is None else world.get_tool_pose().inverse() @ world.get_object_pose(held)
 
     def _step(self) -> None:
         self._arm.advance()

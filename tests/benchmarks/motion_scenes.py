@@ -12,10 +12,10 @@ from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.layout import build_bin
 from executive.cell.objects import Load, ObjectClass, Obstacle
-from executive.cells.sim.collision import PathClearance
+from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import load_mesh, object_class_with_mass
 from executive.cells.sim.spawn import spawn
-from executive.cells.sim.suction import breakaway_force, measure_contact
+from executive.cells.sim.suction import compute_breakaway_force, measure_contact
 from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.cells.sim.world import World
 from executive.errors import InputError, Unreachable
@@ -31,7 +31,7 @@ MAX_TRIES = 50
 @contextmanager
 def open_world(cell: CellConfig) -> Iterator[tuple[World, Planner]]:
     """Yield a world without objects, and a planner that makes all checks of the planner of a run."""
-    world, clearance = World(cell, visuals=False), PathClearance(cell)
+    world, clearance = World(cell, visuals=False), ClearanceChecker(cell)
     try:
         yield world, build_planner(cell, clearance.check)
     finally:
@@ -139,7 +139,7 @@ class SceneGenerator:
         """Return an object as an obstacle at the centre of the bounding box of its outline from above."""
         kind = self._kind(body)
         mesh = load_mesh(self._cell.objects[kind.label])
-        corners = self._world.object_pose(body).apply(mesh.vertices)
+        corners = self._world.get_object_pose(body).apply(mesh.vertices)
         low, high = corners.min(axis=0), corners.max(axis=0)
         x, y = ((low[:2] + high[:2]) / 2).tolist()
         return Obstacle(x, y, kind.radius, float(low[2]) + kind.height, f"{kind.label}-{number}")
@@ -160,7 +160,7 @@ class SceneGenerator:
         for _ in range(2):
             X_WT = tool_down((*place, surface))
             seal = measure_contact(self._world.client, X_WT, {body}, tool.cup_radius, tool.reach)
-            force = breakaway_force(seal, tool)
+            force = compute_breakaway_force(seal, tool)
             surface -= seal.distance if seal else 0.0
         if force < tool.min_force:
             raise Unreachable(f"no seal holds the {self._world.bodies[body]} at its middle")

@@ -16,7 +16,7 @@ import numpy as np
 
 from executive.cell.config import CellConfig, ToolConfig
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.suction import breakaway_force
+from executive.cells.sim.suction import compute_breakaway_force
 from executive.cells.sim.suction import measure_contact as measure_seal
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose, about_z, tool_down
@@ -116,7 +116,7 @@ def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[
 
     The gap is infinite beside the object; a seal is good if it bears the tool's `min_force`.
     """
-    X_WO = world.object_pose(body)
+    X_WO = world.get_object_pose(body)
     top = world.client.getAABB(body)[1][2] + tool.reach
     gaps, tilts, forces = [], [], []
     for place in places:
@@ -128,7 +128,7 @@ def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[
             seal = measure_seal(world.client, landed, {body}, tool.cup_radius, tool.reach)
         gaps.append(math.inf if seal is None else seal.gap)
         tilts.append(math.pi / 2 if seal is None else seal.tilt)
-        forces.append(breakaway_force(seal, tool))
+        forces.append(compute_breakaway_force(seal, tool))
     return {
         "placements": len(gaps),
         **_quantiles("gap", gaps, 6),

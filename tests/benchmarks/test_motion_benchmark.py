@@ -40,7 +40,7 @@ def test_only_what_must_not_be_touched_counts(cell: CellConfig, kinematics: Kine
 
     def move(held: int | None, touched: int | None, start: float, x: float, z: float) -> tuple[str, float]:
         for place, act in (((0.5, 0.0, start), monitor.begin), ((x, 0.0, z), monitor.measure)):
-            world.set_arm(reach(kinematics, place, np.zeros(7)))
+            world.set_joint_positions(reach(kinematics, place, np.zeros(7)))
             if held is not None:
                 world.place_object(held, Pose.of([place[0], 0.0, place[2] - 0.025]))
             act(*((held, touched) if act == monitor.begin else (held,)))

@@ -51,7 +51,7 @@ def test_without_jitter_every_object_is_located_where_it_lies_as_late_as_by_a_de
     for detection, body in zip(found, bodies, strict=True):
         place = made.cell.localizer.locate(detection, frame)
         # A duck's outline is not centred on its middle.
-        assert np.linalg.norm(place[:2] - made._world.object_pose(body).position[:2]) < 0.012
+        assert np.linalg.norm(place[:2] - made._world.get_object_pose(body).position[:2]) < 0.012
 
 
 def test_jitter_differs_from_look_to_look_and_repeats_with_the_seed(build):

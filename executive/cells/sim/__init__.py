@@ -1,23 +1,23 @@
-"""The PyBullet work cell; importing it loads pybullet without the greeting that pybullet prints on stderr."""
+"""Simulated work cell in PyBullet; this module imports pybullet without its greeting on stderr."""
 
 import os
 from importlib import import_module
 
 
-def _load_without_greeting() -> None:
+def _import_without_greeting() -> None:
     try:
-        kept = os.dup(2)
+        saved_stderr = os.dup(2)
     except OSError:  # stderr is closed: nothing can be written to it
         import_module("pybullet")
         return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
+    null_device = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 2)
+        os.dup2(null_device, 2)
         import_module("pybullet")
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+        os.dup2(saved_stderr, 2)
+        os.close(saved_stderr)
+        os.close(null_device)
 
 
-_load_without_greeting()
+_import_without_greeting()

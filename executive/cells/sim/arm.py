@@ -1,4 +1,4 @@
-"""Driver of the simulated arm: it follows planned motions step by step and brakes on demand."""
+"""Driver of the simulated arm, which follows planned trajectories step by step and brakes on demand."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from executive.motion.planner import Planner
 from executive.motion.plans import Plan, PlanFactory
 from executive.motion.trajectory import Trajectory
 
-VELOCITY_INTERVAL = 1e-4
+DIFFERENTIATION_STEP = 1e-4
 """Time step of the numerical derivative of the tool position [s]."""
 START_TOLERANCE = math.radians(0.2)
-"""Largest joint difference between the arm and the start of a motion [rad]."""
+"""Maximum difference of a joint position between the arm and the start of a motion [rad]."""
 TRACKING_TOLERANCE = math.radians(0.5)
-"""Largest joint difference between command and arm [rad]; without disturbance it is below 0.001°."""
+"""Maximum difference of a joint position between command and arm [rad]; below 0.001° if undisturbed."""
 
 
 class SimArm:
-    """An arm in a PyBullet world, implementing `executive.cell.arm.Arm`.
+    """The arm of a PyBullet world; implements `executive.cell.arm.Arm`.
 
-    `advance` is called once before every physics step. It commands the joint positions of the motion one
-    step later with full position gain and zero velocity, which follows the path to 0.0005°; PyBullet's
-    default gain without feed-forward lags by 3°.
+    `advance` is called once before every physics step, and commands the joint positions at the end of this
+    step. With full position gain and zero target velocity, the tracking error is 0.0005°; with PyBullet's
+    default gain it would be 3°.
 
     The arm brakes if a disturbance pushes it off its path or if it collides.
 
@@ -45,9 +45,9 @@ class SimArm:
         planner: Motion planner of the arm.
         config: The cell file.
         clock: Clock of the run.
-        held: Returns the body at the tool, or None; contacts of this body count as contacts of the arm.
+        get_held_body: Returns the body that the tool holds, or None; its contacts count as those of the arm.
         emit: Receives the events of the arm.
-        resumed: Interrupted motion of the arm in a rebuilt world; the arm brakes. None: it is at rest.
+        interrupted: Motion in a rebuilt world, along which the arm brakes; None: the arm is at rest.
 
     Attributes:
         planner: Motion planner of the arm.
@@ -59,26 +59,27 @@ class SimArm:
         planner: Planner,
         config: CellConfig,
         clock: Clock,
-        held: Callable[[], int | None] = lambda: None,
+        get_held_body: Callable[[], int | None] = lambda: None,
         emit: Emit = discard_event,
-        resumed: InterruptedArm | None = None,
+        interrupted: InterruptedArm | None = None,
     ) -> None:
         self.planner = planner
         self._world = world
         self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
-        self._plans = PlanFactory(self._solve, clock, config.motion.planning_time, emit)
-        self._contacts = Contacts(world, held)
+        self._plans = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
+        self._contacts = Contacts(world, get_held_body)
         self._motion: Trajectory | None = None
         self._time = 0.0
-        self._braking: list[float] | None = None
-        self._fault: str | None = None
-        self._met: str | None = None
+        self._braking_times: list[float] | None = None
+        self._fault_message: str | None = None
+        self._collision_message: str | None = None
         self._command = self.q
-        # The command log may be too short to contain a joint command.
-        if resumed is None or not resumed.command.size:
-            self.hold()
+        # A run may be interrupted before the first joint command is logged.
+        if interrupted is None or not interrupted.command.size:
+            self.send_command()
         else:
-            self._command, self._motion, self._time = resumed.command, resumed.motion, resumed.time
+            self._command, self._motion = interrupted.command, interrupted.motion
+            self._time = interrupted.time
             self.stop()
 
     @property
@@ -96,14 +97,14 @@ class SimArm:
     def tool_velocity(self) -> Array:
         """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
         states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
-        q, change = np.array([(state[0], state[1] * VELOCITY_INTERVAL) for state in states]).T
+        q, change = np.array([(state[0], state[1] * DIFFERENTIATION_STEP) for state in states]).T
         compute_pose = self.planner.kinematics.compute_tool_pose
-        return (compute_pose(q + change).position - compute_pose(q).position) / VELOCITY_INTERVAL
+        return (compute_pose(q + change).position - compute_pose(q).position) / DIFFERENTIATION_STEP
 
     @property
     def destination(self) -> Array:
-        """Position of the tool at the end of the running motion, or now if none runs `(3,)` [m]."""
-        return self.planner.kinematics.compute_tool_pose(self._goal).position
+        """Position of the tool `(3,)` [m] at the end of the running motion, or now if the arm is at rest."""
+        return self.planner.kinematics.compute_tool_pose(self._end_positions).position
 
     @property
     def at_rest(self) -> bool:
@@ -117,8 +118,8 @@ class SimArm:
 
     @property
     def collision(self) -> str | None:
-        """Text of the collision that ended the last motion, or None."""
-        return self._met
+        """Description of the collision that ended the last motion, or None."""
+        return self._collision_message
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[Trajectory]:
         """Begin to plan a motion from the current position to a goal, or to a named pose of the cell file.
@@ -131,20 +132,20 @@ class SimArm:
         return self._plans.plan(self._command, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
-        """Plan the next motion, from the end of the running motion, in advance.
+        """Plan the next motion, from the end of the running motion, before `plan` requests it.
 
         Raises:
             Fault: The cell file has no such pose.
         """
         self._require_pose(goal)
-        if self._braking is None:  # the end of a braking motion is not known yet
-            self._plans.plan_ahead(self._goal, goal, task)
+        if self._braking_times is None:  # a braking arm does not reach the end of the motion
+            self._plans.plan_ahead(self._end_positions, goal, task)
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow `motion`; the arm must be at rest at the start of `motion`.
+        """Begin to follow a motion, at whose start the arm must be at rest.
 
         Raises:
-            Fault: The arm is moving, is not at the start, or did not plan `motion`.
+            Fault: The arm is moving, is not at the start, or did not plan the motion.
         """
         self._require_rest("start a motion")
         reject_generator(motion)
@@ -152,55 +153,56 @@ class SimArm:
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
         self._check_distance(motion.start, START_TOLERANCE, "the motion starts")
         self._raise_fault()
-        self._motion, self._time, self._met = motion, 0.0, None
+        self._motion, self._time, self._collision_message = motion, 0.0, None
         self._contacts.reset()
-        self._world.log.motion(motion)
+        self._world.log.append_motion(motion)
 
     def stop(self) -> None:
-        """Brake along the path of the running motion, if there is one; returns at once."""
-        if self._motion is not None and self._braking is None:
-            self._braking = list(plan_braking(self._motion, self._time, self.planner.limits, STEP))
+        """Begin to brake along the path of the running motion, if there is one."""
+        if self._motion is not None and self._braking_times is None:
+            self._braking_times = list(plan_braking(self._motion, self._time, self.planner.limits, STEP))
 
     def run_into(self, obstacle: str) -> None:
-        """Brake as after a collision, and set `collision` to `obstacle`; does nothing if no motion runs."""
-        if self._motion is not None and self._braking is None:
-            self._met = obstacle
+        """Brake as after a collision, and set `collision` to `obstacle`; do nothing if the arm is at rest."""
+        if self._motion is not None and self._braking_times is None:
+            self._collision_message = obstacle
             self.stop()
 
-    def hold(self) -> None:
-        """Send the last command, again if it was sent before."""
+    def send_command(self) -> None:
+        """Send the current command to the motors."""
         self._world.command_arm(self._command, self._time)
 
     def advance(self) -> None:
-        """Send the command for the coming physics step; called once before each."""
-        if self._fault is None and self._braking is None:
+        """Check for disturbances and collisions, and send the command for the next physics step."""
+        if self._fault_message is None and self._braking_times is None:
             self._check_distance(self._command, TRACKING_TOLERANCE, "the command is")
-            if self._fault is not None:
+            if self._fault_message is not None:
                 self.stop()
         if self._motion is None:
             return
-        if self._braking is None:
-            self._met = self._contacts.find_new(lip_may_touch=self._time >= self._motion.guarded_start_time)
-            if self._met is not None:
+        if self._braking_times is None:
+            lip_may_touch = self._time >= self._motion.guarded_start_time
+            self._collision_message = self._contacts.describe_new_contact(lip_may_touch)
+            if self._collision_message is not None:
                 self.stop()
-        if self._braking is None:
+        if self._braking_times is None:
             self._time += STEP
-            done = self._time >= self._motion.duration
+            has_ended = self._time >= self._motion.duration
         else:
-            self._time = self._braking.pop(0)
-            done = not self._braking
+            self._time = self._braking_times.pop(0)
+            has_ended = not self._braking_times
         self._command = self._motion.state_at(self._time)[0]
-        self.hold()
-        if done:
-            self._motion, self._braking = None, None
-            self._world.log.note(command_log.DONE)
+        self.send_command()
+        if has_ended:
+            self._motion, self._braking_times = None, None
+            self._world.log.append(command_log.MOTION_END)
 
     @property
-    def _goal(self) -> Array:
-        """Joint positions at the end of the running motion, or the commanded ones `(n,)` [rad]."""
+    def _end_positions(self) -> Array:
+        """Joint positions `(n,)` [rad] at the end of the running motion, or of the command at rest."""
         return self._command if self._motion is None else self._motion.end
 
-    def _solve(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:
+    def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:
         return self.planner.plan(start, self._poses[goal] if isinstance(goal, str) else goal, task)
 
     def _require_pose(self, goal: Goal | str) -> None:
@@ -208,22 +210,30 @@ class SimArm:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
     def _check_distance(self, q: Array, tolerance: float, text: str) -> None:
-        """Record a fault, to be raised later, if a joint is farther from `q` than `tolerance` [rad]."""
-        error = np.abs(self.q - q)
-        joint = int(np.argmax(error))
-        if error[joint] > tolerance:
-            self._fault = (
-                f"{text} {math.degrees(error[joint]):.2f}° away from where joint {joint + 1} of the arm is; "
+        """Store a fault, to be raised later, if the position of a joint differs too much from `q`.
+
+        Args:
+            q: Required joint positions `(n,)` [rad].
+            tolerance: Maximum difference [rad].
+            text: Start of the message of the fault.
+        """
+        errors = np.abs(self.q - q)
+        joint = int(np.argmax(errors))
+        if errors[joint] > tolerance:
+            self._fault_message = (
+                f"{text} {math.degrees(errors[joint]):.2f}° away from where joint {joint + 1} of the arm is; "
                 f"{math.degrees(tolerance):.1f}° are allowed"
             )
 
-    def _require_rest(self, order: str) -> None:
+    def _require_rest(self, action: str) -> None:
         self._raise_fault()
         if self._motion is not None:
-            left = self._motion.duration - self._time
-            raise Fault(f"the arm was asked to {order} while moving ({left:.2f} s to go); wait for `at_rest`")
+            remaining = self._motion.duration - self._time
+            raise Fault(
+                f"the arm was asked to {action} while moving ({remaining:.2f} s to go); wait for `at_rest`"
+            )
 
     def _raise_fault(self) -> None:
-        if self._fault is not None:
-            fault, self._fault = self._fault, None
-            raise Fault(fault)
+        if self._fault_message is not None:
+            message, self._fault_message = self._fault_message, None
+            raise Fault(message)

@@ -16,7 +16,7 @@ from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
 from executive.cells.audit import UNKNOWN
-from executive.cells.sim.models import add_body, load_mesh, upright
+from executive.cells.sim.models import add_body, compute_upright_pose, load_mesh
 from executive.cells.sim.variations import random_object_colour
 from executive.cells.sim.world import World, add_bin
 from executive.geometry import Array, Pose, about_z, rotation_from_quaternion, tool_down
@@ -59,12 +59,12 @@ def move_arm(world: World, camera: CameraConfig, rng: Generator) -> bool:
     poses = world.config.arm.poses_deg
     scans = camera.scan_poses
     scan = np.radians(poses[scans[0] if rng.random() < 0.6 else str(rng.choice(scans))])
-    world.set_arm(scan)
+    world.set_joint_positions(scan)
     usual = rng.random() < 0.6
     if camera.mount == "wrist":
         spread = (0.02, 0.02, 0.02) if usual else (0.07, 0.15, 0.12)
         turn = math.radians(3) if usual else 0.5
-        X_WT = world.tool_pose()
+        X_WT = world.get_tool_pose()
         offset = rng.uniform(-1, 1, 3) * spread
         tilt = Pose.of(np.zeros(3), [*rng.normal(0, math.radians(1.5), 2) / 2, 0, 1])
         turned = Pose(about_z(rng.uniform(-turn, turn)) @ X_WT.rotation, X_WT.position + offset)
@@ -75,7 +75,7 @@ def move_arm(world: World, camera: CameraConfig, rng: Generator) -> bool:
     # The inverse kinematics starts from a forward posture, nearer to all targets than a scan pose.
     position = rng.uniform((0.25, -0.50, 0.05), (0.72, 0.50, 0.40))
     bearing = math.atan2(position[1], position[0])
-    world.set_arm([bearing, *map(math.radians, world.robot.forward_pose_deg)])
+    world.set_joint_positions([bearing, *map(math.radians, world.robot.forward_pose_deg)])
     _move_tool(world, tool_down(position, bearing + rng.uniform(-1.2, 1.2)))
     return bool(rng.random() < 0.3)
 
@@ -194,7 +194,7 @@ def settle(config: CellConfig, items: Sequence[SceneObject]) -> list[SceneObject
 def _pose_of(client: BulletClient, body: int, item: SceneObject) -> Pose:
     X_LI = Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
     X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
-    return X_WI @ (upright(item.model) @ X_LI).inverse()
+    return X_WI @ (compute_upright_pose(item.model) @ X_LI).inverse()
 
 
 def _move_tool(world: World, X_WT: Pose) -> None:
@@ -205,7 +205,7 @@ def _move_tool(world: World, X_WT: Pose) -> None:
             world.arm, world.flange, X_WE.position, X_WE.quaternion,
             maxNumIterations=60, residualThreshold=1e-4,
         )  # fmt: skip
-        world.set_arm(q[: world.robot.joint_count])
+        world.set_joint_positions(q[: world.robot.joint_count])
 
 
 def _random_rotation(rng: Generator) -> Array:

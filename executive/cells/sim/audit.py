@@ -1,4 +1,4 @@
-"""Final places of the bodies of a simulated world: ground truth, read only after a run."""
+"""Counts of the bodies by their true final positions in a simulated world, made only after a run."""
 
 from __future__ import annotations
 
@@ -11,51 +11,52 @@ from executive.cells.sim.world import World
 from executive.geometry import Array
 from executive.ledger.item import Record
 
-MIN_HEIGHT = -0.05
-"""Height of a centre below which an object has left the table [m]."""
+MIN_CENTRE_HEIGHT = -0.05
+"""Minimum height of the centre of an object that is still on the table [m]."""
 
 
-def audit(
+def audit_bodies(
     world: World,
-    stood: Mapping[int, Sequence[Array]],
+    rest_positions: Mapping[int, Sequence[Array]],
     records: Sequence[Record],
     bins: Mapping[str, Bin],
     routes: Routes,
-    reach: float,
+    max_distance: float,
     held: int | None = None,
-    fallen: Collection[int] = (),
+    dropped: Collection[int] = (),
 ) -> dict[str, int]:
     """Return the counts of `executive.cells.audit.audit_objects` for the bodies of a simulated world.
 
     Args:
         world: The simulated world at the end of the run.
-        stood: By body, its positions `(3,)` [m] at the start and after each time that it was moved by hand
-            or released by the tool.
+        rest_positions: Positions `(3,)` [m] of each body at the start, and after each time that a test moved
+            it or the tool released it.
         records: The items of the ledger.
         bins: The bins of the cell.
-        routes: Names of the right bins of each class.
-        reach: Largest distance between the first position of an item and a position in `stood` [m].
-        held: Body in the tool, or None.
-        fallen: Bodies that fell from the tool and were not in it again.
+        routes: Names of the permitted bins of each class.
+        max_distance: Maximum horizontal distance from the first position of an item to its object [m].
+        held: Body that the tool holds, or None.
+        dropped: Bodies that fell from the tool and have not been picked up since.
     """
 
-    def final_objects() -> Iterator[FinalObject]:
-        for body, positions in stood.items():
+    def iterate_final_objects() -> Iterator[FinalObject]:
+        for body, positions in rest_positions.items():
             is_removed = body not in world.bodies
-            label, position = (
-                world.removed[body] if is_removed else (world.bodies[body], world.object_pose(body).position)
-            )
+            if is_removed:
+                label, position = world.removed_objects[body]
+            else:
+                label, position = world.bodies[body], world.get_object_pose(body).position
             bin = _find_bin(position, bins)
-            # A resumed run may see an object for the first time in a bin; the ledger takes its middle.
-            places = [*positions, bins[bin].position] if bin else positions
-            yield FinalObject(label, bin, places, body in fallen, body == held, is_removed)
+            # If a resumed run first detects an item in a bin, its first position is the bin's centre.
+            positions = [*positions, bins[bin].position] if bin else positions
+            yield FinalObject(label, bin, positions, body in dropped, body == held, is_removed)
 
-    return audit_objects(final_objects(), records, routes, reach)
+    return audit_objects(iterate_final_objects(), records, routes, max_distance)
 
 
 def _find_bin(position: Array, bins: Mapping[str, Bin]) -> str | None:
-    """Return the name of the bin around a position, "" outside of all bins, None below the table."""
-    if position[2] < MIN_HEIGHT:
+    """Return the name of the bin that contains a position, "" outside of all bins, None below the table."""
+    if position[2] < MIN_CENTRE_HEIGHT:
         return None
     # The centre of an object that leans on a bin wall may be above the wall.
     return next((name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS)), "")

@@ -16,7 +16,7 @@ from executive.cell.bins import Bin
 from executive.cell.config import CameraConfig, Colour, DepthConfig, NoiseConfig, Section
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
-from executive.cells.sim.view import ArmShadow
+from executive.cells.sim.arm_occlusion import ArmOcclusion
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.perception.camera_check import describe_displacement
@@ -31,9 +31,9 @@ from executive.perception.mounted_camera import MountedCamera
 
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
-
-
-Reflection = Annotated[float, Field(ge=0, le=3)]
+Region = tuple[int, int, int, int]
+"""Left, top, right and bottom of a region of an image [pixel]."""
+ReflectionCoefficient = Annotated[float, Field(ge=0, le=3)]
 
 
 class Light(Section):
@@ -43,11 +43,11 @@ class Light(Section):
     """Direction x, y, z in the world from the table to the lamp; z is above 0, the length is ignored."""
     colour: Colour = (1.0, 1.0, 1.0)
     """Colour of the lamp's light: r, g, b, each 0 to 1."""
-    ambient: Reflection = 0.6
+    ambient: ReflectionCoefficient = 0.6
     """Ambient coefficient of the Phong model, 0 to 3."""
-    diffuse: Reflection = 0.35
+    diffuse: ReflectionCoefficient = 0.35
     """Diffuse coefficient of the Phong model, 0 to 3."""
-    specular: Reflection = 0.05
+    specular: ReflectionCoefficient = 0.05
     """Specular coefficient of the Phong model, 0 to 3."""
     shadow: bool = False
     """True if objects cast shadows."""
@@ -55,49 +55,49 @@ class Light(Section):
 
 CELL_LIGHT = Light()
 """Light of every simulated cell: a white lamp, slightly in front and to the left, without shadows."""
-DEPTH_STREAM = 1
-"""Last number of the seed of the depth noise, which separates it from the seed of the image noise."""
+DEPTH_SEED = 1
+"""Additional number in the seed of the depth noise, so that it differs from the seed of the image noise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Render:
-    """A rendered part of a camera image, without noise.
+    """A rendered region of a camera image, without noise.
 
     Attributes:
-        image: `(h, w, 3)` uint8, RGB.
-        bodies: `(h, w)` visible body at each pixel, -1 for none.
-        buffer: `(h, w)` depth buffer of OpenGL.
+        image: Colour image `(H, W, 3)` uint8, RGB.
+        bodies: Visible body at each pixel `(H, W)`, -1 for none.
+        depth_buffer: Depth buffer of OpenGL `(H, W)`, 0 to 1.
     """
 
     image: Image
     bodies: NDArray[np.int32]
-    buffer: NDArray[np.float32]
+    depth_buffer: NDArray[np.float32]
 
     @property
     def depth(self) -> Array:
-        """Distances along the optical axis `(h, w)` [m], inf at pixels without a body."""
+        """Distances along the optical axis `(H, W)` [m], inf at pixels without a body."""
         with np.errstate(divide="ignore"):
-            distances = FAR * NEAR / (FAR - (FAR - NEAR) * self.buffer.astype(np.float64))
-        return np.where(self.buffer < 1.0, distances, np.inf)
+            distances = FAR * NEAR / (FAR - (FAR - NEAR) * self.depth_buffer.astype(np.float64))
+        return np.where(self.depth_buffer < 1.0, distances, np.inf)
 
 
-def camera_pose(world: World, config: CameraConfig) -> Pose:
+def get_camera_pose(world: World, config: CameraConfig) -> Pose:
     """Return the current pose `X_WC` of a camera."""
     _, X_MC = compute_calibration(config)
-    return X_MC if config.mount == "fixed" else world.flange_pose() @ X_MC
+    return X_MC if config.mount == "fixed" else world.get_flange_pose() @ X_MC
 
 
-def render(world: World, matrix: Array, X_WC: Pose, part: tuple[int, int, int, int], light: Light) -> Render:
-    """Render `part` (left, top, right, bottom [pixel]) of a camera image at the resolution of the camera."""
-    left, top, right, bottom = part
+def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light) -> Render:
+    """Render a region of a camera image at full resolution."""
+    left, top, right, bottom = region
     width, height = right - left, bottom - top
-    # TinyRenderer samples a pixel at its lower left corner; a shift by half a pixel samples the centre.
-    sampled = (left + 0.5, top - 0.5, right + 0.5, bottom - 0.5)
-    _, _, rgba, buffer, segmentation = world.client.getCameraImage(
+    # TinyRenderer samples the lower left corner of a pixel; a shift by half a pixel samples the centre.
+    shifted = (left + 0.5, top - 0.5, right + 0.5, bottom - 0.5)
+    _, _, rgba, depth_buffer, segmentation = world.client.getCameraImage(
         width,
         height,
         compute_view_matrix(X_WC),
-        compute_projection_matrix(matrix, sampled),
+        compute_projection_matrix(matrix, shifted),
         lightDirection=light.direction,
         lightColor=light.colour,
         lightDistance=3.0,
@@ -111,39 +111,39 @@ def render(world: World, matrix: Array, X_WC: Pose, part: tuple[int, int, int, i
     return Render(
         np.ascontiguousarray(image),
         np.asarray(segmentation, dtype=np.int32).reshape(height, width),
-        np.asarray(buffer, dtype=np.float32).reshape(height, width),
+        np.asarray(depth_buffer, dtype=np.float32).reshape(height, width),
     )
 
 
 def add_noise(image: Image, noise: NoiseConfig, rng: np.random.Generator) -> Image:
-    """Return the image with a random brightness factor and read noise at each pixel."""
+    """Return the image with a random brightness factor for all pixels and read noise at each pixel."""
     gain = rng.normal(1.0, noise.gain)
-    read = rng.standard_normal(image.shape, dtype=np.float32) * np.float32(noise.read)
-    return np.asarray(np.clip(image * np.float32(gain) + read + 0.5, 0, 255).astype(np.uint8))
+    read_noise = rng.standard_normal(image.shape, dtype=np.float32) * np.float32(noise.read)
+    return np.asarray(np.clip(image * np.float32(gain) + read_noise + 0.5, 0, 255).astype(np.uint8))
 
 
-def add_depth_noise(true: Array, config: DepthConfig, rng: np.random.Generator) -> Array:
-    """Return measurements of distances `(H, W)` [m], NaN at pixels without a measurement.
+def add_depth_noise(depth: Array, config: DepthConfig, rng: np.random.Generator) -> Array:
+    """Return noisy measurements of a depth image `(H, W)` [m], NaN at pixels without a measurement.
 
-    The noise of neighbours is correlated, because stereo matching compares windows. Beside an edge a surface
-    is often visible to only one of the two cameras of the sensor, so measurements are often missing.
+    The noise of neighbouring pixels is correlated, because stereo matching compares windows. Beside an edge a
+    surface is often visible to only one of the two cameras of the sensor, so measurements are often missing.
     """
-    noise = rng.standard_normal(true.shape)
+    noise = rng.standard_normal(depth.shape)
     if config.grain:
-        # The blur reduces the standard deviation; the division restores it to 1.
+        # The blur reduces the standard deviation, and the division restores the value 1.
         noise = np.asarray(cv2.GaussianBlur(noise, (0, 0), config.grain), dtype=np.float64)
         noise /= noise.std()
-    seen = np.where(np.isfinite(true), true, np.nan)
-    measured = seen + noise * (config.floor + config.growth * seen**2)
+    finite = np.where(np.isfinite(depth), depth, np.nan)
+    measured = finite + noise * (config.floor + config.growth * finite**2)
     if config.step:
         measured = np.round(measured / config.step) * config.step
-    lost = rng.random(true.shape) < np.where(_find_edges(true, config), config.edge_dropout, config.dropout)
-    return np.where(lost, np.nan, measured)
+    dropout = np.where(_compute_edge_mask(depth, config), config.edge_dropout, config.dropout)
+    return np.where(rng.random(depth.shape) < dropout, np.nan, measured)
 
 
-def _find_edges(true: Array, config: DepthConfig) -> Mask:
-    """Return the mask `(H, W)` of pixels near a depth discontinuity."""
-    finite = np.where(np.isfinite(true), true, FAR).astype(np.float32)
+def _compute_edge_mask(depth: Array, config: DepthConfig) -> Mask:
+    """Return the mask `(H, W)` of the pixels near a discontinuity of the depth."""
+    finite = np.where(np.isfinite(depth), depth, FAR).astype(np.float32)
     kernel = np.ones((3, 3), np.uint8)
     edges = (cv2.dilate(finite, kernel) - cv2.erode(finite, kernel) > config.edge).astype(np.uint8)
     width = 2 * config.edge_width + 1
@@ -151,9 +151,10 @@ def _find_edges(true: Array, config: DepthConfig) -> Mask:
 
 
 class SimCamera(MountedCamera):
-    """A camera of the simulated world; satisfies `executive.cell.protocols.Camera`.
+    """A camera of the simulated world; implements `executive.cell.protocols.Camera`.
 
-    The noise of frame n depends only on the seed and n; a depth sensor does not change the noise of images.
+    The noise of a frame depends only on the seed and on the number of the frame. The image noise does not
+    depend on whether the camera has a depth sensor.
     """
 
     def __init__(
@@ -164,61 +165,63 @@ class SimCamera(MountedCamera):
         clock: Clock,
         seed: int,
         *,
-        shadow: ArmShadow | None = None,
+        occlusion: ArmOcclusion | None = None,
         epoch: Callable[[], int] = lambda: 0,
         light: Light = CELL_LIGHT,
-        true: CameraConfig | None = None,
+        true_config: CameraConfig | None = None,
         bins: Sequence[Bin] = (),
     ) -> None:
-        """Mount the camera.
+        """Create the camera.
 
         Args:
             world: The observed world.
             name: Name of the camera in the cell file.
             config: Section of the camera in the cell file.
-            clock: Clock for the time of the frames.
+            clock: Clock for the time stamps of the frames.
             seed: Seed of the noise.
-            shadow: Occlusion by the arm; by default the arm hides nothing, and the table is always visible.
-            epoch: Returns the ledger's count of changes of the table.
+            occlusion: Occlusion by the arm; None: nothing is occluded, and the table is always visible.
+            epoch: Returns how many times the ledger has been informed of a change on the table.
             light: Light of the scene.
-            true: True pose, lens and noise of the images if they differ from `config`. Frames carry the
-                matrix and the pose of `config`.
+            true_config: Pose, lens and noise with which images are rendered if they differ from `config`.
+                The frames contain the matrix and the pose of `config`.
             bins: Bins whose positions in a frame show a displacement of the camera.
         """
-        super().__init__(name, config, world.flange_pose, clock, epoch)
-        self._true = true or config
+        super().__init__(name, config, world.get_flange_pose, clock, epoch)
+        self._true_config = true_config or config
         self._world = world
         self._seed = seed
-        self._shadow = shadow
+        self._occlusion = occlusion
         self._light = light
         self._bins = bins
 
     def sees_table(self) -> bool:
-        """Return True if the whole workspace is visible now, not hidden by the arm."""
-        return self._shadow is None or self._shadow.sees_table(self.matrix, self._pose(), self._size)
+        """Return True if the whole workspace is in the image now and not occluded by the arm."""
+        occlusion = self._occlusion
+        return occlusion is None or occlusion.is_table_visible(self.matrix, self._pose(), self._size)
 
     def describe_displacement(self, frame: Frame) -> str:
-        """Return a text with the displacement of the camera from its declared pose in a frame; "" if none."""
+        """Return a message about the displacement of the camera in a frame from its declared pose, or ""."""
         return describe_displacement(frame, self._bins)
 
     @property
     def _size(self) -> tuple[int, int]:
         return self.config.width, self.config.height
 
-    def _true_view(self) -> tuple[Array, Pose]:
-        """Return the true camera matrix and the true pose `X_WC`."""
-        return compute_calibration(self._true)[0], camera_pose(self._world, self._true)
+    def _get_true_view(self) -> tuple[Array, Pose]:
+        """Return the camera matrix and the pose `X_WC` with which images are rendered."""
+        return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)
 
     def _capture_images(self) -> tuple[Image, Array | None]:
-        """Return the image and, with a depth sensor, the depth of the current frame."""
-        clean = render(self._world, *self._true_view(), (0, 0, *self._size), self._light)
-        image = add_noise(clean.image, self._true.noise, np.random.default_rng([self._seed, self._frames]))
+        """Return the colour image and the depth image of the current frame; None without a depth sensor."""
+        rendered = render(self._world, *self._get_true_view(), (0, 0, *self._size), self._light)
+        rng = np.random.default_rng([self._seed, self._frames])
+        image = add_noise(rendered.image, self._true_config.noise, rng)
         if self.config.depth is None:
             return image, None
-        rng = np.random.default_rng([self._seed, self._frames, DEPTH_STREAM])
-        return image, add_depth_noise(clean.depth, self.config.depth, rng)
+        rng = np.random.default_rng([self._seed, self._frames, DEPTH_SEED])
+        return image, add_depth_noise(rendered.depth, self.config.depth, rng)
 
     def _compute_visibility_mask(self, X_WC: Pose) -> Mask:
-        if self._shadow is None:
+        if self._occlusion is None:
             return np.ones(self._size[::-1], np.bool_)
-        return self._shadow.visible(self.matrix, X_WC, self._size)
+        return self._occlusion.compute_visibility_mask(self.matrix, X_WC, self._size)

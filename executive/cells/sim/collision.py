@@ -1,10 +1,11 @@
-"""Collision check of a planned path: clearance of arm, tool and load from the cell.
+"""Collision check of a planned path: clearance of arm, tool and load from the cell and from the arm itself.
 
-The check has a world of its own, because moving the arm of the running world would disturb its physics.
+The check uses a separate world, because moving the arm of the running world would disturb its physics.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,120 +22,133 @@ from executive.errors import Blocked
 from executive.geometry import Array, Pose
 
 ROUNDING_ERROR = 1e-5
-"""Largest rounding error of a distance [m]."""
+"""Maximum rounding error of a distance [m]."""
 PARKING_POSITION = (0.0, 0.0, 50.0)
-"""Position of unused bodies [m]."""
+"""Position of currently unused bodies, far from the arm [m]."""
 
 
 class ClosestApproach(NamedTuple):
-    """Distance of a part of the robot from a body of the cell, and the smallest allowed one [m]."""
+    """Distance between a part of the robot and a body, negative for a penetration, and its minimum [m]."""
 
     part: str
     body: str
     distance: float
-    allowed: float
+    min_distance: float
+
+    @property
+    def clearance(self) -> float:
+        """Distance beyond the minimum distance [m], negative for a violation."""
+        return self.distance - self.min_distance
 
     def __str__(self) -> str:
         relation = f"{self.distance:.3f} m from" if self.distance >= 0 else f"{-self.distance:.3f} m into"
         return f"{self.part} {relation} {self.body}"
 
 
-class PathClearance:
+class ClearanceChecker:
     """Checks paths of the arm for collisions with table, bins, obstacles and the arm itself.
 
     A motion may begin closer than the margin to a body (after a stop, or with a held object on the table),
-    but must never come closer than that. A held object is modelled as an upright cylinder under the tool; it
-    may touch the table and the floor of a bin, where it is picked and placed.
+    but must not come closer to this body. A held object is modelled as an upright cylinder under the tool,
+    which may touch the table and the floor of a bin.
 
     Attributes:
-        world: World of the check; its arm is at the joint positions of the last check.
+        world: World of the check, whose arm is at the last checked joint positions.
     """
 
     def __init__(self, config: CellConfig) -> None:
         self.world = World(config, visuals=False)
         self._margin = config.motion.margin
-        self._held: dict[ObjectClass, int] = {}
+        self._loads: dict[ObjectClass, int] = {}
+        """Body that models a held object of each class."""
         self._cylinders: dict[tuple[float, float], list[int]] = {}
+        """Bodies for obstacles by radius and height [m]."""
         self._obstacles: dict[str, tuple[int, ...]] = {}
+        """Bodies of the current obstacles, by name."""
 
     def check(self, path: Array, task: Task = Task()) -> None:
         """Check that the joint positions along a path `(N, n)` [rad] keep the margin of the cell file.
 
         Raises:
-            Blocked: The path violates the margin; the text states both bodies, the distance and the place.
+            Blocked: The path violates the margin; the message states bodies, distance and tool position.
         """
         with self._place_obstacles(task.around):
-            self._check(path, task.load)
+            self._check_path(path, task.load)
 
-    def _check(self, path: Array, carrying: Load | None) -> None:
-        # A pair within the margin at the start may stay at that distance until it has left the margin once.
-        exempt = self._find_nearest(path[0], carrying)
+    def _check_path(self, path: Array, load: Load | None) -> None:
+        # A pair within the margin at the start may stay at its distance until it has left the margin once.
+        exempt = self._find_closest_approaches(path[0], load)
         for q in path[1:]:
-            nearest = self._find_nearest(q, carrying)
-            for pair, near in nearest.items():
-                allowed = min(near.allowed, exempt[pair].distance) if pair in exempt else near.allowed
-                if near.distance < allowed - ROUNDING_ERROR:
-                    raise Blocked(self._describe(near))
-            exempt = {pair: near for pair, near in exempt.items() if pair in nearest}
+            approaches = self._find_closest_approaches(q, load)
+            for pair, approach in approaches.items():
+                start_distance = exempt[pair].distance if pair in exempt else math.inf
+                if approach.distance < min(approach.min_distance, start_distance) - ROUNDING_ERROR:
+                    raise Blocked(self._describe_violation(approach))
+            exempt = {pair: approach for pair, approach in exempt.items() if pair in approaches}
 
-    def _find_nearest(self, q: Array, carrying: Load | None) -> dict[tuple[str, str], ClosestApproach]:
-        """Return the closest approach of every pair within the margin at `q` `(n,)` [rad]."""
-        found: dict[tuple[str, str], ClosestApproach] = {}
-        for near in self._find_near(q, carrying):
-            pair = near.part, near.body
-            if pair not in found or near.distance - near.allowed < found[pair].distance - found[pair].allowed:
-                found[pair] = near
-        return found
+    def _find_closest_approaches(self, q: Array, load: Load | None) -> dict[tuple[str, str], ClosestApproach]:
+        """Return the closest approach of each part and body within the margin at `q` `(n,)` [rad]."""
+        closest: dict[tuple[str, str], ClosestApproach] = {}
+        for approach in self._find_approaches(q, load):
+            pair = approach.part, approach.body
+            if pair not in closest or approach.clearance < closest[pair].clearance:
+                closest[pair] = approach
+        return closest
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
-        """Return the closest approach of an empty arm at `q` `(n,)` [rad] within the margin, or None."""
-        nearest = min(self._find_near(q, None), key=lambda near: near.distance, default=None)
-        return nearest if nearest and nearest.distance < nearest.allowed - ROUNDING_ERROR else None
+        """Return the closest approach of the arm without a load that violates the margin, or None.
+
+        Args:
+            q: Joint positions `(n,)` [rad].
+        """
+        closest = min(self._find_approaches(q, None), key=lambda approach: approach.distance, default=None)
+        return closest if closest and closest.distance < closest.min_distance - ROUNDING_ERROR else None
 
     def close(self) -> None:
         """Close the world of the check."""
         self.world.close()
 
-    def _describe(self, near: ClosestApproach) -> str:
-        x, y, z = self.world.tool_pose().position
+    def _describe_violation(self, approach: ClosestApproach) -> str:
+        x, y, z = self.world.get_tool_pose().position
         return (
-            f"the motion would bring {near}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
+            f"the motion would bring {approach}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m; "
             f"{self._margin:.3f} m must stay free"
         )
 
-    def _find_near(self, q: Array, carrying: Load | None) -> Iterator[ClosestApproach]:
-        """Yield the approaches within the margin at `q` `(n,)` [rad]."""
+    def _find_approaches(self, q: Array, load: Load | None) -> Iterator[ClosestApproach]:
+        """Yield the approaches of arm, tool and load within the margin at `q` `(n,)` [rad]."""
         client, arm = self.world.client, self.world.arm
-        near = client.getClosestPoints  # looked up once, because a look-up takes as long as a call
+        get_points = client.getClosestPoints  # looked up once, because a look-up takes as long as a call
         client.resetJointStatesMultiDof(arm, range(len(q)), [[angle] for angle in q])
         bodies = {"the table": (self.world.table,), **self.world.bins, **self._obstacles}
         for name, parts in bodies.items():
             for body in parts:
-                for point in near(arm, body, self._margin):
+                for point in get_points(arm, body, self._margin):
                     if point[3] >= self.world.robot.first_moving_link:
                         yield ClosestApproach(self.world.name_link(point[3]), name, point[8], self._margin)
-        for one, other in self.world.robot.self_pairs:
-            for point in near(arm, arm, self._margin, linkIndexA=one, linkIndexB=other):
+        for one, other in self.world.robot.self_collision_pairs:
+            for point in get_points(arm, arm, self._margin, linkIndexA=one, linkIndexB=other):
                 yield ClosestApproach(
                     self.world.name_link(one), self.world.name_link(other), point[8], self._margin
                 )
-        if carrying is not None:
-            yield from self._find_near_held(carrying.kind, bodies)
+        if load is not None:
+            yield from self._find_load_approaches(load.kind, bodies)
 
-    def _find_near_held(
-        self, carrying: ObjectClass, bodies: Mapping[str, tuple[int, ...]]
+    def _find_load_approaches(
+        self, load: ObjectClass, bodies: Mapping[str, tuple[int, ...]]
     ) -> Iterator[ClosestApproach]:
-        held, near = self._find_cylinder(carrying), self.world.client.getClosestPoints
-        X_WH = self.world.tool_pose() @ Pose.of([0, 0, carrying.height / 2])
+        """Yield the approaches of the load to `bodies` and to the arm within the margin."""
+        held, get_points = self._get_load_body(load), self.world.client.getClosestPoints
+        X_WH = self.world.get_tool_pose() @ Pose.of([0, 0, load.height / 2])
         self.world.client.resetBasePositionAndOrientation(held, X_WH.position, X_WH.quaternion)
-        part = name_held(carrying.label)
+        part = name_held(load.label)
         for name, parts in bodies.items():
             for body in parts:
-                for point in near(held, body, self._margin):
-                    floor = self._find_height(name) + BIN_THICKNESS
-                    touchable = point[6][2] <= floor + 0.001 and name not in self._obstacles
-                    yield ClosestApproach(part, name, point[8], 0.0 if touchable else self._margin)
-        for point in near(held, self.world.arm, self._margin):
+                for point in get_points(held, body, self._margin):
+                    floor = self._get_base_height(name) + BIN_THICKNESS
+                    may_touch = point[6][2] <= floor + 0.001 and name not in self._obstacles
+                    yield ClosestApproach(part, name, point[8], 0.0 if may_touch else self._margin)
+        for point in get_points(held, self.world.arm, self._margin):
             if self.world.robot.first_moving_link <= point[4] < self.world.robot.wrist_link:
                 yield ClosestApproach(part, self.world.name_link(point[4]), point[8], self._margin)
         self.world.client.resetBasePositionAndOrientation(held, PARKING_POSITION, [0, 0, 0, 1])
@@ -142,15 +156,15 @@ class PathClearance:
     @contextmanager
     def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> Iterator[None]:
         """Put the obstacles into the world as cylinders on the table until the context ends."""
-        client, used = self.world.client, Counter[tuple[float, float]]()
+        client, used_counts = self.world.client, Counter[tuple[float, float]]()
         for obstacle in obstacles:
             size = round(obstacle.radius, 4), round(obstacle.top, 4)
             bodies = self._cylinders.setdefault(size, [])
-            if len(bodies) == used[size]:
+            if len(bodies) == used_counts[size]:
                 shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=size[0], height=size[1])
                 bodies.append(int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION)))
-            body = bodies[used[size]]
-            used[size] += 1
+            body = bodies[used_counts[size]]
+            used_counts[size] += 1
             client.resetBasePositionAndOrientation(
                 body, [obstacle.x, obstacle.y, obstacle.top / 2], [0, 0, 0, 1]
             )
@@ -163,17 +177,15 @@ class PathClearance:
                     client.resetBasePositionAndOrientation(body, PARKING_POSITION, [0, 0, 0, 1])
             self._obstacles = {}
 
-    def _find_height(self, body: str) -> float:
-        """Return the height [m] of a bin by its name, 0 for other bodies."""
-        bin = self.world.config.bins.get(body)
+    def _get_base_height(self, name: str) -> float:
+        """Return the height of the base of a bin above the table [m]; 0 for a body that is no bin."""
+        bin = self.world.config.bins.get(name)
         return bin.position[2] if bin else 0.0
 
-    def _find_cylinder(self, carrying: ObjectClass) -> int:
-        """Return the body that models a held object."""
-        if carrying not in self._held:
-            client = self.world.client
-            shape = client.createCollisionShape(
-                pybullet.GEOM_CYLINDER, radius=carrying.radius + carrying.ring, height=carrying.height
-            )
-            self._held[carrying] = int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION))
-        return self._held[carrying]
+    def _get_load_body(self, load: ObjectClass) -> int:
+        """Return the body that models a held object of a class, created at the first call."""
+        if load not in self._loads:
+            client, radius = self.world.client, load.radius + load.ring
+            shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=load.height)
+            self._loads[load] = int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION))
+        return self._loads[load]

@@ -8,51 +8,54 @@ from executive.cells.sim.tool import LIP_LENGTH
 from executive.cells.sim.world import World, name_held
 
 MIN_CONTACT_FORCE = 2.0
-"""Smallest force of a detected contact [N]; an assumption for joint torque sensors."""
-SEPARATION_STEPS = 12
-"""Steps without contact after which two bodies count as separated; a lifted load may touch again earlier."""
+"""Minimum force of a detected contact [N], an assumption for joint torque sensors."""
+SEPARATION_STEP_COUNT = 12
+"""Number of steps without contact after which two bodies count as separated; a lifted load may bounce."""
 
 
 class Contacts:
-    """Contacts of arm, tool and load that began during the motion.
+    """Contacts of arm, tool and load with other bodies that began during the running motion.
 
     Args:
         world: The world.
-        held: Returns the body at the tool, or None.
+        get_held_body: Returns the body that the tool holds, or None.
     """
 
-    def __init__(self, world: World, held: Callable[[], int | None]) -> None:
+    def __init__(self, world: World, get_held_body: Callable[[], int | None]) -> None:
         self._world = world
-        self._held = held
-        self._known: dict[tuple[str, int], int] = {}
+        self._get_held_body = get_held_body
+        self._last_steps: dict[tuple[str, int], int] = {}
+        """Step of the last contact of each ignored pair of a robot part and a body."""
 
     def reset(self) -> None:
-        """Ignore the present contacts until the bodies separate."""
-        self._known = {(part, body): self._world.steps for part, body, _, _ in self._contacts()}
+        """Ignore each pair of bodies that is in contact now until the two bodies separate."""
+        self._last_steps = {(part, body): self._world.steps for part, body, _, _ in self._iterate_contacts()}
 
-    def find_new(self, lip_may_touch: bool) -> str | None:
-        """Return the text of a new contact, or None; called once per step.
+    def describe_new_contact(self, lip_may_touch: bool) -> str | None:
+        """Return the description of a new contact, or None; called once per step.
 
-        `lip_may_touch`: True if contacts of the lip of the cup are expected.
+        Args:
+            lip_may_touch: True to ignore contacts of the lip of the cup.
         """
-        now = self._world.steps
-        self._known = {pair: step for pair, step in self._known.items() if now - step <= SEPARATION_STEPS}
-        for part, body, place, force in self._contacts():
-            if (part, body) in self._known:
-                self._known[part, body] = now
-            elif force > MIN_CONTACT_FORCE and not (lip_may_touch and self._is_lip(part, place)):
-                x, y, z = self._world.tool_pose().position
+        now, last_steps = self._world.steps, self._last_steps
+        self._last_steps = {p: step for p, step in last_steps.items() if now - step <= SEPARATION_STEP_COUNT}
+        for part, body, position, force in self._iterate_contacts():
+            if (part, body) in self._last_steps:
+                self._last_steps[part, body] = now
+            elif force > MIN_CONTACT_FORCE and not (lip_may_touch and self._is_lip(part, position)):
+                x, y, z = self._world.get_tool_pose().position
                 name = self._world.name_body(body)
                 return f"{part} ran into {name}, with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
         return None
 
-    def _is_lip(self, part: str, place: Sequence[float]) -> bool:
+    def _is_lip(self, part: str, position: Sequence[float]) -> bool:
         """Return True if a point in the world [m] on a part of the robot is on the lip of the cup."""
-        return bool(part == "the tool" and self._world.tool_pose().inverse().apply(place)[2] > -LIP_LENGTH)
+        is_tool = part == "the tool"
+        return is_tool and bool(self._world.get_tool_pose().inverse().apply(position)[2] > -LIP_LENGTH)
 
-    def _contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
+    def _iterate_contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
         """Yield part of the robot, touched body, contact point [m] and normal force [N] of each contact."""
-        world, held = self._world, self._held()
+        world, held = self._world, self._get_held_body()
         for point in world.client.getContactPoints(bodyA=world.arm) or ():
             if point[2] != held:
                 yield world.name_link(point[3]), point[2], point[5], point[9]

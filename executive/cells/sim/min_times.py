@@ -1,4 +1,4 @@
-"""Minimum times in a simulated cell, from joint limits and inverse kinematics."""
+"""Minimum times of descent, transport and detection in a simulated cell, from the limits of the joints."""
 
 from __future__ import annotations
 
@@ -13,58 +13,66 @@ from executive.geometry import Array, tool_down
 from executive.motion.arms import build_kinematics
 from executive.motion.limits import JointLimits, compute_min_time
 
-ANGLE_SPACING = np.radians(20.0)
-"""Step between sampled redundancy angles [rad]."""
+REDUNDANCY_ANGLE_STEP = np.radians(20.0)
+"""Difference between neighbouring samples of the redundancy angle [rad]."""
 SAFETY_FACTOR = 0.8
-"""Share of the minimum time found for a carry; other branches and heights may take less time."""
+"""Factor on the computed transport time, because other joint configurations and heights may be faster."""
 
 
 class SimMinTimes(CellMinTimes):
     """Lower bounds of motion times for any planner; implements `executive.cell.protocols.MinTimes`.
 
-    A carry begins at rest on an object and ends at rest over the bin. On any path, each joint needs at least
-    the time of its rest-to-rest motion. The bound is the minimum over all branches; the last joint need
-    not turn, because the yaw is arbitrary.
+    A transport begins at rest on an object and ends at rest over the bin. On any path, each joint needs at
+    least the time of a rest-to-rest motion of this joint. The bound is the minimum over all pairs of joint
+    configurations; the last joint is ignored, because the yaw of the tool is arbitrary.
 
     Args:
         config: The cell file.
     """
 
     def __init__(self, config: CellConfig) -> None:
-        self._highest = compute_max_pile_height(config)
-        lowest = min(kind.height for kind in config.objects.values())
-        super().__init__(config, TOUCH_DISTANCE, self._highest - lowest)
+        self._pile_height = compute_max_pile_height(config)
+        min_height = min(kind.height for kind in config.objects.values())
+        super().__init__(config, TOUCH_DISTANCE, self._pile_height - min_height)
         self._limits = JointLimits.from_config(config.arm.limits)
         self._kinematics = build_kinematics(config)
-        self._carries: dict[str, float] = {}
+        self._transport_times: dict[str, float] = {}
 
     def _compute_min_transport_time(self, bin: str) -> float:
-        if bin not in self._carries:
+        if bin not in self._transport_times:
             slots = build_bin(bin, self._config.bins[bin]).slots
             low, high = np.transpose([self._config.table.x, self._config.table.y])
-            places = np.clip(slots, low, high), np.broadcast_to(self._config.safe_place[:2], slots.shape)
+            safe_place = np.broadcast_to(self._config.safe_place[:2], slots.shape)
+            starts = np.clip(slots, low, high), safe_place
             try:
-                self._carries[bin] = SAFETY_FACTOR * min(self._min_time(place, slots) for place in places)
+                times = [self._compute_min_time(start, slots) for start in starts]
+                self._transport_times[bin] = SAFETY_FACTOR * min(times)
             except Unreachable:
-                self._carries[bin] = 0.0
-        return self._carries[bin]
+                self._transport_times[bin] = 0.0
+        return self._transport_times[bin]
 
-    def _min_time(self, places: Array, slots: Array) -> float:
-        """Return the minimum time [s] for the nearest pair of `places` `(N, 2)` and `slots` `(N, 2)` [m]."""
-        nearest = np.argmin(np.linalg.norm(places - slots, axis=1))
-        starts, ends = (self._solve_postures(points[nearest], self._highest) for points in (places, slots))
+    def _compute_min_time(self, positions: Array, slots: Array) -> float:
+        """Return the minimum time [s] from a position to its slot, both in the same row of `(N, 2)` [m].
+
+        The row is that with the smallest distance.
+        """
+        nearest = np.argmin(np.linalg.norm(positions - slots, axis=1))
+        starts, ends = (self._solve_configurations(points[nearest]) for points in (positions, slots))
         return float(compute_min_time(ends - starts[:, None], self._limits).min())
 
-    def _solve_postures(self, place: Array, height: float) -> Array:
-        """Return joint positions `(N, n)` [rad] with the tool at a place `(2,)` [m], the last joint at 0.
+    def _solve_configurations(self, position: Array) -> Array:
+        """Return joint configurations `(N, n)` [rad] with the tool over a position `(2,)` [m].
+
+        The last joint is at 0, and the tool is as high as the highest pile of objects.
 
         Raises:
-            Unreachable: No joint positions are within the limits.
+            Unreachable: No joint configuration is within the limits.
         """
-        pose = tool_down(np.array([*place, height]))
-        found = self._kinematics.solve_all(pose, np.zeros(self._limits.joint_count), ANGLE_SPACING).qs
-        found[:, -1] = 0.0
-        inside = found[self._limits.position.contains(found)]
-        if not len(inside):
+        pose = tool_down(np.array([*position, self._pile_height]))
+        start = np.zeros(self._limits.joint_count)
+        qs = self._kinematics.solve_all(pose, start, REDUNDANCY_ANGLE_STEP).qs
+        qs[:, -1] = 0.0
+        allowed = qs[self._limits.position.contains(qs)]
+        if not len(allowed):
             raise Unreachable("no configuration of the arm is inside its joint limits")
-        return inside
+        return allowed

@@ -1,4 +1,4 @@
-"""Files of models: URDF and Wavefront meshes, checked before PyBullet opens them."""
+"""Model files: URDF and Wavefront meshes, which are checked before PyBullet opens them."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from executive.errors import InputError
 from executive.geometry import Array
 
 MAX_MODEL_SIZE = 20_000_000
-"""Largest size of a model file [byte]: larger ones take longer to check than a mission should."""
-MAX_TRIANGLES = 20_000
-"""Largest number of triangles of a mesh: PyBullet takes 3 s to collide with 20,000, and 60 s with 300,000."""
+"""Maximum size of a model file [byte], which limits the duration of the check."""
+MAX_TRIANGLE_COUNT = 20_000
+"""Maximum number of triangles of a mesh: a collision takes PyBullet 3 s with 20,000, 60 s with 300,000."""
 
 
 def find_model(name: str) -> Path:
-    """Return the path of a model: a full path as it is, any other name as one of pybullet_data's.
+    """Return the path of a model file, for an absolute path or a path in the folder of pybullet_data.
 
     Raises:
-        InputError: There is no such file.
+        InputError: There is no such file, or the file is larger than `MAX_MODEL_SIZE`.
     """
     path = os.path.join(pybullet_data.getDataPath(), name)
-    # Path.is_file raises an error for names that no file can have; os.path.isfile returns False.
+    # For an invalid file name, Path.is_file raises an error, but os.path.isfile returns False.
     if os.path.isfile(path):
         if os.path.getsize(path) > MAX_MODEL_SIZE:
             raise InputError(f"the model {name} is larger than {MAX_MODEL_SIZE // 1_000_000} MB")
@@ -37,10 +37,10 @@ def find_model(name: str) -> Path:
 
 
 def read_urdf(path: Path) -> ElementTree.Element:
-    """Return the root of an object's URDF.
+    """Return the root element of the URDF of an object.
 
     Raises:
-        InputError: The file is no URDF, or it names a mesh that is no file in its folder.
+        InputError: The file is no URDF, refers to a file outside of its folder, or has an invalid mesh.
     """
     try:
         root = ElementTree.parse(path).getroot()
@@ -59,14 +59,16 @@ def read_urdf(path: Path) -> ElementTree.Element:
 
 
 def find_mesh(urdf: Path, mesh: ElementTree.Element) -> Path:
-    """Return the path of a mesh that a URDF names.
+    """Return the path of the mesh file of a `mesh` element of a URDF.
 
     Raises:
         InputError: The mesh is no file in the folder of the URDF, is too large, or has too many triangles.
     """
     path = find_model(str(urdf.parent / _check_name(urdf, mesh.get("filename", ""))))
-    if _count_triangles(path) > MAX_TRIANGLES:
-        raise InputError(f"the model {path.name} has more than {MAX_TRIANGLES} triangles; simplify the mesh")
+    if _count_triangles(path) > MAX_TRIANGLE_COUNT:
+        raise InputError(
+            f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles; simplify the mesh"
+        )
     return path
 
 
@@ -83,24 +85,24 @@ def _check_name(urdf: Path, name: str) -> str:
 
 
 def _count_triangles(path: Path) -> int:
-    """Return the number of triangles of a mesh in Wavefront or STL format, and 0 for other formats."""
+    """Return the number of triangles of a mesh in Wavefront or STL format, or 0 for another format."""
     try:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"the model {path.name} cannot be read: {error.strerror}") from error
     if path.suffix.lower() == ".stl":
-        # A binary file states the number after 80 bytes, and has 50 bytes for each triangle.
-        number = int.from_bytes(content[80:84], "little")
-        return number if len(content) == 84 + 50 * number else content.count(b"endfacet")
-    words = (line.split() for line in content.splitlines())
-    return sum(len(face) - 3 for face in words if face[:1] == [b"f"])
+        # A binary STL file has a header of 80 bytes, the number of triangles, and 50 bytes for each triangle.
+        count = int.from_bytes(content[80:84], "little")
+        return count if len(content) == 84 + 50 * count else content.count(b"endfacet")
+    lines = (line.split() for line in content.splitlines())
+    return sum(len(words) - 3 for words in lines if words[:1] == [b"f"])
 
 
 def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
-    """Return vertices `(N, 3)` and triangles `(M, 3)` of a Wavefront file; polygons are cut into fans.
+    """Return vertices `(N, 3)` and triangles `(M, 3)` of a Wavefront file; polygons are split into triangles.
 
     Raises:
-        InputError: It holds no mesh.
+        InputError: The file contains no valid mesh.
     """
     vertices: list[list[float]] = []
     triangles: list[tuple[int, int, int]] = []
@@ -110,12 +112,12 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
             if key == "v":
                 vertices.append([float(value) for value in values[:3]])
             elif key == "f":
-                corners = [int(value.split("/")[0]) for value in values]
-                corners = [i - 1 if i > 0 else len(vertices) + i for i in corners]
-                triangles += [(corners[0], a, b) for a, b in pairwise(corners[1:])]
-        if len(triangles) > MAX_TRIANGLES:
+                numbers = [int(value.split("/")[0]) for value in values]
+                indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
+                triangles += [(indices[0], a, b) for a, b in pairwise(indices[1:])]
+        if len(triangles) > MAX_TRIANGLE_COUNT:
             raise InputError(
-                f"the model {path.name} has more than {MAX_TRIANGLES} triangles; simplify the mesh"
+                f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles; simplify the mesh"
             )
         faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
         return _check_mesh(np.array(vertices, dtype=float), faces)
@@ -124,10 +126,10 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
 
 
 def read_numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the numbers in an attribute of a URDF.
+    """Return the numbers in the text of a URDF attribute, or `default` if the attribute is missing.
 
     Raises:
-        InputError: They are no numbers, not finite, or not as many as in `default`.
+        InputError: The text does not contain as many finite numbers as `default`.
     """
     if text is None:
         return default
@@ -141,10 +143,10 @@ def read_numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, .
 
 
 def _check_mesh(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    """Return vertices and triangles if they are a mesh.
+    """Return vertices `(N, 3)` and triangles `(M, 3)` unchanged.
 
     Raises:
-        ValueError: They are no mesh.
+        ValueError: Vertices and triangles are no valid mesh.
     """
     if not triangles.size:
         raise ValueError("it has no faces (lines beginning with f)")

@@ -1,4 +1,4 @@
-"""Models of objects: visual mesh, body in the simulator, mass, and check of the declared size."""
+"""Models of objects: visual mesh, body in PyBullet, mass, and check of the declared size."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose
 
 SIZE_TOLERANCE = 0.003
-"""Largest difference between a size in a cell file and the size of the model [m]."""
-FRICTION = 0.0005
-"""Coefficient of rolling and spinning friction, without which balls creep at rest and never stop."""
+"""Maximum difference between a size in a cell file and the size of the model [m]."""
+ROLLING_FRICTION = 0.0005
+"""Coefficient of rolling and spinning friction; without it, balls would never come to rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh in the frame O of an upright object: z up, origin as in `upright`.
+    """A triangle mesh in the frame O of an upright object, which `compute_upright_pose` defines; z points up.
 
     Attributes:
-        vertices: `(N, 3)` [m].
-        triangles: `(M, 3)` indices into `vertices`.
+        vertices: Positions of the vertices `(N, 3)` [m].
+        triangles: Indices of the vertices of each triangle `(M, 3)`.
     """
 
     vertices: Array
@@ -40,19 +40,22 @@ class Mesh:
 
     @property
     def bottom(self) -> float:
-        """Height of the lowest vertex above the origin [m], negative below it."""
+        """Z coordinate of the lowest vertex [m]."""
         return float(self.vertices[:, 2].min())
 
     @property
     def top(self) -> float:
-        """Height of the highest vertex above the origin [m]."""
+        """Z coordinate of the highest vertex [m]."""
         return float(self.vertices[:, 2].max())
 
     @property
     def radius(self) -> float:
-        """Radius [m] of the circle around the outline from above, centred in the bounding box."""
-        outline = self.vertices[:, :2]
-        return float(np.linalg.norm(outline - (outline.min(axis=0) + outline.max(axis=0)) / 2, axis=1).max())
+        """Radius [m] of the circle that contains all vertices in the view from above.
+
+        The centre of the circle is the centre of the bounding box.
+        """
+        points = self.vertices[:, :2]
+        return float(np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max())
 
     @cached_property
     def centroid(self) -> Array:
@@ -64,25 +67,25 @@ class Mesh:
         return np.asarray(volumes @ (a + b + c) / 4 / volumes.sum())
 
     @cached_property
-    def convex(self) -> bool:
-        """True if no vertex is more than 0.1 mm outside of the plane of any triangle."""
+    def is_convex(self) -> bool:
+        """True if no vertex is more than 0.1 mm outside of the plane of a triangle."""
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         normals = np.cross(b - a, c - a)
         lengths = np.linalg.norm(normals, axis=1)
         normals, a = (normals / lengths[:, None].clip(1e-12))[lengths > 0], a[lengths > 0]
-        outside = self.vertices @ normals.T - (a * normals).sum(axis=1)
-        return bool(outside.max() < 1e-4)
+        distances = self.vertices @ normals.T - (a * normals).sum(axis=1)
+        return bool(distances.max() < 1e-4)
 
 
 def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
-    """Add an upright object at `X_WO` and return its body.
+    """Add an object with the frame O of the upright object at `X_WO`, and return the body.
 
     Raises:
-        InputError: The model is missing, or is no mesh.
+        InputError: The model is missing or invalid.
     """
-    X_WL = X_WO @ upright(config)
+    X_WL = X_WO @ compute_upright_pose(config)
     body = _add_mesh(client, config, X_WL) if config.mesh else _add_urdf(client, config, X_WL)
-    client.changeDynamics(body, -1, rollingFriction=FRICTION, spinningFriction=FRICTION)
+    client.changeDynamics(body, -1, rollingFriction=ROLLING_FRICTION, spinningFriction=ROLLING_FRICTION)
     return body
 
 
@@ -95,9 +98,12 @@ def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
 
 
 def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
-    """Add a mesh of uniform density; each group collides as its convex hull, enlarged by 1 mm."""
+    """Add a mesh of uniform density and return the body.
+
+    The collision shape of each group of the mesh is its convex hull, enlarged by 1 mm.
+    """
     shape = {"fileName": str(find_model(config.mesh)), "meshScale": [config.scale] * 3}
-    centre = upright(config).inverse().apply(load_mesh(config).centroid)
+    centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
     return int(
         client.createMultiBody(
             baseMass=config.mass,
@@ -105,12 +111,12 @@ def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
             baseVisualShapeIndex=client.createVisualShape(pybullet.GEOM_MESH, **shape),
             basePosition=X_WL.position,
             baseOrientation=X_WL.quaternion,
-            baseInertialFramePosition=centre,
+            baseInertialFramePosition=centroid,
         )
     )
 
 
-def mass_of(config: ObjectConfig) -> float:
+def compute_mass(config: ObjectConfig) -> float:
     """Return the mass of a simulated object [kg], from the cell file or its URDF."""
     if config.mesh:
         return config.mass
@@ -119,68 +125,69 @@ def mass_of(config: ObjectConfig) -> float:
 
 
 def object_class_with_mass(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return the object class of a section of a cell file, with the mass in simulation."""
-    return replace(build_object_class(label, config), mass=mass_of(config))
+    """Return the object class of a section of a cell file, with the mass of its simulated objects."""
+    return replace(build_object_class(label, config), mass=compute_mass(config))
 
 
 def find_missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and sentence for each model of a cell file that is missing or has another size."""
-    for label, kind in config.objects.items():
+    """Yield key and message for each model of a cell file that is missing, invalid, or of another size."""
+    for label, section in config.objects.items():
         key: KeyPath = ("objects", label)
         try:
-            if kind.mesh:
-                load_mesh(kind)
+            if section.mesh:
+                load_mesh(section)
             else:
-                mass_of(kind)
+                compute_mass(section)
         except InputError as error:
-            yield (*key, "mesh" if kind.mesh else "urdf"), str(error)
+            yield (*key, "mesh" if section.mesh else "urdf"), str(error)
         else:
-            yield from (((*key, name), sentence) for name, sentence in _find_wrong_sizes(label, kind))
+            yield from (((*key, name), message) for name, message in _find_wrong_sizes(label, section))
 
 
-def _find_wrong_sizes(label: str, kind: ObjectConfig) -> Iterator[tuple[str, str]]:
-    """Yield `height` or `radius`, with a sentence, for each declared size that differs from the model.
+def _find_wrong_sizes(label: str, section: ObjectConfig) -> Iterator[tuple[str, str]]:
+    """Yield `height` or `radius`, with a message, for each declared size that differs from the model.
 
-    Centre, surface and free space of an object follow from these sizes. A model without a mesh cannot be
-    measured.
+    The executive computes the centre, the top and the free space of an object from these sizes. The size of
+    a model without a Wavefront mesh is not checked.
     """
     try:
-        mesh = load_mesh(kind)
+        mesh = load_mesh(section)
     except InputError:
         return
     for name, actual in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
-        stated = getattr(kind, name)
-        if not abs(stated - actual) <= SIZE_TOLERANCE:  # True if the size is not a number
+        declared = getattr(section, name)
+        if not abs(declared - actual) <= SIZE_TOLERANCE:  # also True for NaN
             yield (
                 name,
-                f"the model of {label} has a {name} of {actual:.4f} m, not {stated:g} m; "
+                f"the model of {label} has a {name} of {actual:.4f} m, not {declared:g} m; "
                 "correct the figure, scale or upright_deg",
             )
 
 
 @lru_cache(maxsize=64)
-def upright(config: ObjectConfig) -> Pose:
+def compute_upright_pose(config: ObjectConfig) -> Pose:
     """Return `X_OL`, the pose of the frame L of the model file in the frame O of the upright object.
 
-    O has the origin of a URDF; for a mesh, whose origin is arbitrary, O is in the centre of the bounding box.
+    The origin of O is that of a URDF. For a mesh, whose origin is arbitrary, it is the centre of the bounding
+    box.
     """
-    rotated = Pose(_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
+    X_OL = Pose(_make_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
     if not config.mesh:
-        return rotated
-    corners = rotated.apply(read_obj(find_model(config.mesh))[0] * config.scale)
-    return Pose(rotated.rotation, -(corners.min(axis=0) + corners.max(axis=0)) / 2)
+        return X_OL
+    vertices = X_OL.apply(read_obj(find_model(config.mesh))[0] * config.scale)
+    return Pose(X_OL.rotation, -(vertices.min(axis=0) + vertices.max(axis=0)) / 2)
 
 
 @lru_cache(maxsize=64)
 def load_mesh(config: ObjectConfig) -> Mesh:
-    """Return the visual mesh of a class of objects, scaled and upright.
+    """Return the scaled visual mesh of a class of objects in the frame O of the upright object.
 
     Raises:
         InputError: The model has no visual mesh in Wavefront format.
     """
     if config.mesh:
-        corners, faces = read_obj(find_model(config.mesh))
-        return Mesh(upright(config).apply(corners * config.scale), faces)
+        points, faces = read_obj(find_model(config.mesh))
+        return Mesh(compute_upright_pose(config).apply(points * config.scale), faces)
     path = find_model(config.urdf)
     vertices: list[Array] = []
     triangles: list[NDArray[np.intp]] = []
@@ -188,21 +195,21 @@ def load_mesh(config: ObjectConfig) -> Mesh:
         mesh = visual.find("geometry/mesh")
         if mesh is None or not mesh.get("filename", "").endswith(".obj"):
             raise InputError(f"{path}: only visuals made of .obj meshes can be labelled")
-        corners, faces = read_obj(find_mesh(path, mesh))
+        points, faces = read_obj(find_mesh(path, mesh))
         scale = np.array(read_numbers(mesh.get("scale"), (1.0, 1.0, 1.0)))
         origin = visual.find("origin")
         rpy = read_numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0))
         xyz = read_numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0))
-        X_LV = Pose(_rotation(*rpy), np.array(xyz) * config.scale)
+        X_LV = Pose(_make_rotation(*rpy), np.array(xyz) * config.scale)
         triangles.append(faces + sum(map(len, vertices)))
-        vertices.append((upright(config) @ X_LV).apply(corners * scale * config.scale))
+        vertices.append((compute_upright_pose(config) @ X_LV).apply(points * scale * config.scale))
     if not vertices:
         raise InputError(f"the model {path.name} has no visual, so no camera would see it")
     return Mesh(np.concatenate(vertices), np.concatenate(triangles))
 
 
-def _rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation matrix of the fixed-axis angles of a URDF [rad]: about x, then y, then z."""
+def _make_rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation matrix for the angles in a URDF [rad]: about the fixed axes x, then y, then z."""
     (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
     about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
     about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])

@@ -1,4 +1,4 @@
-"""Checks of places and poses of a cell file: reach, clearance and view of the cameras."""
+"""Checks of a cell file: reach of bins and safe place, clearance of poses, and view of the cameras."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import find_unreachable_places
 from executive.cell.workcell import KeyPath
 from executive.cells.sim.arm import SimArm
-from executive.cells.sim.camera import camera_pose
-from executive.cells.sim.collision import PathClearance
-from executive.cells.sim.view import ArmShadow
+from executive.cells.sim.arm_occlusion import ArmOcclusion
+from executive.cells.sim.camera import get_camera_pose
+from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.world import World
 from executive.geometry import Array
 from executive.motion.arms import build_planner
 from executive.perception.camera_model import compute_calibration
 
 POINTS_PER_SIDE = 9
-"""Number of places along each side of the workspace where every camera must see an object."""
+"""Number of points along each side of the workspace at which every camera must see the flattest object."""
 
 
 def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and sentence for each place of the cell file that the tool cannot reach.
+    """Yield key and message for each place or named pose of the cell file that the arm cannot reach.
 
-    The tool must reach each drop slot of each bin and the safe place, from travel height down to the release
-    height in one posture; each named pose must be within the joint limits.
+    The tool must reach each slot of each bin and the safe place, from travel height down to the release
+    height in one inverse kinematics branch. Each named pose must be within the joint limits.
     """
     planner = build_planner(config)
-    load = max(kind.height for kind in config.objects.values())
+    max_height = max(kind.height for kind in config.objects.values())
 
-    def require(place: Array, floor: float) -> None:
-        planner.require_reachable(Goal((float(place[0]), float(place[1]), floor + load)))
+    def require_reachable(position: Array, floor: float) -> None:
+        planner.require_reachable(Goal((float(position[0]), float(position[1]), floor + max_height)))
 
     ranges = config.arm.limits.position_ranges_deg
     for name, pose in config.arm.poses_deg.items():
@@ -46,43 +46,45 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
                     ("arm", "poses_deg", name),
                     f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}',
                 )
-    yield from find_unreachable_places(config, require)
+    yield from find_unreachable_places(config, require_reachable)
 
 
-def find_unfit_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and sentence for each pose of the cell file without clearance or view.
+def find_unusable_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each pose of the cell file without clearance or view.
 
     In each named pose, arm and tool must keep the margin to table, bins and the arm itself, because otherwise
-    no motion reaches the pose. From each scan pose the camera must see the whole workspace.
+    no motion can end in the pose. From each scan pose the camera must see the whole workspace.
     """
-    with contextlib.closing(PathClearance(config)) as clearance:
+    with contextlib.closing(ClearanceChecker(config)) as checker:
         for name, pose in config.arm.poses_deg.items():
-            near = clearance.find_violation(np.radians(pose))
-            if near:
+            violation = checker.find_violation(np.radians(pose))
+            if violation:
                 yield (
                     ("arm", "poses_deg", name),
-                    f'the pose "{name}" brings {near}; {config.motion.margin:.3f} m must stay free',
+                    f'the pose "{name}" brings {violation}; {config.motion.margin:.3f} m must stay free',
                 )
-        yield from _find_blind_poses(config, clearance.world)
+        yield from _find_occluding_poses_and_bins(config, checker.world)
 
 
-def _find_blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and sentence for scan poses and bins that hide a part of the workspace from a camera."""
+def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each scan pose or bin that occludes a part of the workspace for a camera."""
     planner = build_planner(config)
-    shadow = ArmShadow(SimArm(world, planner, config, StepClock(lambda: 0.0)), planner.kinematics, config)
+    arm = SimArm(world, planner, config, StepClock(lambda: 0.0))
+    occlusion = ArmOcclusion(arm, planner.kinematics, config)
     for name, camera in config.cameras.items():
         matrix, _ = compute_calibration(camera)
         for index, pose in enumerate(camera.scan_poses):
             if pose not in config.arm.poses_deg:
                 continue
-            world.set_arm(np.radians(config.arm.poses_deg[pose]))
-            if not shadow.sees_table(matrix, camera_pose(world, camera), (camera.width, camera.height)):
+            world.set_joint_positions(np.radians(config.arm.poses_deg[pose]))
+            X_WC = get_camera_pose(world, camera)
+            if not occlusion.is_table_visible(matrix, X_WC, (camera.width, camera.height)):
                 yield (
                     ("cameras", name, "scan_poses", index),
                     f'from the pose "{pose}" the camera {name} does not see the whole workspace: a part '
                     "of it is outside of the image or behind the arm",
                 )
-            elif bin := _find_hiding_bin(config, world, camera_pose(world, camera).position):
+            elif bin := _find_occluding_bin(config, world, X_WC.position):
                 yield (
                     ("bins", bin, "position"),
                     f'the bin "{bin}" hides a part of the workspace from the camera {name} in the pose '
@@ -90,10 +92,10 @@ def _find_blind_poses(config: CellConfig, world: World) -> Iterator[tuple[KeyPat
                 )
 
 
-def _find_hiding_bin(config: CellConfig, world: World, camera: Array) -> str | None:
-    """Return the name of a bin that hides the centre of the flattest object in the workspace, or None."""
+def _find_occluding_bin(config: CellConfig, world: World, camera_position: Array) -> str | None:
+    """Return a bin that occludes the centre of the flattest object somewhere in the workspace, or None."""
     xs, ys = (np.linspace(*side, POINTS_PER_SIDE) for side in (config.table.x, config.table.y))
     height = min(kind.height for kind in config.objects.values()) / 2
     points = [(x, y, height) for x in xs for y in ys]
-    hit = {ray[0] for ray in world.client.rayTestBatch(points, [tuple(camera)] * len(points))}
-    return next((name for name, bodies in world.bins.items() if hit.intersection(bodies)), None)
+    hit_bodies = {hit[0] for hit in world.client.rayTestBatch(points, [tuple(camera_position)] * len(points))}
+    return next((name for name, bodies in world.bins.items() if hit_bodies.intersection(bodies)), None)

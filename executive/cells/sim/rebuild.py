@@ -1,4 +1,4 @@
-"""Reconstruction of a simulated world at the interruption of its run, from the command log."""
+"""Reconstruction of the simulated world of an interrupted run from its command log."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.interpolate import BPoly
 
 from executive.cell.clock import STEP
 from executive.cells.sim import command_log as log
-from executive.cells.sim.command_log import Command, states_of
+from executive.cells.sim.command_log import Command, to_joint_states
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
@@ -25,9 +25,9 @@ class InterruptedArm:
     """Motion of the arm at the interruption of a run.
 
     Attributes:
-        command: Joint positions of the last command before the last physics step `(n,)` [rad].
-        motion: The motion of the arm, or None.
-        time: Time since the start of the motion [s].
+        command: Commanded joint positions from which the arm brakes `(n,)` [rad]; empty without a command.
+        motion: Interrupted motion of the arm, or None if the arm was at rest.
+        time: Time of `command`, since the start of the motion [s].
         steps: Number of control steps of the run.
         last_command: Control step of the last command to arm or tool; 0 if there was none.
     """
@@ -39,14 +39,14 @@ class InterruptedArm:
     last_command: int
 
 
-class Rebuilding:
-    """Repeats the commands to a recorded world in a new world with the same cell file and seed.
+class WorldRebuilder:
+    """Executes recorded commands in a new world with the cell file and the seed of the recorded world.
 
     After each command the new world is bitwise equal to the recorded world after that command.
 
     Args:
         world: The new world.
-        tool: The tool on its arm.
+        tool: Tool of the new world.
     """
 
     def __init__(self, world: World, tool: SuctionTool) -> None:
@@ -55,63 +55,64 @@ class Rebuilding:
         self._motion: Trajectory | None = None
         self._time = 0.0
         self._steps = self._last_command = 0
-        self._stepped: tuple[Array, float] | None = None
-        """Command before the last physics step, and its time; None if no command followed the step."""
+        self._applied_command: tuple[Array, float] | None = None
+        """Command of the last physics step, and its time; None if no command followed the step."""
 
     @property
-    def interrupted(self) -> InterruptedArm:
-        """Motion of the arm, on whose path it is to brake, as a controller does without new commands.
+    def interrupted_arm(self) -> InterruptedArm:
+        """Motion of the arm, along which the arm brakes after the interruption.
 
-        If no physics step followed the last command, the previous command is used. Otherwise the arm would
+        If no physics step followed the last command, the command before it is used. Otherwise the arm would
         move by two steps at once, which may tear a load off the cup.
         """
         command, time = self._command, self._time
-        if self._stepped and self._motion is not None:
-            command, time = self._stepped
+        if self._applied_command and self._motion is not None:
+            command, time = self._applied_command
         return InterruptedArm(command, self._motion, time, self._steps, self._last_command)
 
-    def do(self, command: Command) -> None:
+    def execute(self, command: Command) -> None:
         """Execute the next command."""
         kind, numbers, _ = command
-        if kind in (log.MOTION, log.CLOSE, log.OPEN):
+        if kind in (log.MOTION, log.VACUUM_ON, log.VACUUM_OFF):
             self._last_command = self._steps
         world, tool = self._world, self._tool
-        if kind in (log.STEP, log.IDLE):
-            self._steps += kind == log.STEP
-            self._stepped = None
+        if kind in (log.RUN_STEP, log.IDLE_STEP):
+            self._steps += kind == log.RUN_STEP
+            self._applied_command = None
             world.step()
             tool.advance()
-        elif kind == log.JOINTS_TO:
+        elif kind == log.JOINT_TARGETS:
             if self._command.size:
-                self._stepped = self._stepped or (self._command, self._time)
+                self._applied_command = self._applied_command or (self._command, self._time)
             self._time, self._command = numbers[0], np.array(numbers[1:])
             world.command_arm(self._command, self._time)
         elif kind == log.MOTION:
-            duration, guarded, _ = numbers
-            self._motion, self._time = join_samples(states_of(command), duration, guarded), 0.0
-        elif kind == log.DONE:
+            duration, guarded_start_time, _ = numbers
+            self._motion = make_sampled_trajectory(to_joint_states(command), duration, guarded_start_time)
+            self._time = 0.0
+        elif kind == log.MOTION_END:
             self._motion = None
-        elif kind == log.PLACE:
+        elif kind == log.SET_POSE:
             world.place_object(int(numbers[0]), Pose.of(numbers[1:4], numbers[4:]))
         elif kind == log.REMOVE:
             world.remove_object(int(numbers[0]))
         else:
-            {log.CLOSE: tool.close, log.OPEN: tool.open, log.PART: tool.break_seal}[kind]()
+            {log.VACUUM_ON: tool.close, log.VACUUM_OFF: tool.open, log.SEAL_BREAK: tool.break_seal}[kind]()
 
 
-def rebuild(world: World, tool: SuctionTool, commands: Iterable[Command]) -> InterruptedArm:
+def rebuild_world(world: World, tool: SuctionTool, commands: Iterable[Command]) -> InterruptedArm:
     """Execute all commands in a new world, and return the motion of the arm at the interruption."""
-    rebuilding = Rebuilding(world, tool)
+    rebuilder = WorldRebuilder(world, tool)
     for command in commands:
-        rebuilding.do(command)
-    return rebuilding.interrupted
+        rebuilder.execute(command)
+    return rebuilder.interrupted_arm
 
 
 class SampledPiece:
-    """Quintic spline through given states; implements `MotionPiece`.
+    """Quintic spline through sampled states; implements `executive.motion.trajectory.MotionPiece`.
 
     Args:
-        states: States at every `STEP` and at the end; each array has the shape `(N, n)`.
+        states: States at multiples of `STEP` and at the end; each array has the shape `(N, n)`.
         duration: Duration of the piece [s].
     """
 
@@ -137,6 +138,8 @@ class SampledPiece:
         return q, q.derivative(), q.derivative(2)
 
 
-def join_samples(states: JointState, duration: float, guarded: float = math.inf) -> Trajectory:
-    """Return the motion of which `Trajectory.samples` returned these states."""
-    return Trajectory([SampledPiece(states, duration)], guarded)
+def make_sampled_trajectory(
+    states: JointState, duration: float, guarded_start_time: float = math.inf
+) -> Trajectory:
+    """Return the trajectory through `states`, which are the `samples` of the original trajectory."""
+    return Trajectory([SampledPiece(states, duration)], guarded_start_time)

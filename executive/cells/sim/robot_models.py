@@ -1,4 +1,4 @@
-"""Supported arms as PyBullet models: links, motors, and the link pairs that can collide."""
+"""PyBullet models of the supported arms: links, motors, and the link pairs that can collide."""
 
 from __future__ import annotations
 
@@ -10,49 +10,49 @@ from executive.motion.iiwa14_kinematics import FLANGE_OFFSET
 
 @dataclass(frozen=True)
 class RobotModel:
-    """PyBullet model of an arm whose first links, up to the flange, are moved by one joint each.
+    """PyBullet model of an arm in which one joint moves each link up to the flange.
 
     Link indices are those of PyBullet. The tool is the link after the link of the flange.
 
     Attributes:
         flange_link: Name of the link with the flange.
-        flange_offset: Distance from the origin of that link to the flange along the z axis of the link [m].
-        torques: Maximum torque of each joint [Nm].
-        first_moving_link: Lowest link that can approach other bodies.
-        wrist_link: Lowest link that a held object may touch, because the object hangs there.
-        self_pairs: Pairs of links that can collide with each other.
-        link_radius: Radius of the circle around the housing of each link [m].
-        forward_pose_deg: Joint positions, after the first, of a posture from which the inverse kinematics
-            reaches all places on the table [degree].
+        flange_offset: Distance from the origin of the flange link to the flange along the link's z axis [m].
+        max_torques: Maximum torque of each joint [Nm].
+        first_moving_link: Index of the first link that can approach other bodies.
+        wrist_link: Index of the first link that a held object may touch, because the object hangs there.
+        self_collision_pairs: Pairs of indices of links that can collide with each other.
+        link_radius: Radius of a cylinder around the housing of each link [m].
+        forward_pose_deg: Positions of the joints after the first, from which the numerical inverse kinematics
+            finds a solution for every position on the table [degree].
     """
 
     flange_link: str
     flange_offset: float
-    torques: tuple[float, ...]
+    max_torques: tuple[float, ...]
     first_moving_link: int
     wrist_link: int
-    self_pairs: tuple[tuple[int, int], ...]
+    self_collision_pairs: tuple[tuple[int, int], ...]
     link_radius: float
     forward_pose_deg: tuple[float, ...]
 
     @property
     def joint_count(self) -> int:
         """Number of joints."""
-        return len(self.torques)
+        return len(self.max_torques)
 
 
 ROBOT_MODELS: Mapping[str, RobotModel] = {
     "kuka_iiwa/model.urdf": RobotModel(
         flange_link="lbr_iiwa_link_7",
         flange_offset=FLANGE_OFFSET,
-        # Data sheet, as in RobotLocomotion/models iiwa_description.
-        torques=(320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0),
-        # The base and link 1 only turn about the axis of the base.
+        # From the data sheet, as in iiwa_description of RobotLocomotion/models.
+        max_torques=(320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0),
+        # Link 1 (index 0) only turns about the axis of the base.
         first_moving_link=1,
         wrist_link=5,
         # In 1500 random poses, 121 of 131 self-collisions were between links 5 and 7 (indices 4 and 6).
-        # Longer tools also collide with the base and with links 1 and 2, most often with the base.
-        self_pairs=((4, 6), (7, 0), (7, 1), (7, 2)),
+        # A long tool (index 7) also collides with the lowest links (indices 0 to 2), mostly with the first.
+        self_collision_pairs=((4, 6), (7, 0), (7, 1), (7, 2)),
         link_radius=0.09,
         forward_pose_deg=(30, 0, -85, 0, 65, 0),
     )

@@ -18,11 +18,11 @@ from executive.cell.config import CellConfig, NoiseConfig
 from executive.cell.frame import Box
 from executive.cells.audit import UNKNOWN
 from executive.cells.sim.arrangements import SceneObject, arrange, make_held_object, move_arm, random_part
-from executive.cells.sim.camera import CELL_LIGHT, Image, add_depth_noise, add_noise, camera_pose, render
+from executive.cells.sim.camera import CELL_LIGHT, Image, add_depth_noise, add_noise, get_camera_pose, render
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
 from executive.cells.sim.scene_world import build_light, paint_table, true_cell
-from executive.cells.sim.silhouette import outline_box, visible_share
+from executive.cells.sim.silhouette import compute_bounding_box, compute_visible_fraction
 from executive.cells.sim.spawn import spawn
 from executive.cells.sim.table_top import WOOD
 from executive.cells.sim.variations import (
@@ -156,7 +156,7 @@ class SceneRenderer:
     def _draw(self, rng: np.random.Generator) -> Sample | None:
         world = self._world
         holds = move_arm(world, self._camera, rng)
-        matrix, X_WC = self._matrix, camera_pose(world, self._camera)
+        matrix, X_WC = self._matrix, get_camera_pose(world, self._camera)
         (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD), CELL_LIGHT, self._camera.noise
         if rng.random() >= DECLARED_SHARE:
             matrix, X_WC = random_camera(self._camera, matrix, X_WC, rng)
@@ -168,7 +168,7 @@ class SceneRenderer:
         footprint = np.array([intersect_plane(matrix, X_WC, corner, 0.0)[:2] for corner in corners])
         items = arrange(self._config, footprint, part == self._camera.table_view, shown, rng)
         if holds:
-            items.append(make_held_object(world.tool_pose(), self._config, rng))
+            items.append(make_held_object(world.get_tool_pose(), self._config, rng))
         bodies = [world.add_object(item.label, item.X_WO, item.colour, item.model) for item in items]
         with _removing(world, bodies):
             world.table_top.paint(colour, texture)
@@ -180,13 +180,15 @@ class SceneRenderer:
     def _draw_as_run(self, rng: np.random.Generator) -> Sample | None:
         world, camera = self._world, self._camera
         pose = np.radians(self._config.arm.poses_deg[str(rng.choice(camera.scan_poses))])
-        world.set_arm(pose)
+        world.set_joint_positions(pose)
         bodies = spawn(world, self._config, int(rng.integers(2**32)), unknown=self._scene.unknown)
-        world.set_arm(pose)  # settling may have let it sag
+        world.set_joint_positions(pose)  # settling may have let it sag
         with _removing(world, bodies):
-            X_WC, declared = camera_pose(world, camera), camera_pose(world, self._declared)
+            X_WC, declared = get_camera_pose(world, camera), get_camera_pose(world, self._declared)
             items = [
-                SceneObject(world.bodies[body], world.models[body], world.object_pose(body), (0.0, 0.0, 0.0))
+                SceneObject(
+                    world.bodies[body], world.models[body], world.get_object_pose(body), (0.0, 0.0, 0.0)
+                )
                 for body in bodies
             ]
             whole, light = (0, 0, camera.width, camera.height), build_light(self._scene.light)
@@ -218,8 +220,8 @@ class SceneRenderer:
             mesh = load_mesh(item.model)
             vertices = item.X_WO.apply(mesh.vertices)
             pixels = project(view.matrix, view.X_WC, vertices)
-            share = visible_share(mesh, pixels, mine)
-            whole = outline_box(pixels)
+            share = compute_visible_fraction(mesh, pixels, mine)
+            whole = compute_bounding_box(pixels)
             box = _clip(whole, corner, scale)
             if share < MAX_HIDDEN_SHARE:
                 continue

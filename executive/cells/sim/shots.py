@@ -14,10 +14,10 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cells.sim.camera import Image, Light, Render, render
-from executive.cells.sim.command_log import STEP, read_commands
-from executive.cells.sim.rebuild import Rebuilding
+from executive.cells.sim.command_log import RUN_STEP, read_commands
+from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.spawn import first_world
+from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.viewpoint import Viewpoint
 from executive.processes import Workers
@@ -59,7 +59,7 @@ def count_steps(log: Path) -> int:
     Raises:
         InputError: There is no such log.
     """
-    return sum(command.kind == STEP for command in read_commands(log))
+    return sum(command.kind == RUN_STEP for command in read_commands(log))
 
 
 def take_pictures(shoot: Shoot, steps: Sequence[int], workers: int) -> Generator[Image, None, None]:
@@ -91,18 +91,18 @@ def _take(shoot: Shoot, steps: Sequence[int]) -> list[Image]:
 def take_pictures_in_order(shoot: Shoot, steps: Sequence[int]) -> Iterator[Image]:
     """Yield the pictures of `take_pictures`, rendered in one world in this process."""
     scene = load_scene(shoot.scene, shoot.config)
-    world, viewpoint = first_world(shoot.config, shoot.seed, scene=scene), shoot.viewpoint
+    world, viewpoint = build_initial_world(shoot.config, shoot.seed, scene=scene), shoot.viewpoint
     try:
         # The distracting pattern of the floor is hidden: transparent bodies are not rendered.
-        world.client.changeVisualShape(world.plane, -1, rgbaColor=[1, 1, 1, 0])
-        rebuilding = Rebuilding(world, SuctionTool(world, shoot.config.tool))
+        world.client.changeVisualShape(world.floor, -1, rgbaColor=[1, 1, 1, 0])
+        rebuilder = WorldRebuilder(world, SuctionTool(world, shoot.config.tool))
         commands = read_commands(shoot.log)
         done = 0
         for step in steps:
             while done < step:
                 command = next(commands)
-                rebuilding.do(command)
-                done += command.kind == STEP
+                rebuilder.execute(command)
+                done += command.kind == RUN_STEP
             yield _compose_picture(
                 render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, *viewpoint.size), FILM_LIGHT)
             )

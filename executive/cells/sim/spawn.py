@@ -57,7 +57,7 @@ class PartSeeds:
         return PartSeeds(*(int(part.generate_state(1)[0]) for part in parts))
 
 
-def first_world(
+def build_initial_world(
     config: CellConfig, seed: int, *, gui: bool = False, scene: SceneConfig = DECLARED_SCENE
 ) -> World:
     """Return the initial world of a run with this seed: arm at `home`, objects at rest on the table.
@@ -70,7 +70,7 @@ def first_world(
     world = World(true_cell(config, scene), gui=gui)
     paint_table(world, scene)
     spawn(world, world.config, PartSeeds.of(seed).objects, unknown=scene.unknown)
-    world.stood.clear()
+    world.rest_positions.clear()
     return world
 
 
@@ -184,7 +184,7 @@ def _stack(world: World, bodies: Sequence[int], share: float, rng: np.random.Gen
 
 def _put_on(world: World, upper: int, lower: int, rng: np.random.Generator) -> bool:
     """Put one object on another, and return True if it stays; otherwise restore all poses."""
-    before = {body: world.object_pose(body) for body in world.bodies}
+    before = {body: world.get_object_pose(body) for body in world.bodies}
     base = before[lower].position
     below, above = (load_mesh(world.models[body]) for body in (lower, upper))
     height = base[2] + below.top - above.bottom + DROP_HEIGHT
@@ -207,7 +207,7 @@ def _put_on(world: World, upper: int, lower: int, rng: np.random.Generator) -> b
 def _has_moved(world: World, goal: Mapping[int, Pose]) -> bool:
     """Return True if any body is farther than `MAX_SHIFT` from its goal."""
     return any(
-        float(np.linalg.norm(world.object_pose(body).position - X_WO.position)) > MAX_SHIFT
+        float(np.linalg.norm(world.get_object_pose(body).position - X_WO.position)) > MAX_SHIFT
         for body, X_WO in goal.items()
     )
 

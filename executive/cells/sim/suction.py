@@ -1,4 +1,4 @@
-"""Contact model of the suction cup: geometry of the contact, and breakaway force of the seal."""
+"""Contact model of the suction cup: geometry of a contact, and breakaway force of the seal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from executive.cell.config import ToolConfig
 from executive.geometry import Array, Pose
 
 RIM_RAY_COUNT = 16
-"""Number of rays at the rim; half as many are on a ring at half the radius, and one at the centre."""
+"""Number of rays on the rim of the cup; a ring at half the radius has half as many, and the centre one."""
 
 
 @dataclass(frozen=True)
@@ -22,10 +22,10 @@ class CupContact:
     """Geometry of the contact between the cup and the surface under it.
 
     Attributes:
-        body: The simulator's id of the nearest body under the cup.
+        body: Nearest body under the cup.
         distance: Distance from the face of the cup to the nearest point of the body, along the tool axis [m].
-        gap: Largest distance between rim and surface after the cup has reached the first contact and its
-            bellows has tilted with the surface [m]; infinite if part of the cup is not over the body.
+        gap: Maximum distance between rim and surface [m] if the cup touches the surface and its bellows has
+            tilted with the surface; infinite if a part of the cup is not over the body.
         tilt: Angle between the tool axis and the normal of the plane fitted to the surface under the
             cup [rad]; the bellows tilts by this angle.
     """
@@ -42,81 +42,84 @@ def measure_contact(
     """Return the contact of a cup at `X_WT` with the nearest of `bodies`, or None if none is under the cup.
 
     Rays along the tool axis hit the collision shapes of `bodies` and pass through all other bodies. They
-    start `reach` behind the lip, because a cup in contact penetrates the surface a little, and end `reach`
-    plus the diameter of the cup in front of the lip, because no lip can lie on a steeper surface.
+    start at the distance `reach` behind the lip, because a cup in contact penetrates the surface a little.
+    They end `reach` plus the diameter of the cup in front of the lip; no lip seals on a steeper surface.
 
     Args:
-        client: The pybullet client that holds the bodies.
-        X_WT: Pose of the centre of the lip, z along the tool axis into the object.
-        bodies: Ids of the bodies to which the cup can seal.
+        client: The pybullet client of the bodies.
+        X_WT: Pose of the centre of the lip; its z axis is the tool axis and points into the object.
+        bodies: Bodies to which the cup can seal.
         cup_radius: Radius of the lip [m].
-        reach: Largest distance from a surface at which the lip still seals [m].
+        reach: Maximum distance from a surface at which the lip seals [m].
     """
-    face = _sample_face(cup_radius)
-    hits, heights = _cast_rays(client, X_WT, bodies, face, reach, reach + 2 * cup_radius)
-    nearest = int(np.argmin(heights))
-    if not math.isfinite(heights[nearest]):
+    face_points = _sample_face(cup_radius)
+    hit_bodies, distances = _cast_rays(client, X_WT, bodies, face_points, reach, reach + 2 * cup_radius)
+    nearest = int(np.argmin(distances))
+    if not math.isfinite(distances[nearest]):
         return None
-    body = int(hits[nearest])
-    is_hit = hits == body
-    points = np.column_stack([face[is_hit], np.ones(np.count_nonzero(is_hit))])
-    (slope_x, slope_y, level), *_ = np.linalg.lstsq(points, heights[is_hit], rcond=None)
+    body = int(hit_bodies[nearest])
+    is_hit = hit_bodies == body
+    points = np.column_stack([face_points[is_hit], np.ones(np.count_nonzero(is_hit))])
+    (slope_x, slope_y, offset), *_ = np.linalg.lstsq(points, distances[is_hit], rcond=None)
     tilt = math.atan(math.hypot(slope_x, slope_y))
     gap = math.inf
     if is_hit.all():
-        residual = (heights - points @ (slope_x, slope_y, level)) * math.cos(tilt)
-        gap = float(residual[-RIM_RAY_COUNT:].max() - residual.min())
-    return CupContact(body, float(heights[nearest]), gap, tilt)
+        residuals = (distances - points @ (slope_x, slope_y, offset)) * math.cos(tilt)
+        gap = float(residuals[-RIM_RAY_COUNT:].max() - residuals.min())
+    return CupContact(body, float(distances[nearest]), gap, tilt)
 
 
-def breakaway_force(seal: CupContact | None, tool: ToolConfig) -> float:
-    """Return the pull at which the seal breaks [N]; 0 if none forms.
+def compute_breakaway_force(contact: CupContact | None, tool: ToolConfig) -> float:
+    """Return the pull at which the seal of a contact breaks [N]; 0 if no seal forms.
 
-    `force * (1 - gap / gap_max) * (1 - tilt / tilt_max)`, clipped at zero. The full force is vacuum
-    times lip area. The compliant lip bridges a gap; its contact pressure falls and its leak grows in
+    The force is `force * (1 - gap / gap_max) * (1 - tilt / tilt_max)`, clipped at zero, where `force` is
+    vacuum times lip area. The compliant lip bridges a gap; its contact pressure falls and its leak grows in
     proportion to its deflection, and at `gap_max` the pressure is zero. The bellows bends to compensate a
     tilt, which loads one side of the lip and peels the other. Both are first-order terms of independent
     causes, hence linear and multiplied; manufacturers publish only the two ends (full force on a flat
     surface, largest bend). The force is continuous: a slightly worse grasp is slightly weaker.
     """
-    if seal is None or seal.distance > tool.reach:
+    if contact is None or contact.distance > tool.reach:
         return 0.0
-    gap_factor = max(0.0, 1.0 - seal.gap / tool.gap)
-    tilt_factor = max(0.0, 1.0 - seal.tilt / math.radians(tool.tilt_deg))
+    gap_factor = max(0.0, 1.0 - contact.gap / tool.gap)
+    tilt_factor = max(0.0, 1.0 - contact.tilt / math.radians(tool.tilt_deg))
     return tool.force * gap_factor * tilt_factor
 
 
 @lru_cache(maxsize=16)
 def _sample_face(cup_radius: float) -> Array:
-    """Return the points of the rays on the face of the cup `(N, 2)` [m]: centre, inner ring, rim."""
+    """Return the points of the rays on the face of the cup `(N, 2)` [m]: centre, inner ring, and rim."""
 
-    def ring(radius: float, count: int) -> Array:
-        angle = 2 * np.pi * np.arange(count) / count
-        return radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    def make_ring(radius: float, count: int) -> Array:
+        angles = 2 * np.pi * np.arange(count) / count
+        return radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
-    return np.vstack(
-        [np.zeros((1, 2)), ring(cup_radius / 2, RIM_RAY_COUNT // 2), ring(cup_radius, RIM_RAY_COUNT)]
-    )
+    inner_ring, rim = make_ring(cup_radius / 2, RIM_RAY_COUNT // 2), make_ring(cup_radius, RIM_RAY_COUNT)
+    return np.vstack([np.zeros((1, 2)), inner_ring, rim])
 
 
 def _cast_rays(
-    client: Any, X_WT: Pose, bodies: Collection[int], face: Array, behind: float, before: float
+    client: Any, X_WT: Pose, bodies: Collection[int], face_points: Array, start: float, end: float
 ) -> tuple[Array, Array]:
-    """Return the nearest of `bodies` on each ray `(N,)`, or -1, and its distance from the face `(N,)` [m]."""
-    count = len(face)
-    hits, heights = np.full(count, -1), np.full(count, np.inf)
-    starts = X_WT.apply(np.column_stack([face, np.full(count, -behind)]))
-    ends = X_WT.apply(np.column_stack([face, np.full(count, before)]))
+    """Return the nearest of `bodies` on each ray `(N,)` and its distance from the face of the cup `(N,)` [m].
+
+    A ray without a hit has body -1 and infinite distance. The rays are parallel to the tool axis; they start
+    at the distance `start` behind the face and end at the distance `end` in front of the face [m].
+    """
+    count = len(face_points)
+    hit_bodies, distances = np.full(count, -1), np.full(count, np.inf)
+    starts = X_WT.apply(np.column_stack([face_points, np.full(count, -start)]))
+    ends = X_WT.apply(np.column_stack([face_points, np.full(count, end)]))
     pending = np.arange(count)
     layer = 0
     while pending.size:
-        # The rays start inside the tool and hit it first. Rays that start behind an ignored surface would
-        # not help: Bullet's rays end at once on a surface less than a millimetre ahead.
-        answers = client.rayTestBatch(starts[pending].tolist(), ends[pending].tolist(), reportHitNumber=layer)
-        for ray, (body, _, fraction, *_) in zip(pending, answers, strict=True):
-            height = fraction * (behind + before) - behind
-            if body in bodies and height < heights[ray]:
-                hits[ray], heights[ray] = body, height
-        pending = pending[[answer[0] >= 0 for answer in answers]]
+        # The rays start inside the tool, so their first hits are ignored. New rays from behind an ignored
+        # surface are no alternative, because Bullet's rays hit again within a millimetre of their start.
+        hits = client.rayTestBatch(starts[pending].tolist(), ends[pending].tolist(), reportHitNumber=layer)
+        for ray, (body, _, fraction, *_) in zip(pending, hits, strict=True):
+            distance = fraction * (start + end) - start
+            if body in bodies and distance < distances[ray]:
+                hit_bodies[ray], distances[ray] = body, distance
+        pending = pending[[hit[0] >= 0 for hit in hits]]
         layer += 1
-    return hits, heights
+    return hit_bodies, distances

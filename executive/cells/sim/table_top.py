@@ -1,4 +1,4 @@
-"""Colour and texture of the table."""
+"""Colour and texture of the simulated table."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from pybullet_utils.bullet_client import BulletClient
 from executive.cell.config import Colour
 
 WOOD, PLAIN = "wood", "plain"
+"""Names of the texture in the URDF of the table, and of a white surface without texture."""
 PATTERN_COUNT = 24
-"""Number of generated textures, which are called `pattern 0` to `pattern 23`."""
+"""Number of generated textures, whose names are `pattern 0` to `pattern 23`."""
 TEXTURES = (WOOD, PLAIN, *(f"pattern {number}" for number in range(PATTERN_COUNT)))
-"""Names of all textures: that of the URDF, no texture, and the generated ones."""
+"""Names of all textures."""
 TEXTURE_SIZE = 256
 """Side of a generated texture [pixel]."""
 
 
 class TableTop:
-    """The surface of the simulated table; `paint` changes what cameras see of it, and nothing else.
+    """The surface of the simulated table; `paint` changes only its appearance in camera images.
 
     Args:
         client: The connection to the physics server.
@@ -34,18 +35,19 @@ class TableTop:
         self._client = client
         self._table = table
         shapes = client.getVisualShapeData(table, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
-        # A world without visuals has no shapes and needs no textures.
+        # A world without visual shapes needs no textures.
         self._textures = {PLAIN: -1, WOOD: shapes[0][8] if shapes else -1}
 
     def paint(self, colour: Colour, texture: str = WOOD) -> None:
-        """Give the table a texture of `TEXTURES`, its RGB values multiplied by `colour`."""
+        """Give the table a texture of `TEXTURES`, with RGB values multiplied by `colour`."""
         if texture not in self._textures:
-            self._textures[texture] = self._load(texture)
+            self._textures[texture] = self._load_pattern(texture)
         self._client.changeVisualShape(
             self._table, -1, textureUniqueId=self._textures[texture], rgbaColor=[*colour, 1]
         )
 
-    def _load(self, texture: str) -> int:
+    def _load_pattern(self, texture: str) -> int:
+        """Generate a texture, load it into the physics server, and return its id there."""
         seed = TEXTURES.index(texture)
         # PyBullet caches textures by path, so that each texture needs its own path.
         with tempfile.TemporaryDirectory() as folder:
@@ -55,12 +57,12 @@ class TableTop:
 
 
 def generate_pattern(seed: int) -> NDArray[np.uint8]:
-    """Return a bright random texture `(N, N, 3)`: clouds, stripes, tiles or speckles."""
+    """Return a bright random texture of `TEXTURE_SIZE`, RGB: clouds, stripes, tiles or speckles."""
     rng = np.random.default_rng(seed)
     contrast = rng.uniform(15, 90)
-    grid = int(rng.choice([4, 8, 16, 32]))
+    count = int(rng.choice([4, 8, 16, 32]))
     kind = seed % 4
-    shape = ((grid, grid, 3), (1, grid * 2, 3), (grid, grid, 1), (TEXTURE_SIZE, TEXTURE_SIZE, 1))[kind]
+    shape = ((count, count, 3), (1, count * 2, 3), (count, count, 1), (TEXTURE_SIZE, TEXTURE_SIZE, 1))[kind]
     interpolation = cv2.INTER_CUBIC if kind in (0, 3) else cv2.INTER_NEAREST
     values = 255 - rng.uniform(0, contrast, shape) * np.ones(3)
     size = (TEXTURE_SIZE, TEXTURE_SIZE)

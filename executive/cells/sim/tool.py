@@ -1,4 +1,4 @@
-"""Simulated suction tool; the contact determines the breakaway force of its seal."""
+"""Simulated suction tool, whose seal breaks at a force that depends on the contact."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ import pybullet
 
 from executive.cell.config import ToolConfig
 from executive.cells.sim import command_log
-from executive.cells.sim.suction import breakaway_force, measure_contact
+from executive.cells.sim.suction import compute_breakaway_force, measure_contact
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 
 TOUCH_DISTANCE = 0.001
-"""Largest distance from a surface at which the soft lip detects it [m]."""
+"""Maximum distance from a surface at which the soft lip detects the surface [m]."""
 LIP_LENGTH = 0.002
-"""Length of the lip at the end of the tool [m]; contacts further back are contacts of the shaft."""
+"""Length of the lip at the end of the tool [m]; other contacts of the tool are contacts of the shaft."""
 PULL_SMOOTHING = 0.25
 """Weight of the newest step in the low-pass filter of the pull on the seal.
 
-The time constant is 3.5 steps or 14 ms: a seal breaks over milliseconds, while impact forces of the solver
-last a single step.
+The time constant is 3.5 steps or 14 ms, because a seal breaks within milliseconds, while impact forces of the
+solver last a single step.
 """
 
 
 @dataclass
 class _Grip:
-    """Body at the cup: its id, its constraint, breakaway force of the seal and filtered pull on it [N]."""
+    """Held body, its constraint, breakaway force of its seal [N] and filtered pull on the seal `(3,)` [N]."""
 
     body: int
     constraint: int
-    holding_force: float
+    breakaway_force: float
     pull: Array = field(default_factory=lambda: np.zeros(3))
 
 
 class SuctionTool:
-    """A `Tool` on the arm of a `World`; `advance` is called after every physics step.
+    """The suction tool of a `World`; implements `Tool`. `advance` is called after every physics step.
 
     A held body keeps its pose relative to the tool until the filtered pull on the seal exceeds the
     breakaway force. Moments have no effect. A broken seal forms again only after cup and object have
     separated or the vacuum was off, because right after the break the object is still within reach.
 
     Attributes:
-        fallen: Bodies whose last seal broke; ground truth, as `held_body`.
+        dropped_bodies: Bodies whose last seal broke; ground truth, not for skills.
     """
 
     def __init__(self, world: World, config: ToolConfig) -> None:
@@ -52,62 +52,62 @@ class SuctionTool:
         self._config = config
         self._vacuum = False
         self._grip: _Grip | None = None
-        self._parting: int | None = None
-        self._felt = (-1, False)
-        self.fallen: set[int] = set()
+        self._separating_body: int | None = None
+        self._last_touch = (-1, False)
+        self.dropped_bodies: set[int] = set()
 
     @property
     def touching(self) -> bool:
-        """True if the lip was within 1 mm of any body after the last physics step."""
-        step, felt = self._felt
+        """True if the lip was within `TOUCH_DISTANCE` of any body after the last physics step."""
+        step, is_touching = self._last_touch
         if step != self._world.steps:
-            felt = any(True for _ in self._find_near(TOUCH_DISTANCE))
-            self._felt = (self._world.steps, felt)
-        return felt
+            is_touching = any(True for _ in self._find_bodies_near(TOUCH_DISTANCE))
+            self._last_touch = (self._world.steps, is_touching)
+        return is_touching
 
     @property
     def holding(self) -> bool:
-        """True while the vacuum indicates a held object."""
+        """True while the tool holds an object."""
         return self._grip is not None
 
     @property
     def holding_force(self) -> float:
-        """Breakaway force of the seal, from the vacuum gauge [N]; 0 while nothing is held."""
-        return 0.0 if self._grip is None else self._grip.holding_force
+        """Breakaway force of the seal [N]; 0 while the tool holds nothing."""
+        return 0.0 if self._grip is None else self._grip.breakaway_force
 
     @property
     def held_body(self) -> int | None:
-        """The simulator's id of the held body or None; ground truth for tests and audit, never for skills."""
+        """The held body, or None; ground truth for tests and audit, not for skills."""
         return None if self._grip is None else self._grip.body
 
     @property
     def pull(self) -> float:
-        """Filtered pull on the seal [N], 0 while nothing is held; ground truth, as `held_body`."""
+        """Filtered pull on the seal [N], 0 while the tool holds nothing; ground truth, not for skills."""
         return 0.0 if self._grip is None else float(np.linalg.norm(self._grip.pull))
 
     def close(self) -> None:
-        """Switch the vacuum on, and hold a body within reach if its seal is strong enough."""
-        self._world.log.note(command_log.CLOSE)
+        """Switch the vacuum on, and hold a body within reach if the seal is strong enough."""
+        self._world.log.append(command_log.VACUUM_ON)
         self._vacuum = True
         if self._grip is None:
             self._seal()
 
     def open(self) -> None:
         """Release the held body and switch the vacuum off."""
-        self._world.log.note(command_log.OPEN)
+        self._world.log.append(command_log.VACUUM_OFF)
         self._vacuum = False
-        self._parting = None
+        self._separating_body = None
         if self._grip is not None:
             body = self._grip.body
-            self._world.stood.setdefault(body, []).append(self._world.object_pose(body).position)
+            self._world.rest_positions.setdefault(body, []).append(self._world.get_object_pose(body).position)
         self._release()
 
     def break_seal(self) -> None:
-        """Break the seal, as too large a pull does; the held body falls."""
-        self._world.log.note(command_log.PART)
+        """Break the seal, so that the held body falls."""
+        self._world.log.append(command_log.SEAL_BREAK)
         if self._grip is not None:
-            self._parting = self._grip.body
-            self.fallen.add(self._grip.body)
+            self._separating_body = self._grip.body
+            self.dropped_bodies.add(self._grip.body)
             self._release()
 
     def advance(self) -> None:
@@ -121,28 +121,32 @@ class SuctionTool:
         """Filter the pull on the seal, and break the seal if the pull exceeds the breakaway force."""
         force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
         grip.pull += PULL_SMOOTHING * (force - grip.pull)
-        if float(np.linalg.norm(grip.pull)) > grip.holding_force:
+        if float(np.linalg.norm(grip.pull)) > grip.breakaway_force:
             self.break_seal()
 
     def _seal(self) -> None:
-        """Hold a body within reach if its seal is strong enough."""
-        near = set(self._find_near(self._config.reach))
-        if self._parting not in near:
-            self._parting = None
-        movable = near & self._world.bodies.keys() - {self._parting}
-        if not movable:
+        """Hold a body within reach if the seal is strong enough."""
+        near = set(self._find_bodies_near(self._config.reach))
+        if self._separating_body not in near:
+            self._separating_body = None
+        sealable = near & self._world.bodies.keys() - {self._separating_body}
+        if not sealable:
             return
         world, config = self._world, self._config
-        seal = measure_contact(world.client, world.tool_pose(), movable, config.cup_radius, config.reach)
-        holding_force = breakaway_force(seal, config)
-        if seal is not None and holding_force >= config.min_force:
-            self.fallen.discard(seal.body)
-            self._grip = _Grip(seal.body, self._attach(seal.body), holding_force)
-            # Cup and body overlap slightly; their contact forces would act against the constraint.
-            self._set_collision(seal.body, False)
+        X_WT = world.get_tool_pose()
+        contact = measure_contact(world.client, X_WT, sealable, config.cup_radius, config.reach)
+        force = compute_breakaway_force(contact, config)
+        if contact is not None and force >= config.min_force:
+            self.dropped_bodies.discard(contact.body)
+            self._grip = _Grip(contact.body, self._attach(contact.body), force)
+            # Cup and body overlap slightly, and their contact forces would act against the constraint.
+            self._set_collision(contact.body, False)
 
     def _attach(self, body: int) -> int:
-        """Fix the body to the tool at its current pose; frames of constraints lie in the centres of mass."""
+        """Fix a body to the tool at its current pose and return the constraint.
+
+        The frames of a constraint are in the centres of mass.
+        """
         world = self._world
         X_WI = Pose.of(*world.client.getLinkState(world.arm, world.tool, computeForwardKinematics=True)[:2])
         X_IB = X_WI.inverse() @ Pose.of(*world.client.getBasePositionAndOrientation(body))
@@ -163,10 +167,10 @@ class SuctionTool:
     def _set_collision(self, body: int, enabled: bool) -> None:
         self._world.client.setCollisionFilterPair(self._world.arm, body, self._world.tool, -1, int(enabled))
 
-    def _find_near(self, distance: float) -> Iterator[int]:
+    def _find_bodies_near(self, distance: float) -> Iterator[int]:
         """Yield every body except the arm within `distance` [m] of the lip.
 
-        The broad phase runs first (3 us), so the call is cheap while the tool is in the air.
+        The bounding boxes are compared first (3 us), so the call is fast while no body is near the tool.
         """
         world = self._world
         low, high = world.client.getAABB(world.arm, world.tool)
@@ -176,7 +180,7 @@ class SuctionTool:
         bodies = sorted({body for body, _ in overlapping or ()} - {world.arm})
         if not bodies:
             return
-        X_TW = world.tool_pose().inverse()
+        X_TW = world.get_tool_pose().inverse()
         for body in bodies:
             points = world.client.getClosestPoints(world.arm, body, distance, linkIndexA=world.tool)
             if any(X_TW.apply(point[5])[2] > -LIP_LENGTH for point in points):

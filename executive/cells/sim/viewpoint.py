@@ -1,4 +1,4 @@
-"""Viewpoint from which arm, workspace and bins of a cell fill an image."""
+"""Viewpoint of a displayed picture, chosen such that arm, workspace and bins of a cell fill the image."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_camera_matrix, compute_look_at_pose
 
 AZIMUTH, ELEVATION = math.radians(-37), math.radians(29)
-"""Direction from the cell to the camera [rad]: in front of the arm, to its right, and above."""
+"""Direction from the cell to the camera [rad]: in front of the arm, to the right of the arm, and above."""
 FIELD_OF_VIEW_DEG = 33.0
-"""Vertical field of view [degree]: narrow, for a distant camera."""
+"""Vertical field of view of the camera [degree]; it is small, so that the camera is far away."""
 ARM_HEIGHT = 0.8
-"""Largest height of the arm above its base [m]."""
+"""Height of the arm above its base for the choice of the viewpoint [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """A camera for display; no decision depends on its images.
+    """Camera of a displayed picture.
 
     Attributes:
         matrix: Camera matrix `(3, 3)` [pixel].
@@ -35,26 +35,27 @@ class Viewpoint:
     size: tuple[int, int]
 
 
-def overview(config: CellConfig, size: tuple[int, int], part: Box) -> Viewpoint:
-    """Return the viewpoint from which arm, workspace and bins of a cell fill a part of the image.
+def compute_viewpoint(config: CellConfig, size: tuple[int, int], region: Box) -> Viewpoint:
+    """Return the viewpoint from which arm, workspace and bins of a cell fill a region of the image.
 
     Args:
         config: The cell file.
         size: Width and height of the image [pixel].
-        part: Left, top, right and bottom of the part of the image to fill [pixel].
+        region: Left, top, right and bottom of the region [pixel].
     """
     matrix = compute_camera_matrix(*size, FIELD_OF_VIEW_DEG)
-    away = [
+    direction = [
         math.cos(ELEVATION) * math.cos(AZIMUTH),
         math.cos(ELEVATION) * math.sin(AZIMUTH),
         math.sin(ELEVATION),
     ]
-    R_WC = compute_look_at_pose(away, [0, 0, 0], [0, 0, 1]).rotation
-    points = _outline(config) @ R_WC
-    # A camera at p sees a point q between the slopes low and high if
-    # low (q_z - p_z) <= q_x - p_x <= high (q_z - p_z). Choose the nearest p_z, then the middle of p_x.
-    corners = np.linalg.solve(matrix, np.array([[*part[:2], 1.0], [*part[2:], 1.0]]).T).T
-    spans = [
+    R_WC = compute_look_at_pose(direction, [0, 0, 0], [0, 0, 1]).rotation
+    points = _list_hull_points(config) @ R_WC
+    # In camera axes, a camera at p shows a point q in the region if, with the slopes low and high of the rays
+    # through the borders of the region, low (q_z - p_z) <= q_x - p_x <= high (q_z - p_z), and likewise for y.
+    # The largest possible p_z is chosen, then the mean of the possible p_x and p_y.
+    corners = np.linalg.solve(matrix, np.array([[*region[:2], 1.0], [*region[2:], 1.0]]).T).T
+    bounds = [
         (
             np.max(points[:, axis] - high * points[:, 2]),
             np.min(points[:, axis] - low * points[:, 2]),
@@ -63,13 +64,13 @@ def overview(config: CellConfig, size: tuple[int, int], part: Box) -> Viewpoint:
         )
         for axis, low, high in zip((0, 1), corners[0, :2], corners[1, :2], strict=True)
     ]
-    z = min((last - first) / (high - low) for first, last, low, high in spans)
-    xy = [(first + high * z + last + low * z) / 2 for first, last, low, high in spans]
+    z = min((upper - lower) / (high - low) for lower, upper, low, high in bounds)
+    xy = [(lower + high * z + upper + low * z) / 2 for lower, upper, low, high in bounds]
     return Viewpoint(matrix, Pose(R_WC, R_WC @ np.array([*xy, z])), size)
 
 
-def _outline(config: CellConfig) -> Array:
-    """Return points `(N, 3)` [m] that enclose arm, workspace and bins."""
+def _list_hull_points(config: CellConfig) -> Array:
+    """Return points in the world `(N, 3)` [m] whose convex hull contains arm, workspace and bins."""
     points = [(0.0, 0.0, 0.0), (0.0, 0.0, ARM_HEIGHT)]
     points += [(x, y, 0.0) for x in config.table.x for y in config.table.y]
     for bin in config.bins.values():

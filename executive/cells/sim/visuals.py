@@ -1,4 +1,4 @@
-"""Shapes of the simulated world for display."""
+"""Shapes of the bodies of the simulated world, for display."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from executive.geometry import Pose
 TABLE_COLOUR = (0.86, 0.78, 0.66)
 """Mean colour of the texture of the table, RGB, each 0 to 1."""
 
-_KINDS = {
+_SHAPE_KINDS = {
     pybullet.GEOM_BOX: "box",
     pybullet.GEOM_CYLINDER: "cylinder",
     pybullet.GEOM_SPHERE: "sphere",
     pybullet.GEOM_MESH: "mesh",
 }
+"""Values of `Shape.kind`, by PyBullet's types of geometry."""
 
 
 class SimVisuals:
-    """Shapes of a world except the floor; implements `executive.cell.visuals.Visuals`.
+    """Shapes of a world without its floor; implements `executive.cell.visuals.Visuals`.
 
     A call of `poses` takes about 0.3 ms.
 
@@ -36,51 +37,55 @@ class SimVisuals:
     def __init__(self, world: World) -> None:
         self._world = world
         self._links = range(world.client.getNumJoints(world.arm))
-        # The simulator returns the pose of the centre of mass of a body without links.
-        self._X_IB = {body: _inertia(world, body).inverse() for body in world.bodies}
-        bodies = {world.table: "", **{body: "" for own in world.bins.values() for body in own}}
-        bodies |= {body: _object(body) for body in world.bodies}
-        self.shapes: Sequence[Shape] = tuple(_shapes_of(world, bodies))
+        # For a body without links, PyBullet returns the pose X_WI of the centre of mass.
+        self._X_IB = {body: _get_inertia_pose(world, body).inverse() for body in world.bodies}
+        names = {world.table: "", **{body: "" for bodies in world.bins.values() for body in bodies}}
+        names |= {body: _name_object(body) for body in world.bodies}
+        self.shapes: Sequence[Shape] = tuple(_make_shapes(world, names))
 
     def poses(self) -> Mapping[str, Pose]:
         """Return the poses of the links of the arm and of the loose objects, by name."""
         client = self._world.client
-        links = client.getLinkStates(self._world.arm, self._links, computeForwardKinematics=True)
-        found = {_link(link): Pose.of(*state[4:6]) for link, state in zip(self._links, links, strict=True)}
+        states = client.getLinkStates(self._world.arm, self._links, computeForwardKinematics=True)
+        links = zip(self._links, states, strict=True)
+        poses_by_name = {_name_link(link): Pose.of(*state[4:6]) for link, state in links}
         for body in self._world.bodies:
             X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
-            found[_object(body)] = X_WI @ self._X_IB[body]
-        return found
+            poses_by_name[_name_object(body)] = X_WI @ self._X_IB[body]
+        return poses_by_name
 
 
-def _shapes_of(world: World, bodies: Mapping[int, str]) -> Iterator[Shape]:
-    """Yield the shapes of the arm and of the bodies with the given names."""
-    for body, name in ((world.arm, ""), *bodies.items()):
-        X_WB = Pose.of(*world.client.getBasePositionAndOrientation(body)) @ _inertia(world, body).inverse()
+def _make_shapes(world: World, names: Mapping[int, str]) -> Iterator[Shape]:
+    """Yield the shapes of the arm and of the bodies in `names`; the name of a static body is ""."""
+    for body, name in ((world.arm, ""), *names.items()):
+        X_WI = Pose.of(*world.client.getBasePositionAndOrientation(body))
+        X_WB = X_WI @ _get_inertia_pose(world, body).inverse()
         for data in world.client.getVisualShapeData(body):
-            _, link, kind, size, file, position, quaternion, colour = data[:8]
-            if kind not in _KINDS:
+            _, link, geometry, size, file, position, quaternion, colour = data[:8]
+            if geometry not in _SHAPE_KINDS:
                 continue
             X_BS = Pose.of(position, quaternion)
-            owner = _link(link) if body == world.arm and link >= 0 else name
+            owner = _name_link(link) if body == world.arm and link >= 0 else name
             if not owner:
                 X_BS = X_WB @ X_BS
-            # The simulator returns height, radius of a cylinder.
-            lengths = (2 * size[1], 2 * size[1], size[0]) if kind == pybullet.GEOM_CYLINDER else tuple(size)
-            if kind == pybullet.GEOM_SPHERE:
+            # PyBullet returns height and radius of a cylinder, and the radius of a sphere.
+            lengths = tuple(size)
+            if geometry == pybullet.GEOM_CYLINDER:
+                lengths = (2 * size[1], 2 * size[1], size[0])
+            elif geometry == pybullet.GEOM_SPHERE:
                 lengths = (2 * size[0],) * 3
             rgb = TABLE_COLOUR if body == world.table else tuple(colour[:3])
-            yield Shape(owner, _KINDS[kind], lengths, X_BS, rgb, file.decode())
+            yield Shape(owner, _SHAPE_KINDS[geometry], lengths, X_BS, rgb, file.decode())
 
 
-def _inertia(world: World, body: int) -> Pose:
-    """Return `X_LI`, the pose of the centre of mass of a body in the frame of the body."""
+def _get_inertia_pose(world: World, body: int) -> Pose:
+    """Return `X_BI`, the pose of the centre of mass of a body in the frame of the body."""
     return Pose.of(*world.client.getDynamicsInfo(body, -1)[3:5])
 
 
-def _link(link: int) -> str:
+def _name_link(link: int) -> str:
     return f"link {link + 1}"
 
 
-def _object(body: int) -> str:
+def _name_object(body: int) -> str:
     return f"object {body}"

@@ -1,7 +1,7 @@
-"""The simulated world of a cell: arm with tool, table, bins and loose objects in PyBullet.
+"""Simulated world of a cell: arm with tool, table, bins and loose objects in PyBullet.
 
-The world frame W is at the base of the arm, on the table top. The same cell file and the same objects in
-the same order give bitwise the same world.
+The origin of the world frame W is at the base of the arm, on the table top. Worlds with the same cell file
+and the same objects in the same order are bitwise identical.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_walls
 from executive.cells.sim import command_log
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.model_files import find_model
-from executive.cells.sim.models import add_body, upright
+from executive.cells.sim.models import add_body, compute_upright_pose
 from executive.cells.sim.robot_models import ROBOT_MODELS, RobotModel
 from executive.cells.sim.table_top import TableTop
 from executive.geometry import Array, Pose
 
 TABLE_HEIGHT = 0.625
-"""Height of the table top of pybullet_data's table above its feet [m]."""
+"""Height of the table in pybullet_data [m]."""
 TABLE_CENTRE = (0.40, 0.0)
-"""Centre of the table top [m]; it is 1.0 m long along x and 1.5 m along y."""
+"""Centre of the table top in the world [m]; the table top is 1.0 m long along x and 1.5 m along y."""
 CYLINDER_MARGIN = 0.001
 """Collision margin that Bullet adds on all sides to a cylinder of a URDF [m]."""
 TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
-RAY_LENGTH, RAY_STEP = 5.0, 1e-4
-"""Length of a ray, and distance behind a surface of the arm at which the ray continues [m]."""
+MAX_RAY_LENGTH, RAY_RESTART_DISTANCE = 5.0, 1e-4
+"""Maximum length of a ray, and distance behind a hit of the arm at which the ray is cast again [m]."""
 
 
 class World:
@@ -42,25 +42,27 @@ class World:
 
     Args:
         config: The cell file.
-        gui: True shows the world in a window.
-        visuals: False loads no visual shapes, which halves the loading time; cameras then see nothing.
+        gui: True to show the world in a window.
+        visuals: False to load no visual shapes, which halves the loading time; camera images are then empty.
 
     Attributes:
-        client: The connection to the physics server.
+        config: The cell file.
+        client: The connection to the physics server, which identifies bodies by integers.
         arm: Body of the arm, fixed at the origin.
         robot: Model of the arm.
         flange: Index of the link with the flange.
         tool: Index of the link of the tool, whose frame is that of the flange.
-        table, plane: Bodies of the table and of the floor under the table.
+        table, floor: Bodies of the table and of the floor under the table.
         table_top: The surface of the table.
-        bins: Bodies of each bin.
-        bodies: Label of every loose object, by body.
+        bins: Bodies of each bin, by name.
+        bodies: Class of every loose object, by body.
         models: Model of every loose object, by body.
         steps: Number of physics steps.
-        log: Log of the commands to the world; each is appended before its execution.
-        idle: True while physics steps belong to no run.
-        stood: Positions `(3,)` [m] at which loose objects were placed or released after creation, by body.
-        removed: Class and last position `(3,)` [m] of each removed object, by body.
+        log: Log of the commands to the world; each command is appended before its execution.
+        is_idle: True during physics steps that belong to no control step of the run.
+        rest_positions: Positions `(3,)` [m] to which loose objects were moved or at which the tool released
+            them, by body; without their initial positions.
+        removed_objects: Class and last position `(3,)` [m] of each removed object, by body.
     """
 
     def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
@@ -72,7 +74,7 @@ class World:
         self.client.setTimeStep(STEP)
         self.client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
         flags = 0 if visuals else pybullet.URDF_IGNORE_VISUAL_SHAPES
-        self.plane = self.client.loadURDF(str(find_model("plane.urdf")), [0, 0, -TABLE_HEIGHT], flags=flags)
+        self.floor = self.client.loadURDF(str(find_model("plane.urdf")), [0, 0, -TABLE_HEIGHT], flags=flags)
         self.table = self.client.loadURDF(
             str(find_model("table/table.urdf")),
             [*TABLE_CENTRE, -TABLE_HEIGHT],
@@ -87,17 +89,17 @@ class World:
         self.models: dict[int, ObjectConfig] = {}
         self.steps = 0
         self.log = CommandLog()
-        self.idle = False
-        self.stood: dict[int, list[Array]] = {}
-        self.removed: dict[int, tuple[str, Array]] = {}
-        self.set_arm(np.radians(config.arm.poses_deg["home"]))
+        self.is_idle = False
+        self.rest_positions: dict[int, list[Array]] = {}
+        self.removed_objects: dict[int, tuple[str, Array]] = {}
+        self.set_joint_positions(np.radians(config.arm.poses_deg["home"]))
 
     def add_object(
         self, label: str, X_WO: Pose, colour: Sequence[float], model: ObjectConfig | None = None
     ) -> int:
-        """Add an object of class `label` at `X_WO` (z up if it stands upright) and return its body.
+        """Add an object of the class `label` at `X_WO`, whose z axis points up if the object is upright.
 
-        The default model is that of the cell file.
+        Returns the body of the object. The default model is that of the class in the cell file.
         """
         model = model or self.config.objects[label]
         body = add_body(self.client, model, X_WO)
@@ -107,14 +109,14 @@ class World:
 
     def remove_object(self, body: int) -> None:
         """Remove a loose object from the world."""
-        self.log.note(command_log.REMOVE, body)
-        self.removed[body] = self.bodies[body], self.object_pose(body).position
+        self.log.append(command_log.REMOVE, body)
+        self.removed_objects[body] = self.bodies[body], self.get_object_pose(body).position
         del self.bodies[body], self.models[body]
         self.client.removeBody(body)
 
     def name_body(self, body: int) -> str:
         """Return the name of a body for messages."""
-        for name, bodies in {"the table": (self.table,), "the floor": (self.plane,), **self.bins}.items():
+        for name, bodies in {"the table": (self.table,), "the floor": (self.floor,), **self.bins}.items():
             if body in bodies:
                 return name
         return f"a {self.bodies[body]}" if body in self.bodies else "the arm"
@@ -123,62 +125,69 @@ class World:
         """Return the name of a link of the arm for messages, by its index."""
         return "the tool" if link == self.tool else f"link {link + 1}"
 
-    def object_pose(self, body: int) -> Pose:
+    def get_object_pose(self, body: int) -> Pose:
         """Return the pose `X_WO` of a loose object, in the frame of `add_object`."""
         X_WI = Pose.of(*self.client.getBasePositionAndOrientation(body))
         X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
-        return X_WI @ X_LI.inverse() @ upright(self.models[body]).inverse()
+        return X_WI @ X_LI.inverse() @ compute_upright_pose(self.models[body]).inverse()
 
     def place_object(self, body: int, X_WO: Pose) -> None:
         """Move a loose object to `X_WO`, at rest."""
-        self.stood.setdefault(body, []).append(X_WO.position)
-        self.log.note(command_log.PLACE, body, *X_WO.position, *X_WO.quaternion)
+        self.rest_positions.setdefault(body, []).append(X_WO.position)
+        self.log.append(command_log.SET_POSE, body, *X_WO.position, *X_WO.quaternion)
         X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
-        X_WI = X_WO @ upright(self.models[body]) @ X_LI
+        X_WI = X_WO @ compute_upright_pose(self.models[body]) @ X_LI
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
 
-    def set_arm(self, q: Sequence[float] | Array) -> None:
-        """Set the joint positions to `q` `(n,)` [rad] at rest, without collision checks."""
+    def set_joint_positions(self, q: Sequence[float] | Array) -> None:
+        """Move the arm to joint positions `q` `(n,)` [rad] at once, without physics or collision checks."""
         for joint, angle in enumerate(q):
             self.client.resetJointState(self.arm, joint, angle)
 
     def command_arm(self, q: Array, time: float = 0.0) -> None:
-        """Command joint positions `q` `(n,)` [rad] at `time` [s] of the motion.
+        """Command joint positions `q` `(n,)` [rad]; `time` [s] since the start of the motion is only logged.
 
-        With full position gain and zero velocity, a command before every step follows a path to 0.0005°.
+        With full position gain, zero target velocity and a command before every step, the arm follows a path
+        with an error of 0.0005°.
         """
-        self.log.note(command_log.JOINTS_TO, time, *q)
+        self.log.append(command_log.JOINT_TARGETS, time, *q)
         self.client.setJointMotorControlArray(
             self.arm,
             range(self.robot.joint_count),
             pybullet.POSITION_CONTROL,
             targetPositions=q.tolist(),
-            forces=self.robot.torques,
+            forces=self.robot.max_torques,
             positionGains=[1.0] * self.robot.joint_count,
         )
 
-    def flange_pose(self) -> Pose:
+    def get_flange_pose(self) -> Pose:
         """Return `X_WF`, the pose of the flange."""
         state = self.client.getLinkState(self.arm, self.flange, computeForwardKinematics=True)
         return Pose.of(*state[4:6]) @ Pose.of([0, 0, self.robot.flange_offset])
 
-    def tool_pose(self) -> Pose:
-        """Return `X_WT`, the pose of the tool centre point, which is the centre of the lip of the cup."""
-        return self.flange_pose() @ Pose.of([0, 0, self.config.tool.length])
+    def get_tool_pose(self) -> Pose:
+        """Return `X_WT`, the pose of the tool centre point: the centre of the lip of the cup."""
+        return self.get_flange_pose() @ Pose.of([0, 0, self.config.tool.length])
 
     def cast_ray(self, origin: Array, direction: Array) -> Array | None:
-        """Return the first hit of a ray `(3,)` [m] on a body other than arm and tool, or None."""
-        end = origin + RAY_LENGTH * direction / np.linalg.norm(direction)
+        """Return the first point `(3,)` [m] of a ray on a body other than arm and tool, or None.
+
+        Args:
+            origin: Start of the ray `(3,)` [m].
+            direction: Direction of the ray `(3,)`, of any length above 0.
+        """
+        end = origin + MAX_RAY_LENGTH * direction / np.linalg.norm(direction)
         start = origin
         while True:
-            body, _, share, point, _ = self.client.rayTest(start, end)[0]
+            body, _, fraction, point, _ = self.client.rayTest(start, end)[0]
             if body != self.arm:
                 return np.array(point) if body >= 0 else None
-            start = start + share * (end - start) + RAY_STEP * (end - start) / np.linalg.norm(end - start)
+            ray = end - start
+            start = start + fraction * ray + RAY_RESTART_DISTANCE * ray / np.linalg.norm(ray)
 
     def step(self) -> None:
         """Advance the physics by 1/240 s."""
-        self.log.note(command_log.IDLE if self.idle else command_log.STEP)
+        self.log.append(command_log.IDLE_STEP if self.is_idle else command_log.RUN_STEP)
         self.client.stepSimulation()
         self.steps += 1
 
@@ -188,14 +197,15 @@ class World:
         self.client.disconnect()
 
     def _load_arm(self, flags: int) -> int:
-        """Load the arm with the tool as an additional fixed link, because errors of a constraint could drift.
+        """Load the arm with the tool as an additional fixed link and return the body.
 
-        Bodies do not collide with themselves (PyBullet's default), so tool and wrist may overlap.
+        The errors of a constraint between arm and tool could drift. Links of one body do not collide with
+        each other (PyBullet's default), so tool and wrist may overlap.
         """
         path = find_model(self.config.arm.urdf)
         text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
         tool = self.config.tool
-        text = text.replace("</robot>", _tool_link(tool.length, tool.cup_radius, self.robot))
+        text = text.replace("</robot>", _make_tool_urdf(tool.length, tool.cup_radius, self.robot))
         with tempfile.TemporaryDirectory() as folder:
             generated = Path(folder) / "arm_with_tool.urdf"
             generated.write_text(text)
@@ -208,31 +218,25 @@ def name_held(label: str) -> str:
 
 
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
-    """Create a static body with floor and walls of a bin at its position, and return it."""
-    halves, places = map(list, zip(*list_bin_walls(bin.size), strict=True))
-    shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(halves), "halfExtents": halves}
-    return int(
-        client.createMultiBody(
-            baseMass=0,
-            baseCollisionShapeIndex=client.createCollisionShapeArray(**shape, collisionFramePositions=places),
-            baseVisualShapeIndex=client.createVisualShapeArray(
-                **shape, visualFramePositions=places, rgbaColors=[[*bin.colour, 1]] * len(halves)
-            ),
-            basePosition=bin.position,
-        )
-    )
+    """Create a static body with floor and walls of a bin at its position, and return the body."""
+    half_sizes, centres = map(list, zip(*list_bin_walls(bin.size), strict=True))
+    shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(half_sizes), "halfExtents": half_sizes}
+    colours = [[*bin.colour, 1]] * len(half_sizes)
+    collision = client.createCollisionShapeArray(**shape, collisionFramePositions=centres)
+    visual = client.createVisualShapeArray(**shape, visualFramePositions=centres, rgbaColors=colours)
+    return int(client.createMultiBody(0, collision, visual, bin.position))
 
 
-def _tool_link(length: float, cup_radius: float, robot: RobotModel) -> str:
+def _make_tool_urdf(length: float, cup_radius: float, robot: RobotModel) -> str:
     """Return the URDF text of the tool, from the flange to the lip, with the closing tag of the robot."""
-    body = length - NECK_LENGTH
-    parts = [(body, TOOL_RADIUS, body / 2), (NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2)]
+    shaft = length - NECK_LENGTH
+    cylinders = [(shaft, TOOL_RADIUS, shaft / 2), (NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2)]
     shapes = "".join(
         f'<{kind}><origin xyz="0 0 {z}"/><geometry>'
         f'<cylinder length="{size - 2 * margin}" radius="{radius - margin}"/></geometry>'
         + ('<material name="Grey"/>' if kind == "visual" else "")
         + f"</{kind}>"
-        for size, radius, z in parts
+        for size, radius, z in cylinders
         for kind, margin in (("visual", 0.0), ("collision", CYLINDER_MARGIN))
     )
     return f"""

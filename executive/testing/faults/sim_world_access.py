@@ -45,7 +45,7 @@ class SimWorldAccess(WorldAccess):
     def move(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
         """Displace an object."""
         self.release_if_held(true_object)
-        X_WO = self._world.object_pose(true_object.body)
+        X_WO = self._world.get_object_pose(true_object.body)
         position = X_WO.position + np.array([*displacement, 0.0])
         self._world.place_object(true_object.body, Pose(X_WO.rotation, position))
 
@@ -59,10 +59,10 @@ class SimWorldAccess(WorldAccess):
 
     def settle(self) -> None:
         """Simulate one second that does not belong to a run."""
-        self._world.idle = True
+        self._world.is_idle = True
         for _ in range(SETTLING_STEPS):
             self._workcell.advance()
-        self._world.idle = False
+        self._world.is_idle = False
 
     def _describe(self, body: int) -> TrueObject:
-        return TrueObject(body, self._world.bodies[body], self._world.object_pose(body).position)
+        return TrueObject(body, self._world.bodies[body], self._world.get_object_pose(body).position)

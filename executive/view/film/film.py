@@ -10,7 +10,7 @@ from pathlib import Path
 from PIL import Image
 
 from executive.cells.sim.shots import Shoot, count_steps, take_pictures
-from executive.cells.sim.viewpoint import overview
+from executive.cells.sim.viewpoint import compute_viewpoint
 from executive.view.film.formats import FilmFormat
 from executive.view.film.page import SCENE_SIZE, draw_page, draw_result
 from executive.view.film.run_state import FilmRunState
@@ -67,7 +67,7 @@ def _draw_frames(
     subtitle = f"seed {start.seed} · cell {source.config.cell}{speed_text}"
     duration = steps[-1] * start.step
     state = FilmRunState(source.events, source.nodes, list(directory.pictures.glob("*.jpg")))
-    view = overview(source.config, SCENE_SIZE, CELL_BOX)
+    view = compute_viewpoint(source.config, SCENE_SIZE, CELL_BOX)
     shoot = Shoot(source.config, start.seed, directory.world_log, view, directory.scene)
     with closing(take_pictures(shoot, steps, workers)) as pictures:
         for step, picture in zip(steps, pictures, strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from executive.cells.sim.command_log import is_log
+from executive.cells.sim.command_log import is_command_log
 from executive.errors import InputError
 from executive.events import ItemChanged
 from executive.record.journal import find_end, find_start, read_journal
@@ -61,7 +61,7 @@ def _require_log(directory: RunDirectory) -> None:
             "simulated again; sweeps do not keep this file. Run the mission again with `executive run` and "
             "the same seed, and film that run"
         )
-    if not is_log(directory.world_log):
+    if not is_command_log(directory.world_log):
         raise InputError(
             f'the run in "{directory.path}" cannot be filmed: its cell has no simulated world; '
             "film a run on a cell of `kind: sim`"

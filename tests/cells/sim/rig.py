@@ -8,7 +8,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
 from executive.cells.sim.arm import SimArm
-from executive.cells.sim.collision import PathClearance
+from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
 from executive.events import Event
@@ -30,7 +30,7 @@ class Rig:
     def __init__(self, config: CellConfig) -> None:
         self.config = config
         self.world = World(config, visuals=False)
-        self.clearance = PathClearance(config)
+        self.clearance = ClearanceChecker(config)
         self.planner = build_planner(config, self.clearance.check)
         self.clock = StepClock(lambda: self.world.steps * STEP)
         self.events: list[Event] = []

@@ -150,7 +150,7 @@ def test_a_motion_of_another_arm_is_a_fault(rig: Rig) -> None:
 def test_an_arm_pushed_off_its_path_brakes_and_says_so(rig: Rig) -> None:
     rig.arm.start(rig.planned(OVER))
     rig.step(30)
-    rig.world.set_arm(rig.arm.q + np.radians([0, 3, 0, 0, 0, 0, 0]))
+    rig.world.set_joint_positions(rig.arm.q + np.radians([0, 3, 0, 0, 0, 0, 0]))
     rig.step(2)
     with pytest.raises(Fault, match=r"the command is \d\.\d\d° away from where joint 2 of the arm is; 0\.5°"):
         _ = rig.arm.at_rest

@@ -9,7 +9,7 @@ import pytest
 from executive.cell.arm import Task
 from executive.cell.config import CellConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
-from executive.cells.sim.collision import PathClearance
+from executive.cells.sim.collision import ClearanceChecker
 from executive.errors import Blocked
 from executive.motion.arms import build_kinematics
 from executive.motion.iiwa14_kinematics import Iiwa14, find_max_wrist_angle
@@ -21,8 +21,8 @@ COIN = Obstacle(0.5, 0.1, 0.03, 0.0005, "a coin")
 
 
 @pytest.fixture(scope="module")
-def clearance(overhead: CellConfig) -> Iterator[PathClearance]:
-    clearance = PathClearance(overhead)
+def clearance(overhead: CellConfig) -> Iterator[ClearanceChecker]:
+    clearance = ClearanceChecker(overhead)
     yield clearance
     clearance.close()
 
@@ -81,7 +81,7 @@ def into_the_bin(height: float, *distances: float) -> list[tuple[float, float, f
     ],
 )
 def test_a_path_keeps_the_margin_but_a_load_may_lie_on_table_and_floor(
-    clearance: PathClearance, at, places, task: Task, said: str
+    clearance: ClearanceChecker, at, places, task: Task, said: str
 ) -> None:
     """A motion may leave a place that is too near to something, but not come nearer."""
     path = np.array([at(*place) for place in places])
@@ -94,14 +94,14 @@ def test_a_path_keeps_the_margin_but_a_load_may_lie_on_table_and_floor(
 
 def test_a_long_tool_may_meet_the_upper_arm(overhead: CellConfig) -> None:
     tool = overhead.tool.model_copy(update={"length": 0.3})
-    clearance = PathClearance(overhead.model_copy(update={"tool": tool}))
+    clearance = ClearanceChecker(overhead.model_copy(update={"tool": tool}))
     folded = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -65, 105, -120, 0, 100, 0)])
     with pytest.raises(Blocked, match=r"the tool 0\.009 m into link 2, with the tool at"):
         clearance.check(folded)
     clearance.close()
 
 
-def test_the_margin_is_kept_above_and_beside_what_stands_around(clearance: PathClearance, at) -> None:
+def test_the_margin_is_kept_above_and_beside_what_stands_around(clearance: ClearanceChecker, at) -> None:
     def passes(*end: float) -> bool:
         try:
             clearance.check(np.array([at(0.5, -0.1, 0.25), at(*end)]), Task(around=(TOWER,)))
@@ -115,14 +115,14 @@ def test_the_margin_is_kept_above_and_beside_what_stands_around(clearance: PathC
     assert [passes(0.5, 0.1 - beside - gap, 0.15) for gap in (0.006, 0.004)] == [True, False]
 
 
-def test_several_things_of_one_size_stand_around_at_once(clearance: PathClearance, at) -> None:
+def test_several_things_of_one_size_stand_around_at_once(clearance: ClearanceChecker, at) -> None:
     towers = tuple(Obstacle(0.5, y, 0.03, 0.2, f"cube-{y}") for y in (-0.1, 0.0, 0.1))
     for tower in towers:
         with pytest.raises(Blocked, match=f"into {tower.name}, "):
             clearance.check(np.array([at(0.5, 0.2, 0.25), at(0.5, tower.y, 0.15)]), Task(around=towers))
 
 
-def test_a_held_object_keeps_clear_of_the_arm(clearance: PathClearance) -> None:
+def test_a_held_object_keeps_clear_of_the_arm(clearance: ClearanceChecker) -> None:
     path = np.radians([(0, -65, 60, -90, 0, 60, 0), (0, -100, 65, -110, 0, 105, 0)])
     clearance.check(path)
     with pytest.raises(Blocked, match=r"the held rod 0\.004 m into link 2, with the tool at"):
@@ -135,6 +135,6 @@ def test_the_wrist_may_fold_as_far_as_links_5_and_7_stay_apart(clearance, distan
     for side in (-1, 1):
         q = rng.uniform(-2, 2, 7)
         q[5] = side * find_max_wrist_angle(distance)
-        world.set_arm(q)
+        world.set_joint_positions(q)
         points = world.client.getClosestPoints(world.arm, world.arm, 0.05, linkIndexA=4, linkIndexB=6)
         assert min(point[8] for point in points) == pytest.approx(distance, abs=5e-4)

@@ -18,7 +18,7 @@ OVERTRAVEL, DROP = 0.015, 0.015
 
 def in_tool(rig: Rig, body: int) -> Pose:
     """Return the pose of an object in the tool's frame."""
-    return rig.world.tool_pose().inverse() @ rig.world.object_pose(body)
+    return rig.world.get_tool_pose().inverse() @ rig.world.get_object_pose(body)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_an_object_is_picked_carried_without_slip_and_placed(
     rig.run()
     assert arm.collision is None
     rig.step(120)
-    lies = rig.world.object_pose(body).position
+    lies = rig.world.get_object_pose(body).position
     assert lies[:2] == pytest.approx(box.slots[0], abs=0.03)
     assert box.contains(lies)
     assert lies[2] < kind.height

@@ -76,7 +76,7 @@ def test_a_guarded_descent_rests_within_a_millimetre_of_where_it_felt_something(
     motion, top = rig.config.motion, rig.config.objects[label].height
     body = rig.add(label, *place)
     rig.step(60)
-    lay, expected = rig.world.object_pose(body).position, top - share * motion.descent
+    lay, expected = rig.world.get_object_pose(body).position, top - share * motion.descent
     lowest = expected - 0.015
     goal = Goal((*place, lowest), guarded=0.015 + motion.descent, speed=motion.descent_speed)
     felt, pressed = rig.touch_down(goal)
@@ -85,6 +85,6 @@ def test_a_guarded_descent_rests_within_a_millimetre_of_where_it_felt_something(
     assert rig.tool.touching
     assert rig.arm.collision is None
     assert pressed < 1.0, "the weight of the object [N]"
-    assert rig.world.object_pose(body).position == pytest.approx(lay, abs=2e-4)
+    assert rig.world.get_object_pose(body).position == pytest.approx(lay, abs=2e-4)
     rig.tool.close()
     assert rig.tool.holding

@@ -12,7 +12,7 @@ import pytest
 from executive.cell.bins import Bin
 from executive.cell.workcell import PLACES
 from executive.cells.audit import UNKNOWN
-from executive.cells.sim.audit import audit
+from executive.cells.sim.audit import audit_bodies
 from executive.geometry import Pose
 
 IN_BIN, ON_TABLE, ON_FLOOR = (0.2, -0.44, 0.12), (0.5, 0.0, 0.025), (1.4, 0.0, -0.6)
@@ -23,10 +23,10 @@ class OneBody:
 
     def __init__(self, label: str = "cube", place: Sequence[float] = IN_BIN) -> None:
         self.bodies = {7: label}
-        self.removed: dict[int, tuple[str, np.ndarray]] = {}
+        self.removed_objects: dict[int, tuple[str, np.ndarray]] = {}
         self._place = place
 
-    def object_pose(self, body: int) -> Pose:
+    def get_object_pose(self, body: int) -> Pose:
         return Pose.of(self._place)
 
 
@@ -34,7 +34,9 @@ def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more:
     bins = {"red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), np.array([0.2, 0.2, 0.1]), np.zeros((1, 2)))}
     stood = {7: [np.array([0.5, 0.0, 0.025])]}
     options = {"records": [], **more}
-    return audit(world or OneBody(), stood, bins=bins, routes={"cube": bins_of_cube}, reach=0.025, **options)  # type: ignore[arg-type]
+    return audit_bodies(
+        world or OneBody(), stood, bins=bins, routes={"cube": bins_of_cube}, max_distance=0.025, **options
+    )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -44,15 +46,15 @@ def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more:
         (("blue_bin", "red_bin"), {}, "right"),
         (("blue_bin", "grey_bin"), {}, "wrong_bin"),
         (("red_bin",), {"held": 7}, "left"),
-        (("blue_bin",), {"fallen": {7}}, "elsewhere"),
-        (("red_bin",), {"fallen": {7}}, "right"),
+        (("blue_bin",), {"dropped": {7}}, "elsewhere"),
+        (("red_bin",), {"dropped": {7}}, "right"),
     ],
 )
 def test_a_body_in_a_bin_counts_by_its_class_and_by_who_put_it_there(
     bins: tuple[str, ...], more: dict[str, Any], end: str
 ) -> None:
     none = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "fell_in_wrong_bin": 0, "unseen": 1}
-    fell = bins == ("blue_bin",) and "fallen" in more
+    fell = bins == ("blue_bin",) and "dropped" in more
     assert counted(bins, **more) == {**none, end: 1, "fell_in_wrong_bin": int(fell)}
 
 
@@ -61,7 +63,7 @@ def test_a_body_in_a_bin_counts_by_its_class_and_by_who_put_it_there(
     [
         (("red_bin",), IN_BIN, {}, "right"),
         (("blue_bin",), IN_BIN, {}, "wrong_bin"),
-        (("red_bin",), IN_BIN, {"fallen": {7}}, "elsewhere"),
+        (("red_bin",), IN_BIN, {"dropped": {7}}, "elsewhere"),
         (("red_bin",), ON_TABLE, {}, "elsewhere"),
     ],
 )
@@ -69,7 +71,7 @@ def test_a_body_that_was_taken_out_of_a_bin_counts_as_if_it_still_lay_there(
     bins: tuple[str, ...], place: Sequence[float], more: dict[str, Any], end: str
 ) -> None:
     world = OneBody()
-    world.removed[7] = (world.bodies.pop(7), np.array(place))
+    world.removed_objects[7] = (world.bodies.pop(7), np.array(place))
     item = SimpleNamespace(state=None, first_position=np.array(ON_TABLE))
     assert counted(bins, world, records=[item], **more) == {**dict.fromkeys(PLACES, 0), end: 1}
     assert counted(bins, world, **more) == dict.fromkeys(PLACES, 0), "nobody had seen it"

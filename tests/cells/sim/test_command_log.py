@@ -10,7 +10,7 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cell.config import CellConfig
 from executive.cells.sim import command_log as log
-from executive.cells.sim.command_log import CommandLog, read_commands, states_of
+from executive.cells.sim.command_log import CommandLog, read_commands, to_joint_states
 from executive.errors import InputError
 from executive.motion.arms import build_planner
 
@@ -23,17 +23,17 @@ def path(tmp_path: Path) -> Path:
 def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
     written = CommandLog(path, 7)
     joints = (1 / 3, *np.random.default_rng(1).normal(size=7))
-    written.note(log.CLOSE)
-    written.note(log.JOINTS_TO, *joints)
-    written.note(log.STEP)
-    written.note(log.PLACE, 7, *joints[:7])
+    written.append(log.VACUUM_ON)
+    written.append(log.JOINT_TARGETS, *joints)
+    written.append(log.RUN_STEP)
+    written.append(log.SET_POSE, 7, *joints[:7])
     written.close()
-    again = CommandLog(path, 7, again=True)
-    again.note(log.IDLE)
+    again = CommandLog(path, 7, resume=True)
+    again.append(log.IDLE_STEP)
     again.close()
     read = list(read_commands(path))
     assert [one.kind for one in read] == [
-        log.CLOSE, log.JOINTS_TO, log.STEP, log.PLACE, log.IDLE,
+        log.VACUUM_ON, log.JOINT_TARGETS, log.RUN_STEP, log.SET_POSE, log.IDLE_STEP,
     ]  # fmt: skip
     assert read[1].numbers == joints
     assert read[3].numbers == (7, *joints[:7])
@@ -42,45 +42,45 @@ def test_it_reads_what_was_written_bit_by_bit(path: Path) -> None:
 def test_a_command_that_was_torn_is_left_out_wherever_it_was(path: Path, overhead: CellConfig) -> None:
     planner = build_planner(overhead)
     written = CommandLog(path, 7)
-    written.note(log.STEP)
+    written.append(log.RUN_STEP)
     whole = path.stat().st_size
-    written.note(log.JOINTS_TO, *range(8))
+    written.append(log.JOINT_TARGETS, *range(8))
     motion = planner.plan(np.radians(overhead.arm.poses_deg["home"]), Goal((0.5, 0.0, 0.1)))
-    written.motion(motion)
+    written.append_motion(motion)
     written.close()
     *_, command = read_commands(path)
     assert command.numbers[:2] == (motion.duration, motion.guarded_start_time)
-    for one, other in zip(states_of(command), motion.samples, strict=True):
+    for one, other in zip(to_joint_states(command), motion.samples, strict=True):
         assert np.array_equal(one, other)
     content = path.read_bytes()
     for length in (whole, whole + 1, whole + 64, whole + 65, whole + 70, len(content) - 1):
         path.write_bytes(content[:length])
         kinds = [one.kind for one in read_commands(path)]
-        assert kinds == [log.STEP] + [log.JOINTS_TO] * (length >= whole + 65), length
+        assert kinds == [log.RUN_STEP] + [log.JOINT_TARGETS] * (length >= whole + 65), length
 
 
 def test_what_goes_on_begins_after_the_last_whole_command(path: Path) -> None:
     written = CommandLog(path, 7)
-    written.note(log.STEP)
-    written.note(log.JOINTS_TO, *range(8))
+    written.append(log.RUN_STEP)
+    written.append(log.JOINT_TARGETS, *range(8))
     written.close()
     written.close()
     path.write_bytes(path.read_bytes()[:-5])
-    again = CommandLog(path, 7, again=True)
-    again.note(log.OPEN)
+    again = CommandLog(path, 7, resume=True)
+    again.append(log.VACUUM_OFF)
     again.close()
-    CommandLog().note(log.STEP)  # nothing is kept without a path
-    assert [one.kind for one in read_commands(path)] == [log.STEP, log.OPEN]
+    CommandLog().append(log.RUN_STEP)  # nothing is kept without a path
+    assert [one.kind for one in read_commands(path)] == [log.RUN_STEP, log.VACUUM_OFF]
 
 
 def test_a_damaged_log_says_so(path: Path) -> None:
     written = CommandLog(path, 7)
-    written.note(log.STEP)
-    written.note(log.JOINTS_TO, *range(8))
+    written.append(log.RUN_STEP)
+    written.append(log.JOINT_TARGETS, *range(8))
     written.close()
     content = path.read_bytes()
     path.write_bytes(content + bytes(4096))
-    assert [one.kind for one in read_commands(path)] == [log.STEP, log.JOINTS_TO]
+    assert [one.kind for one in read_commands(path)] == [log.RUN_STEP, log.JOINT_TARGETS]
     not_finite = content[:-8] + np.float64(np.nan).tobytes()
     for damaged in (content + b"?" + content, not_finite):
         path.write_bytes(damaged)
@@ -99,14 +99,14 @@ def test_a_file_that_is_no_log_says_so(path: Path) -> None:
         list(read_commands(path))
     with pytest.raises(InputError, match=r"cannot write .*: not a directory"):
         CommandLog(path / "below", 7)
-    assert not log.is_log(path)
+    assert not log.is_command_log(path)
     CommandLog(path, 7).close()
-    assert log.is_log(path)
+    assert log.is_command_log(path)
 
 
 def test_the_header_states_the_number_of_joints(path: Path) -> None:
     written = CommandLog(path, 6)
-    written.note(log.JOINTS_TO, *range(7))
+    written.append(log.JOINT_TARGETS, *range(7))
     written.close()
     assert path.read_bytes().startswith(b"executive world 2 joints 6\n")
     assert [one.numbers for one in read_commands(path)] == [tuple(range(7))]
@@ -121,4 +121,4 @@ def test_a_log_of_another_version_is_refused_in_one_message(path: Path, header: 
     ):
         list(read_commands(path))
     with pytest.raises(InputError, match="reads version 2"):
-        CommandLog(path, 7, again=True)
+        CommandLog(path, 7, resume=True)

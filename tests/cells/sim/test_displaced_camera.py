@@ -75,8 +75,10 @@ def test_a_camera_that_is_moved_during_a_run_ends_it_once_the_tool_is_empty() ->
         def capture(self) -> TrueFrame:
             if self._frames == 6:
                 keys = ("position", "look_at")
-                moved = {key: tuple(np.add(getattr(self._true, key), (0.0, 0.02, 0.0))) for key in keys}
-                self._true = self._true.model_copy(update=moved)
+                moved = {
+                    key: tuple(np.add(getattr(self._true_config, key), (0.0, 0.02, 0.0))) for key in keys
+                }
+                self._true_config = self._true_config.model_copy(update=moved)
             return super().capture()
 
     kind = partial(make_oracle_kind(), camera=partial(Pushed, renders_images=True))

@@ -85,7 +85,7 @@ def test_the_table_felt_through_a_hole_is_no_contact(with_one: Callable[..., Sim
     target = seen(made)
     (body,) = made._world.bodies
     # As if the detection had been off by just the ring: the cup comes down in the hole.
-    target.position[:2] = made._world.object_pose(body).position[:2] - np.array([0.017, 0.0])
+    target.position[:2] = made._world.get_object_pose(body).position[:2] - np.array([0.017, 0.0])
     result = run_skill(Approach(target=target), made)
     assert result.reason == "no_contact"
     assert result.message.startswith("no contact down to 3 mm")

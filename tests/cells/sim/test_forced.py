@@ -30,7 +30,7 @@ def held(rig: Rig) -> int:
 
 
 def height(rig: Rig, body: int) -> float:
-    return float(rig.world.object_pose(body).position[2])
+    return float(rig.world.get_object_pose(body).position[2])
 
 
 def test_a_seal_gives_way_and_the_object_falls(rig: Rig, held: int) -> None:

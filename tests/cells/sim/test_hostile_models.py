@@ -9,7 +9,7 @@ import pytest
 
 from executive.cell.config import ObjectConfig
 from executive.cells.sim.model_files import find_model
-from executive.cells.sim.models import load_mesh, mass_of
+from executive.cells.sim.models import compute_mass, load_mesh
 from executive.errors import InputError
 
 LEVELS = "".join(f"<!ENTITY a{number + 1} '{f'&a{number};' * 10}'>" for number in range(9))
@@ -33,7 +33,7 @@ def test_a_file_that_is_no_urdf_is_an_error(content: str, error: str, tmp_path: 
     (tmp_path / "m.urdf").write_text(content)
     config = ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03)
     with pytest.raises(InputError) as raised:
-        mass_of(config)
+        compute_mass(config)
     assert str(raised.value).startswith(error)
 
 
@@ -62,7 +62,7 @@ def test_a_mesh_that_is_no_file_is_not_opened(part: str, tmp_path: Path) -> None
     shape = f"<{part}><geometry><mesh filename='pipe.obj'/></geometry></{part}>"
     (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
     with pytest.raises(InputError, match=r"^there is no model .*pipe\.obj, neither beside the cell file nor"):
-        mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+        compute_mass(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_no_element_of_a_urdf_names_a_file_outside_of_its_folder(
 ) -> None:
     (tmp_path / "m.urdf").write_text(f"<robot><visual><geometry>{part}</geometry></visual></robot>")
     with pytest.raises(InputError) as raised:
-        mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+        compute_mass(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
     assert str(raised.value).startswith(error)
 
 
@@ -94,7 +94,7 @@ def test_an_stl_mesh_of_more_than_20000_triangles_is_refused(content: bytes, tmp
     shape = "<collision><geometry><mesh filename='m.stl'/></geometry></collision>"
     (tmp_path / "m.urdf").write_text(f"<robot>{shape}</robot>")
     with pytest.raises(InputError, match=r"^the model m\.stl has more than 20000 triangles; simplify"):
-        mass_of(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
+        compute_mass(ObjectConfig(urdf=str(tmp_path / "m.urdf"), height=0.05, radius=0.03))
 
 
 @pytest.mark.parametrize("model", ["m.urdf", "m.obj"])

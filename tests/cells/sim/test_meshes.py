@@ -92,7 +92,7 @@ def test_a_mesh_stands_around_its_middle_and_weighs_about_the_middle_of_its_volu
         world.add_object("wedge", X_WO, (1, 1, 1)),
         world.add_object("laid", Pose.of([0.3, 0, 0.3]), (1, 1, 1)),
     )
-    assert world.object_pose(body).to_rounded_list() == pytest.approx(X_WO.to_rounded_list(), abs=1e-6)
+    assert world.get_object_pose(body).to_rounded_list() == pytest.approx(X_WO.to_rounded_list(), abs=1e-6)
     assert world.client.getDynamicsInfo(body, -1)[0] == 0.2
     centre, _ = world.client.getBasePositionAndOrientation(body)
     assert centre == pytest.approx(X_WO.apply(mesh.centroid))

@@ -10,7 +10,7 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import build_bin, build_object_class
 from executive.cell.objects import Load
 from executive.cells.sim.cell import SimCell
-from executive.cells.sim.collision import PathClearance
+from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.min_times import SimMinTimes
 from executive.geometry import Array
 from executive.motion.arms import build_planner
@@ -35,7 +35,7 @@ def nearest(config: CellConfig, slots: Array) -> Array:
 @pytest.mark.slow
 def test_no_planned_carry_is_faster_than_the_least(overhead: CellConfig, least: SimMinTimes) -> None:
     """Half of them are the shortest there are: from the place nearest to a slot, and higher than it must."""
-    clearance = PathClearance(overhead)
+    clearance = ClearanceChecker(overhead)
     planner = build_planner(overhead, clearance.check)
     rng, home = np.random.default_rng(3), np.radians(overhead.arm.poses_deg["home"])
     shares = []

@@ -14,7 +14,7 @@ from executive.cell.clock import STEP
 from executive.cell.workcell import CellOptions, ResumePoint
 from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.cell import SimCell
-from executive.cells.sim.command_log import JOINTS_TO, CommandLog
+from executive.cells.sim.command_log import JOINT_TARGETS, CommandLog
 from executive.events import discard_event
 from executive.geometry import Array
 from executive.mission.load import load_mission
@@ -141,7 +141,7 @@ def test_a_command_that_no_physics_step_has_followed_is_not_skipped(
     log = tmp_path / "log"
     log.write_bytes(one.log.read_bytes())
     time = one.time + STEP
-    CommandLog(log, 7, again=True).note(JOINTS_TO, time, *one.motion.state_at(time).q)
+    CommandLog(log, 7, resume=True).append(JOINT_TARGETS, time, *one.motion.state_at(time).q)
     cell = rebuilt(mission, log)
     cell.advance()
     assert cell._arm._time == pytest.approx(time, abs=STEP / 10)

@@ -22,7 +22,7 @@ from executive.cells.sim.arrangements import (
 )
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
-from executive.cells.sim.silhouette import outline_area
+from executive.cells.sim.silhouette import compute_silhouette_area
 from executive.errors import InputError
 from executive.geometry import Pose
 from executive.processes import Workers
@@ -105,10 +105,12 @@ def test_a_resized_model_has_the_size_that_it_states(overhead: CellConfig) -> No
 
 def test_a_silhouette_has_the_area_of_its_shape(overhead: CellConfig) -> None:
     meshes = {label: load_mesh(model) for label, model in overhead.objects.items()}
-    areas = {label: outline_area(mesh, mesh.vertices[:, :2] * 1000) for label, mesh in meshes.items()}
+    areas = {
+        label: compute_silhouette_area(mesh, mesh.vertices[:, :2] * 1000) for label, mesh in meshes.items()
+    }
     assert areas["cube"] == pytest.approx(50**2)
     assert areas["sphere"] == pytest.approx(np.pi * 30**2, rel=0.01)
-    assert {label: mesh.convex for label, mesh in meshes.items()} == {
+    assert {label: mesh.is_convex for label, mesh in meshes.items()} == {
         "cube": True, "sphere": True, "duck": False,
     }  # fmt: skip
     extent = np.prod(np.ptp(meshes["duck"].vertices[:, :2] * 1000, axis=0))

@@ -25,7 +25,7 @@ from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, load_scene
 from executive.cells.sim.scene_world import build_light, true_cell
 from executive.cells.sim.scenes import SceneRenderer
-from executive.cells.sim.spawn import first_world
+from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.events import discard_event
@@ -70,7 +70,7 @@ def world(overhead: CellConfig) -> Iterator[Callable[..., World]]:
     worlds: list[World] = []
 
     def build(**sections: Any) -> World:
-        worlds.append(first_world(overhead, SEED, scene=scene(**sections)))
+        worlds.append(build_initial_world(overhead, SEED, scene=scene(**sections)))
         return worlds[-1]
 
     yield build
@@ -84,13 +84,13 @@ def capture(made: SimCell) -> Frame:
 
 def placed(world: World) -> list[tuple[str, list[float]]]:
     """Return label and pose of every object."""
-    return [(label, world.object_pose(body).to_rounded_list(5)) for body, label in world.bodies.items()]
+    return [(label, world.get_object_pose(body).to_rounded_list(5)) for body, label in world.bodies.items()]
 
 
 def test_a_scene_without_changes_is_the_declared_world(world: Build, overhead: CellConfig) -> None:
     assert true_cell(overhead, scene()) == overhead
     assert build_light(DECLARED_SCENE.light) == CELL_LIGHT
-    declared = first_world(overhead, SEED)
+    declared = build_initial_world(overhead, SEED)
     assert placed(world()) == placed(declared)
     declared.close()
     assert load_scene(None, overhead) == DECLARED_SCENE
@@ -129,12 +129,12 @@ def test_the_table_gets_a_colour_and_a_texture_and_the_objects_keep_theirs(
 
 def test_number_gap_and_stacks_are_those_of_the_scene(world: Build, overhead: CellConfig) -> None:
     made = world(table={"objects": [7, 7], "gap": 0.05})
-    places = [made.object_pose(body).position[:2] for body in made.bodies]
+    places = [made.get_object_pose(body).position[:2] for body in made.bodies]
     kinds = [overhead.objects[label].radius for label in made.bodies.values()]
     gaps = [np.linalg.norm(places[a] - places[b]) - kinds[a] - kinds[b] for a in range(7) for b in range(a)]
     assert (len(places), min(gaps) > 0.045) == (7, True)
     piled = world(table={"objects": [6, 6], "stacked": 1})
-    assert max(piled.object_pose(body).position[2] for body in piled.bodies) > 0.06
+    assert max(piled.get_object_pose(body).position[2] for body in piled.bodies) > 0.06
 
 
 def test_appearance_changes_no_position_and_the_ledger_does_not_know_the_true_size(
@@ -168,11 +168,11 @@ def test_unknown_objects_lie_beside_the_others_and_no_detector_knows_them(
     assert (len(world.bodies), len(strange)) == (5, 2)
     others = [body for body in world.bodies if body not in strange]
     for body in strange:
-        model, place = world.models[body], world.object_pose(body).position
+        model, place = world.models[body], world.get_object_pose(body).position
         assert "169.urdf" in model.urdf
         assert model.radius == pytest.approx(load_mesh(model).radius)
         for other in others:
-            apart = np.linalg.norm(world.object_pose(other).position[:2] - place[:2])
+            apart = np.linalg.norm(world.get_object_pose(other).position[:2] - place[:2])
             assert apart > model.radius, "neither on nor under an object"
     frame = capture(made)
     assert isinstance(frame, TrueFrame)
@@ -186,7 +186,7 @@ def middles(made: SimCell, matrix: np.ndarray, X_WC: Pose) -> np.ndarray:
     """Return where a camera sees the middle of the outline of each object `(N, 2)` [pixel]."""
     found = []
     for body, model in made._world.models.items():
-        pixels = project(matrix, X_WC, made._world.object_pose(body).apply(load_mesh(model).vertices))
+        pixels = project(matrix, X_WC, made._world.get_object_pose(body).apply(load_mesh(model).vertices))
         found.append((pixels.min(axis=0) + pixels.max(axis=0)) / 2)
     return np.array(found)
 
@@ -239,10 +239,10 @@ def test_the_error_of_a_camera_on_the_wrist_moves_with_the_arm(
     made = cell(wrist, camera={"shift": [0.0, 0.01, 0.0]})
     camera = wrist.cameras["wrist"]
     for pose in ("scan", "aside_left"):
-        made._world.set_arm(np.radians(wrist.arm.poses_deg[pose]))
-        flange, X_FC = made._world.flange_pose(), compute_calibration(camera)[1]
+        made._world.set_joint_positions(np.radians(wrist.arm.poses_deg[pose]))
+        flange, X_FC = made._world.get_flange_pose(), compute_calibration(camera)[1]
         assert capture(made).X_WC.to_rounded_list() == (flange @ X_FC).to_rounded_list()
-        true = made.cell.camera._true_view()[1]  # type: ignore[attr-defined]
+        true = made.cell.camera._get_true_view()[1]  # type: ignore[attr-defined]
         assert true.to_rounded_list() == (flange @ Pose.of([0.0, 0.01, 0.0]) @ X_FC).to_rounded_list()
 
 

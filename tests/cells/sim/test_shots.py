@@ -15,7 +15,7 @@ from executive.cells.sim import shots as module
 from executive.cells.sim.camera import Image
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.shots import GROUND, SKY, Shoot, count_steps, take_pictures, take_pictures_in_order
-from executive.cells.sim.viewpoint import overview
+from executive.cells.sim.viewpoint import compute_viewpoint
 from executive.errors import InputError
 
 SIZE = (96, 84)
@@ -27,13 +27,13 @@ def swing(config: CellConfig, path: Path, idle: int) -> Shoot:
     home = np.radians(config.arm.poses_deg["home"])
     commands = CommandLog(path, 7)
     for step in range(STEPS):
-        commands.note(log.JOINTS_TO, step / 240, *(home - 0.02 * step * np.eye(7)[0]))
-        commands.note(log.STEP)
+        commands.append(log.JOINT_TARGETS, step / 240, *(home - 0.02 * step * np.eye(7)[0]))
+        commands.append(log.RUN_STEP)
         if step == 20:
             for _ in range(idle):
-                commands.note(log.IDLE)
+                commands.append(log.IDLE_STEP)
     commands.close()
-    return Shoot(config, 5, path, overview(config, SIZE, (2, 2, 94, 82)))
+    return Shoot(config, 5, path, compute_viewpoint(config, SIZE, (2, 2, 94, 82)))
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def changed(one: Image, other: Image) -> int:
 
 def test_each_picture_is_of_its_moment(shoot: Shoot, tmp_path: Path) -> None:
     assert count_steps(shoot.log) == STEPS
-    with pytest.raises(InputError, match="can neither be taken up again nor filmed"):
+    with pytest.raises(InputError, match="can neither be resumed nor filmed"):
         count_steps(tmp_path / "none")
     first, same, middle, last = take_pictures_in_order(shoot, [0, 0, 18, STEPS])
     assert first.shape == (SIZE[1], SIZE[0], 3)
@@ -74,7 +74,7 @@ def test_several_processes_take_the_same_pictures_in_the_same_order(
 
 
 def test_a_viewpoint_has_arm_workspace_and_bins_in_the_given_part_of_the_image(overhead: CellConfig) -> None:
-    view = overview(overhead, (800, 720), (20, 60, 780, 640))
+    view = compute_viewpoint(overhead, (800, 720), (20, 60, 780, 640))
     assert view.matrix == pytest.approx(np.array([[1215.34, 0, 400], [0, 1215.34, 360], [0, 0, 1]]), rel=1e-5)
     pose = [1.8486, -1.1888, 1.3928, -0.7711, -0.3845, 0.2265, 0.4542]
     assert (view.X_WC.to_rounded_list(4), view.size) == (pytest.approx(pose, abs=2e-4), (800, 720))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, DepthConfig, NoiseConfig
-from executive.cells.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise, camera_pose, render
+from executive.cells.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise, get_camera_pose, render
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.world import World
 from executive.geometry import Pose, about_z
@@ -28,7 +28,7 @@ class StoppedClock:
 def at_scan_pose(build: Build, config: CellConfig) -> tuple[World, str]:
     (name,) = config.cameras
     world = build(config)
-    world.set_arm(np.radians(config.arm.poses_deg[config.cameras[name].scan_poses[0]]))
+    world.set_joint_positions(np.radians(config.arm.poses_deg[config.cameras[name].scan_poses[0]]))
     return world, name
 
 
@@ -61,14 +61,14 @@ def test_projected_meshes_agree_with_the_rendered_silhouettes(
         mesh = load_mesh(config.objects[label])
         place = np.array([0.44 + 0.09 * (i % 3), -0.18 + 0.18 * (i // 3), -mesh.bottom])
         world.add_object(label, Pose(about_z(0.7 * i), place), (1, 0, 0))
-    matrix, X_WC = compute_calibration(camera)[0], camera_pose(world, camera)
+    matrix, X_WC = compute_calibration(camera)[0], get_camera_pose(world, camera)
     left, top, _, _ = camera.table_view
     bodies = render(world, matrix, X_WC, camera.table_view, CELL_LIGHT).bodies
     for body, label in world.bodies.items():
         rows, columns = np.nonzero(bodies == body)
         seen = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
         pixels = project(
-            matrix, X_WC, world.object_pose(body).apply(load_mesh(config.objects[label]).vertices)
+            matrix, X_WC, world.get_object_pose(body).apply(load_mesh(config.objects[label]).vertices)
         )
         expected = [*(pixels.min(axis=0) - (left, top)), *(pixels.max(axis=0) - (left, top))]
         # Half a pixel is what sampling at pixel centres costs on a straight edge, a bit more on a tip.
@@ -106,17 +106,19 @@ def test_a_seed_repeats_the_noise_of_images_and_depth_and_a_depth_sensor_changes
 
 def test_a_frame_carries_what_is_needed_to_use_it_later(build: Build, overhead: CellConfig) -> None:
     class Half:
-        def visible(self, matrix: np.ndarray, X_WC: Pose, size: tuple[int, int]) -> np.ndarray:
+        def compute_visibility_mask(
+            self, matrix: np.ndarray, X_WC: Pose, size: tuple[int, int]
+        ) -> np.ndarray:
             mask = np.ones(size[::-1], np.bool_)
             mask[:240] = False
             return mask
 
-        def sees_table(self, matrix: np.ndarray, X_WC: Pose, size: tuple[int, int]) -> bool:
+        def is_table_visible(self, matrix: np.ndarray, X_WC: Pose, size: tuple[int, int]) -> bool:
             return False
 
     world, name = at_scan_pose(build, overhead)
     config = overhead.cameras[name].model_copy(update={"noise": NoiseConfig(gain=0, read=0)})
-    camera = SimCamera(world, name, config, StoppedClock(), 1, shadow=Half(), epoch=lambda: 4)
+    camera = SimCamera(world, name, config, StoppedClock(), 1, occlusion=Half(), epoch=lambda: 4)
     frame = camera.capture()
     assert (frame.camera, frame.stamp, frame.epoch, frame.depth) == (name, 1.5, 4, None)
     assert frame.image.shape == (480, 640, 3)

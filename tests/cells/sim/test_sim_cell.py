@@ -41,7 +41,7 @@ def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
 
 def placements(made: SimCell) -> list[tuple[str, list[float]]]:
     world = made._world
-    poses = [(label, world.object_pose(body)) for body, label in world.bodies.items()]
+    poses = [(label, world.get_object_pose(body)) for body, label in world.bodies.items()]
     return [(label, [*pose.position, *pose.rotation.ravel()]) for label, pose in poses]
 
 
@@ -126,7 +126,7 @@ def test_what_the_ledger_never_saw_is_unseen_wherever_it_ends(build_cell: Build)
     made = build_cell(seed=0)
     assert made.audit()["unseen"] == 4
     hidden, *_ = made._world.bodies
-    lay = made._world.object_pose(hidden)
+    lay = made._world.get_object_pose(hidden)
     put(made, hidden, (0.0, 0.0, 0.03))  # in the foot of the arm, where no camera looks
     look(made)
     made._world.place_object(hidden, lay)

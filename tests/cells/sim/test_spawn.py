@@ -15,7 +15,7 @@ from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.spawn import PartSeeds, first_world, spawn
+from executive.cells.sim.spawn import PartSeeds, build_initial_world, spawn
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.events import discard_event
@@ -31,12 +31,12 @@ def with_stacks(config: CellConfig, share: float) -> CellConfig:
 def lowest(world: World, body: int) -> float:
     """Return the height of an object's underside [m]."""
     vertices = load_mesh(world.config.objects[world.bodies[body]]).vertices
-    return float(world.object_pose(body).apply(vertices)[:, 2].min())
+    return float(world.get_object_pose(body).apply(vertices)[:, 2].min())
 
 
 def carried(world: World) -> dict[int, int]:
     """Return what each object that lies on another one lies on."""
-    places = {body: world.object_pose(body).position[:2] for body in world.bodies}
+    places = {body: world.get_object_pose(body).position[:2] for body in world.bodies}
     return {
         upper: min(places.keys() - {upper}, key=lambda b: float(np.linalg.norm(places[b] - places[upper])))
         for upper in world.bodies
@@ -47,7 +47,7 @@ def carried(world: World) -> dict[int, int]:
 def placed(world: World) -> list[tuple[str, float, float, float]]:
     """Return label and rounded place [m] of every object."""
     return [
-        (label, *(round(float(value), 4) for value in world.object_pose(body).position))
+        (label, *(round(float(value), 4) for value in world.get_object_pose(body).position))
         for body, label in world.bodies.items()
     ]
 
@@ -77,7 +77,7 @@ def test_objects_stand_still_apart_and_inside_the_workspace(
     world, table = build(config), overhead.table
     bodies = spawn(world, config, 0, count=6 if share else None)
     assert table.objects[0] <= len(bodies) <= table.objects[1]
-    poses, pairs = {body: world.object_pose(body) for body in bodies}, carried(world)
+    poses, pairs = {body: world.get_object_pose(body) for body in bodies}, carried(world)
     assert bool(pairs) is bool(share)
     assert len({*pairs, *pairs.values()}) == 2 * len(pairs), "each carries one object and lies on the table"
     for pose in poses.values():
@@ -91,7 +91,7 @@ def test_objects_stand_still_apart_and_inside_the_workspace(
         world.step()
     assert carried(world) == pairs
     for body, before in poses.items():
-        assert world.object_pose(body).position == pytest.approx(before.position, abs=1e-3)
+        assert world.get_object_pose(body).position == pytest.approx(before.position, abs=1e-3)
         assert lowest(world, body) == pytest.approx(0.05 if body in pairs else 0.0, abs=2e-3)
 
 
@@ -113,8 +113,8 @@ def test_a_load_travels_over_stacks_and_starts_from_their_tops(overhead: CellCon
 def test_the_first_world_is_the_one_that_a_cell_of_the_same_seed_begins_with(overhead: CellConfig) -> None:
     options = CellOptions(SilentOperator(), base=Path("."))
     cell = make_oracle_kind()(overhead, seed=9, routes={}, emit=discard_event, options=options)
-    world = first_world(overhead, 9)
-    assert (world.bodies, world.stood) == (cell._world.bodies, {})
+    world = build_initial_world(overhead, 9)
+    assert (world.bodies, world.rest_positions) == (cell._world.bodies, {})
     for body in world.bodies:
         one, other = (each.client.getBasePositionAndOrientation(body) for each in (world, cell._world))
         assert one == other

@@ -8,7 +8,7 @@ import pytest
 from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.config import ToolConfig
-from executive.cells.sim.suction import CupContact, breakaway_force, measure_contact
+from executive.cells.sim.suction import CupContact, compute_breakaway_force, measure_contact
 from executive.geometry import tool_down
 
 REACH = 0.002
@@ -43,16 +43,16 @@ def test_a_cup_over_the_middle_of_a_cube_seals_perfectly_at_the_distance_it_has(
     assert seal.distance == pytest.approx(0.0015, abs=1e-5)
     assert seal.gap == pytest.approx(0, abs=1e-5)
     assert seal.tilt == pytest.approx(0, abs=1e-3)
-    assert breakaway_force(seal, TOOL) == pytest.approx(TOOL.force, rel=0.01)
+    assert compute_breakaway_force(seal, TOOL) == pytest.approx(TOOL.force, rel=0.01)
 
 
 def test_a_cup_reaching_over_the_edge_of_a_cube_has_no_seal(client: BulletClient) -> None:
     body = box(client, (0, 0, -0.025), 0.025)
     inside = measure_contact(client, tool_down([0.018, 0, 0.001]), {body}, 0.006, REACH)
     outside = measure_contact(client, tool_down([0.020, 0, 0.001]), {body}, 0.006, REACH)
-    assert breakaway_force(inside, TOOL) == pytest.approx(TOOL.force, rel=0.01)
+    assert compute_breakaway_force(inside, TOOL) == pytest.approx(TOOL.force, rel=0.01)
     assert outside is not None and math.isinf(outside.gap)
-    assert breakaway_force(outside, TOOL) == 0
+    assert compute_breakaway_force(outside, TOOL) == 0
 
 
 @pytest.mark.parametrize("cup", [0.004, 0.006, 0.012])
@@ -90,12 +90,12 @@ def test_two_objects_under_one_cup_are_no_seal(client: BulletClient) -> None:
 
 
 def test_a_surface_out_of_reach_bears_nothing() -> None:
-    assert breakaway_force(CupContact(1, REACH - 1e-6, 0.0, 0.0), TOOL) == TOOL.force
-    assert breakaway_force(CupContact(1, REACH + 1e-6, 0.0, 0.0), TOOL) == 0
+    assert compute_breakaway_force(CupContact(1, REACH - 1e-6, 0.0, 0.0), TOOL) == TOOL.force
+    assert compute_breakaway_force(CupContact(1, REACH + 1e-6, 0.0, 0.0), TOOL) == 0
 
 
 def test_half_the_gap_and_half_the_tilt_leave_a_quarter_of_the_force() -> None:
     seal = CupContact(1, 0.0, TOOL.gap / 2, math.radians(TOOL.tilt_deg) / 2)
-    assert breakaway_force(seal, TOOL) == pytest.approx(TOOL.force / 4)
+    assert compute_breakaway_force(seal, TOOL) == pytest.approx(TOOL.force / 4)
     for bad in (CupContact(1, 0.0, 2 * TOOL.gap, 0.0), CupContact(1, 0.0, 2 * TOOL.gap, 1.5), None):
-        assert breakaway_force(bad, TOOL) == 0.0
+        assert compute_breakaway_force(bad, TOOL) == 0.0

@@ -36,12 +36,12 @@ class Bench:
     def put(self, height: float, dx: float = 0.0) -> None:
         """Put the lip `height` [m] over the object's top, `dx` [m] beside its good place."""
         self.q = reach(self.kinematics, (X + dx, Y, self.top + height), self.q)
-        self.world.set_arm(self.q)
+        self.world.set_joint_positions(self.q)
         self.steps(1)
 
     def raise_by(self, height: float, steps: int = 240) -> None:
         """Lift the tool smoothly."""
-        start = self.world.tool_pose().position
+        start = self.world.get_tool_pose().position
         for i in range(1, steps + 1):
             s = i / steps
             goal = start + np.array([0, 0, height * s * s * (3 - 2 * s)])
@@ -71,7 +71,7 @@ class Bench:
     def pose_in_tool(self) -> Pose:
         """Return the object's pose in the tool's frame."""
         X_WB = Pose.of(*self.world.client.getBasePositionAndOrientation(self.body))
-        return self.world.tool_pose().inverse() @ X_WB
+        return self.world.get_tool_pose().inverse() @ X_WB
 
 
 @pytest.fixture

@@ -24,14 +24,14 @@ def world(overhead: CellConfig):
 def test_the_arm_is_where_its_joints_put_it(world: World) -> None:
     visuals = SimVisuals(world)
     before = visuals.poses()
-    assert np.allclose(before["link 8"].position, world.flange_pose().position, atol=1e-6)
+    assert np.allclose(before["link 8"].position, world.get_flange_pose().position, atol=1e-6)
     for body in world.bodies:
         assert before[f"object {body}"].position[:2] == pytest.approx(
-            world.object_pose(body).position[:2], abs=1e-6
+            world.get_object_pose(body).position[:2], abs=1e-6
         )
-    world.set_arm(np.radians([20, 40, 10, -70, 5, 60, 15]))
+    world.set_joint_positions(np.radians([20, 40, 10, -70, 5, 60, 15]))
     after = visuals.poses()
-    assert np.allclose(after["link 8"].position, world.flange_pose().position, atol=1e-6)
+    assert np.allclose(after["link 8"].position, world.get_flange_pose().position, atol=1e-6)
     assert not np.allclose(before["link 4"].position, after["link 4"].position, atol=0.01)
 
 

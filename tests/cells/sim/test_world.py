@@ -23,8 +23,8 @@ def test_the_table_top_is_at_height_zero_and_the_bin_floors_just_above(
 
 def test_the_tool_ends_where_the_tool_centre_point_is(build: Build, wrist: CellConfig) -> None:
     world = build(wrist)
-    world.set_arm(np.radians(wrist.arm.poses_deg["scan"]))
-    X_WT = world.tool_pose()
+    world.set_joint_positions(np.radians(wrist.arm.poses_deg["scan"]))
+    X_WT = world.get_tool_pose()
     assert X_WT.rotation == pytest.approx(tool_down([0, 0, 0]).rotation, abs=1e-5)
     low, high = world.client.getAABB(world.arm, world.tool)
     assert low[2] == pytest.approx(X_WT.position[2], abs=2e-3)
@@ -35,9 +35,9 @@ def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, ov
     world = build(overhead)
     first, second = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2])), Pose.of([0.4, 0, 0.3])
     body = world.add_object("duck", first, (1, 1, 1))
-    assert world.object_pose(body).to_rounded_list() == pytest.approx(first.to_rounded_list(), abs=1e-6)
+    assert world.get_object_pose(body).to_rounded_list() == pytest.approx(first.to_rounded_list(), abs=1e-6)
     world.place_object(body, second)
-    assert world.object_pose(body).to_rounded_list() == pytest.approx(second.to_rounded_list(), abs=1e-6)
+    assert world.get_object_pose(body).to_rounded_list() == pytest.approx(second.to_rounded_list(), abs=1e-6)
     world.remove_object(body)
     assert world.bodies == {}
 
@@ -45,7 +45,7 @@ def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, ov
 def test_a_ray_ends_at_the_first_thing_but_the_arm(build: Build, overhead: CellConfig) -> None:
     world, down = build(overhead), np.array([0.0, 0.0, -2.0])
     world.add_object("cube", Pose.of([0.5, 0.1, 0.025]), (1, 0, 0))
-    world.set_arm(np.radians([0, 33, 0, -88, 0, 59, 0]))
+    world.set_joint_positions(np.radians([0, 33, 0, -88, 0, 59, 0]))
     elbow = world.client.getLinkState(world.arm, 3)[0]
     for (x, y), height in (((0.5, 0.1), 0.05), ((0.6, 0.1), 0.0), (elbow[:2], 0.0), ((0.001, 0.0), 0.0)):
         assert world.cast_ray(np.array([x, y, 1.5]), down) == pytest.approx([x, y, height], abs=1e-3)
@@ -56,7 +56,7 @@ def test_a_ray_ends_at_the_first_thing_but_the_arm(build: Build, overhead: CellC
 def test_every_body_and_part_has_a_name_for_the_text_of_an_error(build: Build, overhead: CellConfig) -> None:
     world = build(overhead)
     duck = world.add_object("duck", Pose.of([0.5, 0.1, 0.2]), (1, 1, 1))
-    bodies = world.plane, world.table, *world.bins["blue_bin"], duck, world.arm
+    bodies = world.floor, world.table, *world.bins["blue_bin"], duck, world.arm
     names = ["the floor", "the table", "blue_bin", "a duck", "the arm"]
     assert [world.name_body(body) for body in bodies] == names
     parts = [world.name_link(link) for link in (-1, 0, world.flange, world.tool)]

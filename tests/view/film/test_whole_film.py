@@ -10,10 +10,10 @@ import av
 import numpy as np
 import pytest
 
-from executive.cells.sim.command_log import STEP, read_commands
-from executive.cells.sim.rebuild import Rebuilding
+from executive.cells.sim.command_log import RUN_STEP, read_commands
+from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.shots import count_steps
-from executive.cells.sim.spawn import first_world
+from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.tool import SuctionTool
 from executive.errors import InputError
 from executive.events import NodeEnded, ToolCommanded
@@ -62,12 +62,12 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
         one.tick for one in events if isinstance(one.event, NodeEnded) and one.event.skill == "Grasp"
     )
     (closed,) = (one.tick for one in events if one.event == ToolCommanded("close"))
-    world = first_world(source.config, source.start.seed)
+    world = build_initial_world(source.config, source.start.seed)
     tool = SuctionTool(world, source.config.tool)
-    rebuilding, holds = Rebuilding(world, tool), [False]
+    rebuilder, holds = WorldRebuilder(world, tool), [False]
     for command in read_commands(filmed_run.world_log):
-        rebuilding.do(command)
-        if command.kind == STEP:
+        rebuilder.execute(command)
+        if command.kind == RUN_STEP:
             holds.append(tool.holding)
     world.close()
     state = FilmRunState(events, source.nodes, [])

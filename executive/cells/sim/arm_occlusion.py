@@ -1,0 +1,80 @@
+"""Occlusion of camera images by the simulated arm, computed from joint positions and kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.cell.config import CellConfig
+from executive.cell.layout import compute_max_pile_height
+from executive.cells.sim.arm import SimArm
+from executive.cells.sim.robot_models import ROBOT_MODELS
+from executive.geometry import Array, Pose
+from executive.motion.arm_model import Kinematics
+from executive.perception.visibility import (
+    TOOL_RADIUS,
+    ArmPart,
+    find_hidden_pixels,
+    find_outline_pixels,
+)
+
+MAX_LOAD_OFFSET = 0.015
+"""Maximum distance of the centre of a held object from the axis of the cup [m]."""
+
+
+class ArmOcclusion:
+    """Occlusion of camera images by the arm, its tool and a held object.
+
+    Args:
+        arm: The arm.
+        kinematics: Kinematics of the arm.
+        config: The cell file.
+        is_loaded: Returns True if the tool holds an object, which is assumed to have the maximum size.
+    """
+
+    def __init__(
+        self,
+        arm: SimArm,
+        kinematics: Kinematics,
+        config: CellConfig,
+        is_loaded: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._arm = arm
+        self._kinematics = kinematics
+        self._is_loaded = is_loaded
+        self._link_radius = ROBOT_MODELS[config.arm.urdf].link_radius
+        self._load_radius = max(kind.radius for kind in config.objects.values()) + MAX_LOAD_OFFSET
+        self._load_height = max(kind.height for kind in config.objects.values())
+        heights = (0.0, compute_max_pile_height(config))
+        self._corners = np.array([(x, y, z) for x in config.table.x for y in config.table.y for z in heights])
+
+    def compute_visibility_mask(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
+        """Return a mask `(H, W)` of the pixels that are certainly not occluded.
+
+        Args:
+            matrix: Camera matrix `(3, 3)` [pixel].
+            X_WC: Pose of the camera.
+            size: Width and height of the image [pixel].
+        """
+        q = self._arm.q
+        flange, X_WT = self._kinematics.compute_flange_pose(q).position, self._kinematics.compute_tool_pose(q)
+        joints = [
+            np.zeros(3),
+            *(frame.position for frame in self._kinematics.compute_joint_frames(q)),
+            flange,
+        ]
+        parts: list[ArmPart] = [(joints, self._link_radius), ([flange, X_WT.position], TOOL_RADIUS)]
+        if self._is_loaded():
+            load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
+            parts.append(([X_WT.position, load_end], self._load_radius))
+        return ~find_hidden_pixels(parts, matrix, X_WC, size)
+
+    def is_table_visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
+        """Return True if the whole workspace, up to the height of a pile, is in the image and not occluded.
+
+        The arguments are those of `compute_visibility_mask`.
+        """
+        table = find_outline_pixels(self._corners, matrix, X_WC, size)
+        return table is not None and bool(np.all(self.compute_visibility_mask(matrix, X_WC, size)[table]))
