@@ -1,4 +1,4 @@
-"""Evaluation of detectors on labelled images."""
+"""Evaluation of detectors on labelled images, rendered or from a data set."""
 
 from __future__ import annotations
 
@@ -41,29 +41,29 @@ from executive.training.labelled_image import LabelledImage
 from executive.training.rendering import generate, run_frames
 from executive.training.samples import Samples
 
-MAX_OBJECTS = 20
-"""Maximum number of objects in a scene, if the workspace has room for them."""
-Progress = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
-"""Opens a named progress bar, whose context yields `update(done, total)`."""
+MAX_OBJECT_COUNT = 20
+"""Maximum number of objects in a rendered scene; fewer if the table has no room for them."""
+OpenProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
+"""Function that opens a progress bar with a name; its context is the function `update(done, total)`."""
 
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """Settings of rendered scenes.
+    """Settings for rendered scenes.
 
     Attributes:
-        images: Number of images per cell.
+        image_count: Number of images per cell.
         seed: Random seed.
-        varied: True: scenes vary as in training. False: initial scenes of runs with at most `MAX_OBJECTS`
-            objects, searched as in a run.
-        view: Part of a run's frame that is searched, `table` or `full`.
+        is_varied: True: scenes vary as in training. False: initial scenes of runs with at most
+            `MAX_OBJECT_COUNT` objects, searched as in a run.
+        view: Region of the frame that is searched: `table`, or `full` for the whole frame.
         workers: Number of processes that render.
-        scene: Scene file that changes initial scenes of runs; None: no change.
+        scene: Scene file that changes the initial scenes of runs; None: no change.
     """
 
-    images: int
+    image_count: int
     seed: int
-    varied: bool
+    is_varied: bool
     view: str
     workers: int
     scene: Path | None = None
@@ -74,10 +74,10 @@ class DetectorUnderTest:
     """A detector to measure.
 
     Attributes:
-        cell: Cell of the detector; None for a detector without a cell.
-        configs: Sections of the detector and of those that it may use, by name.
+        cell: Cell of the detector; None: a detector without a cell.
+        configs: Configuration of the detector, and of other detectors that it may use, by name.
         name: Key of the detector in `configs`.
-        base: Folder to which paths in its options are relative.
+        base: Folder to which paths in the options of the detector are relative.
     """
 
     cell: CellConfig | None
@@ -86,7 +86,7 @@ class DetectorUnderTest:
     base: Path
 
     def name_measurement(self, dataset: Path | None) -> str:
-        """Return the name of a measurement on scenes of the cell or on a data set."""
+        """Return the name of a measurement on a data set, or on scenes of the cell if `dataset` is None."""
         if dataset is None:
             assert self.cell is not None
             return self.cell.cell
@@ -100,9 +100,9 @@ def list_detectors(
 
     Args:
         cells: Cells by the path of the cell file.
-        detector: Name of the detector in each cell; None: the first.
-        weights: Model file to measure in every cell; None: the detector of the cell file.
-        labels: File with the class names of the model; None: the file in its folder.
+        detector: Name of the detector in each cell; None: the first detector of the cell.
+        weights: Model file to measure instead of the detectors of the cells; None: no model file.
+        labels: File with the class names of the model; None: the file in the folder of the model.
 
     Raises:
         InputError: A cell has no detector of this name.
@@ -124,15 +124,15 @@ def list_detectors(
 
 
 def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: Path | None = None) -> None:
-    """Check that scenes can be rendered and detectors built, before minutes of rendering.
+    """Check that scenes can be rendered and the detector can be built, before minutes of rendering.
 
     Raises:
-        InputError: The cell is not simulated, the scene file is wrong, or a detector cannot be built.
+        InputError: The cell is not simulated, the scene file has errors, or a detector cannot be built.
     """
     cell = detector.cell
     if renders_scenes and cell and cell.kind != "sim":
         raise InputError(
-            f"only cells of kind sim can be rendered, and {cell.cell} is of kind {cell.kind}; "
+            f"scenes can be rendered only of cells of kind sim, but {cell.cell} is of kind {cell.kind}; "
             "measure its detector on your own images with --dataset"
         )
     if renders_scenes and cell:
@@ -141,18 +141,18 @@ def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: 
         raise InputError(f"detector {name}: {sentence}")
 
 
-def measure(
+def measure_detector(
     detector: DetectorUnderTest,
     dataset: Path | None,
     scenes: SceneSettings,
     *,
     threshold: float | None,
     worst_misses: WorstMisses,
-    progress: Progress,
+    progress: OpenProgressBar,
 ) -> Evaluation:
-    """Return an evaluation of a detector on `dataset`, or on scenes of its cell."""
+    """Evaluate a detector on `dataset`, or on rendered scenes of its cell, and return its errors."""
     config = detector.cell
-    run_config = None if dataset is not None or scenes.varied else config
+    run_config = None if dataset is not None or scenes.is_varied else config
     with _open_images(detector, dataset, scenes, progress) as samples:
         cell_detector = CellDetector(
             detector.configs,
@@ -162,7 +162,7 @@ def measure(
             view=scenes.view,
             classes=tuple(config.objects) if config else None,
         )
-        with contextlib.closing(cell_detector), progress(f"asking {detector.name}") as update:
+        with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
             return evaluate(
                 cell_detector, _report_progress(samples, update), threshold=threshold, worst=worst_misses,
                 localizer=_build_localizer(run_config) if run_config else None,
@@ -172,28 +172,28 @@ def measure(
 
 @contextlib.contextmanager
 def _open_images(
-    detector: DetectorUnderTest, dataset: Path | None, scenes: SceneSettings, progress: Progress
+    detector: DetectorUnderTest, dataset: Path | None, scenes: SceneSettings, progress: OpenProgressBar
 ) -> Iterator[Samples | list[LabelledImage]]:
-    """Provide the images for the measurement of a detector."""
+    """Open the images of the data set, or render scenes of the cell; a context manager."""
     config = detector.cell
     if dataset is not None or config is None:
         assert dataset is not None
         yield Samples(dataset)
-    elif scenes.varied:
+    elif scenes.is_varied:
         with tempfile.TemporaryDirectory() as folder:
             with progress(f"rendering {config.cell}") as update:
                 generate(
-                    {config.cell: config}, Path(folder), images=scenes.images, seed=scenes.seed,
+                    {config.cell: config}, Path(folder), images=scenes.image_count, seed=scenes.seed,
                     layout="coco", workers=scenes.workers, valid=1.0, progress=update,
                 )  # fmt: skip
             yield Samples(Path(folder))
     else:
-        table = {"objects": (0, find_max_count(config, MAX_OBJECTS))}
-        filled = config.model_copy(update={"table": config.table.model_copy(update=table)})
+        table = {"objects": (0, find_max_count(config, MAX_OBJECT_COUNT))}
+        limited_config = config.model_copy(update={"table": config.table.model_copy(update=table)})
         with progress(f"rendering {config.cell}") as update:
             frames = run_frames(
-                filled, images=scenes.images, seed=scenes.seed, workers=scenes.workers, progress=update,
-                scene=load_scene(scenes.scene, config),
+                limited_config, images=scenes.image_count, seed=scenes.seed, workers=scenes.workers,
+                progress=update, scene=load_scene(scenes.scene, config),
             )  # fmt: skip
         yield frames
 
@@ -201,14 +201,14 @@ def _open_images(
 def _report_progress(
     samples: Samples | list[LabelledImage], update_progress: Callable[[int, int], None]
 ) -> Iterator[LabelledImage]:
-    """Yield the images and report the progress after each one."""
+    """Yield the images, and update the progress bar after each image."""
     for done, sample in enumerate(samples, 1):
         yield sample
         update_progress(done, len(samples))
 
 
 def _build_localizer(config: CellConfig) -> Localizer | None:
-    """Return the cell's localizer; None for `ray`, which needs the simulated world."""
+    """Return the localizer of the cell; None for the method `ray`, which needs a simulated world."""
     if config.localization == "ray":
         return None
     classes = {label: build_object_class(label, kind) for label, kind in config.objects.items()}
@@ -218,25 +218,25 @@ def _build_localizer(config: CellConfig) -> Localizer | None:
 def store_evaluation(
     detector: DetectorUnderTest, evaluation: Evaluation, out: Path | None, *, command: str, seconds: float
 ) -> Path:
-    """Write the errors of a detector in its cell into a file and return the path of the file.
+    """Write the measured errors of a detector to a file and return the path of the file.
 
-    Measurements of other detectors in the file are kept.
+    Measurements of other detectors in the file are not changed.
 
     Args:
         detector: The detector and its cell.
-        evaluation: Errors of the detector.
-        out: The file; None: `CELL.measured.json` beside the cell file.
+        evaluation: Measured errors of the detector.
+        out: The file; None: `CELL.measured.json` in the folder of the cell file.
         command: Command line that repeats the evaluation.
         seconds: Duration of the evaluation [s].
 
     Raises:
-        InputError: The detector gave no answer for any image, or the file cannot be read or written.
+        InputError: The detector answered for no image, or the file cannot be read or written.
     """
     assert detector.cell is not None
     path = out or detector.base / f"{detector.cell.cell}{SUFFIX}"
     if evaluation.reliability is None:
         raise InputError(
-            f"detector {detector.name} gave no answer for any image: {evaluation.why}; nothing was measured"
+            f"detector {detector.name} answered for no image: {evaluation.why}; nothing was measured"
         )
     table = evaluation.confusion
     measurement = Measurement(

@@ -1,4 +1,4 @@
-"""Sweep over seeds of one mission, with a process and a run directory for each run."""
+"""Sweep: runs of one mission with different seeds, in worker processes, each with a run directory."""
 
 from __future__ import annotations
 
@@ -21,40 +21,42 @@ class Job:
         mission: Mission file, or name of a shipped mission.
         seed: Random seed.
         overrides: Values of params of the mission and keys of the cell, as given with `--set`.
-        runs: Folder of the run directories.
-        frames: True to save the images that decisions are based on.
-        scene: Scene file, or None.
+        runs: Folder in which the run directory is made.
+        saves_pictures: True to save the images on which decisions are based.
+        scene: Scene file that changes the objects and the camera; None: no change.
     """
 
     mission: str
     seed: int
     overrides: Mapping[str, str]
     runs: Path
-    frames: bool
+    saves_pictures: bool
     scene: Path | None = None
 
 
-def sweep(
+def run_sweep(
     jobs: Sequence[Job],
     *,
     workers: int = 2,
     progress: Callable[[int, int], None] | None = None,
-    halting: Callable[[], None] | None = None,
+    on_halt: Callable[[], None] | None = None,
     work: Callable[[Job], Result] | None = None,
 ) -> list[Result]:
     """Execute all jobs and return the results in the order of the jobs.
 
-    A run that ends its process has the status `FAULT`. After Ctrl-C or SIGTERM no further run starts, running
-    runs halt, and the results so far are returned.
+    A run whose process dies has the status `FAULT`. After Ctrl-C or SIGTERM no further run starts, running
+    runs are halted, and the results so far are returned.
 
     Args:
         jobs: The runs.
         workers: Number of processes.
-        progress: Called with the number of finished runs and of all runs.
-        halting: Called after the first signal.
-        work: Executes one job, in a process of its own; None: `run_job`.
+        progress: Function that is called with the number of finished runs and the number of all runs.
+        on_halt: Function that is called after the first signal.
+        work: Function that executes a job in a worker process; None: `run_job`.
     """
-    results = run_jobs(jobs, work or run_job, _fail_job, workers=workers, progress=progress, halting=halting)
+    results = run_jobs(
+        jobs, work or run_job, _make_failed_result, workers=workers, progress=progress, on_halt=on_halt
+    )
     return [result for result in results if result is not None]
 
 
@@ -69,16 +71,16 @@ def run_job(job: Job) -> Result:
     skills = discover()
     loaded = load_mission(job.mission, skills, job.overrides)
     options = RunOptions(job.seed, scene=job.scene)
-    result = record_run(loaded, skills, options, job.runs, RecordOptions(saves_pictures=job.frames))
-    # A failure to write the report does not change the result.
+    result = record_run(loaded, skills, options, job.runs, RecordOptions(saves_pictures=job.saves_pictures))
+    # If the report cannot be written, the result is still returned.
     try_write_report(result.run)
     return result
 
 
-def summarize(results: Sequence[Result], requested: int) -> dict[str, Any]:
-    """Return the figures of a sweep: correctly sorted objects, disagreements, times and failures.
+def summarize_results(results: Sequence[Result], requested_count: int) -> dict[str, Any]:
+    """Return the statistics of a sweep: sorted objects, disagreements, times and failures.
 
-    Halted runs count only as missing from the number of `requested` runs.
+    Halted runs are ignored, except that `cut_off` is True if fewer than `requested_count` runs are complete.
     """
     results = [result for result in results if result.status != "HALTED"]
     audits = [result.audit for result in results if result.audit is not None]
@@ -86,8 +88,8 @@ def summarize(results: Sequence[Result], requested: int) -> dict[str, Any]:
     total = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
     low, high = wilson_interval(right, total)
     return {
-        "asked": requested,
-        "cut_off": len(results) < requested,
+        "asked": requested_count,
+        "cut_off": len(results) < requested_count,
         "runs": len(results),
         "succeeded": sum(result.status == "SUCCESS" for result in results),
         "objects": {
@@ -119,24 +121,24 @@ def summarize(results: Sequence[Result], requested: int) -> dict[str, Any]:
 
 
 def wilson_interval(successes: int, total: int) -> tuple[float, float]:
-    """Return the 95 % Wilson score interval of a proportion; (0, 1) if the total is 0."""
+    """Return the 95 % Wilson score interval of the proportion successes / total; (0, 1) if total is 0."""
     if total == 0:
         return 0.0, 1.0
-    from scipy.stats import binomtest  # The import takes 0.5 s, which the workers must not spend.
+    from scipy.stats import binomtest  # The import takes 0.5 s: not in the workers.
 
     interval = binomtest(successes, total).proportion_ci(method="wilson")
     return float(interval.low), float(interval.high)
 
 
 def summarize_values(values: Sequence[float]) -> dict[str, float]:
-    """Return `least, median, mean, most` of `values`; all are 0 without values."""
+    """Return minimum (`least`), `median`, `mean` and maximum (`most`) of the values; 0 without values."""
     functions: dict[str, Callable[[Sequence[float]], float]]
     functions = {"least": min, "median": statistics.median, "mean": statistics.fmean, "most": max}
     return {name: round(function(values), 3) if values else 0.0 for name, function in functions.items()}
 
 
-def _fail_job(job: Job, error: BaseException) -> Result:
-    """Return the result of a run that ended with an exception or ended its process."""
+def _make_failed_result(job: Job, error: BaseException) -> Result:
+    """Return the result of a run that raised an exception or whose process died."""
     return Result(
         mission=job.mission,
         status="FAULT",

@@ -103,7 +103,7 @@ def command(
             evaluation.check_detector(tested, renders_scenes=dataset is None, scene=scene)
         for tested in tested_detectors:
             measurement, start = tested.name_measurement(dataset), time.monotonic()
-            result = evaluation.measure(
+            result = evaluation.measure_detector(
                 tested, dataset, scenes, threshold=threshold, worst_misses=worst, progress=bar
             )
             print_metrics(measurement, tested.name, result)

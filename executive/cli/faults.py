@@ -55,24 +55,25 @@ def command(
     with stdout_kept_clean():
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record_trial
-        from executive.campaign.subject import load_subject
+        from executive.campaign.mission_under_test import load_mission_under_test
         from executive.cli.progress import bar, print_halting
         from executive.view.figures.fault import format_results, format_trial, results_to_json, trial_to_json
 
-        subject = load_subject(mission, overrides, oracle, seed)
+        subject = load_mission_under_test(mission, overrides, oracle, seed)
         with bar("tried", quiet=as_json or is_list or numbers is not None) as progress:
-            campaign = Campaign(subject, workers=workers, progress=progress, halting=print_halting)
+            campaign = Campaign(subject, workers=workers, progress=progress, on_halt=print_halting)
             plain: Any
             if is_list:
                 listed = enumerate(campaign.faults, 1)
                 plain = [{"fault": number, "description": str(fault)} for number, fault in listed]
                 text, code = "\n".join(f"{fault['fault']:4} {fault['description']}" for fault in plain), 0
             elif numbers is not None:
-                trial, path = record_trial(subject, campaign.rehearsal, campaign.select(numbers), runs)
+                faults = campaign.select_faults(numbers)
+                trial, path = record_trial(subject, campaign.nominal_run, faults, runs)
                 plain = {**trial_to_json(trial), "run": str(path)}
                 text, code = f"{format_trial(trial)}\n{path}", int(bool(trial.problems))
             else:
-                figures = campaign.try_pairs(pairs) if pairs else campaign.try_singles()
+                figures = campaign.run_fault_pairs(pairs) if pairs else campaign.run_single_faults()
                 plain, text = results_to_json(figures), format_results(figures)
                 code = int(bool(figures.failed_trials)) if figures.complete else 130
     print_json(plain) if as_json else click.echo(text)

@@ -47,7 +47,7 @@ def command(
     Ctrl-C halts the current runs; the results of the complete runs are printed. A second Ctrl-C ends at once.
     """
     with stdout_kept_clean():
-        from executive.campaign.sweep import Job, summarize, sweep
+        from executive.campaign.sweep import Job, run_sweep, summarize_results
         from executive.cell.json_values import to_json
         from executive.cli.progress import bar, print_halting
         from executive.mission.load import load_mission
@@ -63,8 +63,8 @@ def command(
         check_runs_folder(runs)
         with bar(mission) as progress:
             jobs = [Job(mission, seed, overrides, runs, frames, scene) for seed in seeds]
-            results = sweep(jobs, workers=workers, progress=progress, halting=print_halting)
-        figures = summarize(results, len(seeds))
+            results = run_sweep(jobs, workers=workers, progress=progress, on_halt=print_halting)
+        figures = summarize_results(results, len(seeds))
         click.echo(_describe(figures), err=True)
     if as_json:
         settings = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}

@@ -16,8 +16,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import click
+from executive.campaign.subject import MissionUnderTest
 
-from executive.campaign.subject import Subject
 from executive.cells.sim.command_log import is_command_log
 from executive.cli.options import runs_option
 from executive.errors import ExecutiveError, InputError
@@ -97,7 +97,7 @@ class Snapshots(StopAtFirstTick):
 
 
 def measure(
-    subject: Subject, runs: Path, reports: int, others: int, films: int, truncations: int, kills: int
+    subject: MissionUnderTest, runs: Path, reports: int, others: int, films: int, truncations: int, kills: int
 ) -> Figures:
     """Damage records of a run of MISSION, and read, replay, resume and film them."""
     runs.mkdir(parents=True, exist_ok=True)
@@ -140,7 +140,7 @@ def measure(
     }
 
 
-def _record_whole(subject: Subject, runs: Path) -> Snapshots:
+def _record_whole(subject: MissionUnderTest, runs: Path) -> Snapshots:
     """Run the mission to its end, and return the snapshots of its record."""
     snapshots = Snapshots(runs)
     options = RunOptions(subject.seed, subject.requests, kind=subject.kind)
@@ -183,12 +183,12 @@ def _report(path: Path) -> None:
     write_report(path)
 
 
-def _replay(subject: Subject, path: Path) -> None:
+def _replay(subject: MissionUnderTest, path: Path) -> None:
     if difference := replay_run(path, read_journal(path / "journal.jsonl"), subject.skills).difference:
         raise SystemExit(_tell(1, difference))
 
 
-def _resume_to_first_tick(subject: Subject, path: Path) -> None:
+def _resume_to_first_tick(subject: MissionUnderTest, path: Path) -> None:
     options = RunOptions(subject.seed, kind=subject.kind)
     resume_run(path, subject.skills, options, RecordOptions([StopAtFirstTick()], saves_pictures=False))
 
@@ -207,7 +207,9 @@ def _film_first_picture(path: Path) -> None:
     )
 
 
-def _resume_truncated(subject: Subject, whole: Path, base: Path, snapshots: Snapshots, case: int) -> Figures:
+def _resume_truncated(
+    subject: MissionUnderTest, whole: Path, base: Path, snapshots: Snapshots, case: int
+) -> Figures:
     """Cut the journal off before a snapshot of the world, and resume the run."""
     rng = random.Random(case)
     number = rng.randrange(len(snapshots.lengths))
@@ -219,7 +221,7 @@ def _resume_truncated(subject: Subject, whole: Path, base: Path, snapshots: Snap
     return _resume(subject, path, f"{case}, journal cut at {length}, world at snapshot {number}")
 
 
-def _resume_killed(subject: Subject, base: Path, case: int, snapshots: Snapshots) -> Figures:
+def _resume_killed(subject: MissionUnderTest, base: Path, case: int, snapshots: Snapshots) -> Figures:
     """Kill a run, remove the last blocks of its journal and of a log of its world, and resume it."""
     rng, runs = random.Random(case), base / f"killed-{case}"
     duration = 2.0
@@ -241,7 +243,7 @@ def _truncate(file: Path, length: int) -> None:
     file.write_bytes(file.read_bytes()[:length])
 
 
-def _resume(subject: Subject, path: Path, case: str) -> Figures:
+def _resume(subject: MissionUnderTest, path: Path, case: str) -> Figures:
     """Resume a run in a child; return whether ledger and audit agree, its status and its problems."""
 
     def resume() -> Figures:

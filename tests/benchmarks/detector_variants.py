@@ -9,8 +9,7 @@ from pathlib import Path
 import click
 import yaml
 
-from executive.campaign.evaluation import SceneSettings, check_detector, list_detectors
-from executive.campaign.evaluation import measure as measure_detector
+from executive.campaign.evaluation import SceneSettings, check_detector, list_detectors, measure_detector
 from executive.cell.config import CellConfig
 from executive.cli.cells import find_cell, load_cells
 from executive.cli.options import seed_option, workers_option
@@ -111,7 +110,7 @@ def evaluate_scene(
     """Return the figures of the first detector of a cell in a scene, as `executive evaluate` does."""
     (detector,) = list_detectors({file: cell}, None, None, None)
     check_detector(detector, renders_scenes=True, scene=scene)
-    scenes = SceneSettings(images, seed, varied=False, view="table", workers=workers, scene=scene)
+    scenes = SceneSettings(images, seed, is_varied=False, view="table", workers=workers, scene=scene)
     return measure_detector(
         detector, None, scenes, threshold=THRESHOLD, worst_misses=WorstMisses(), progress=bar
     )

@@ -20,8 +20,8 @@ import click
 import numpy as np
 from py_trees.common import Status
 
-from executive.campaign.halt_checks import check_journal, check_rest, check_tool
-from executive.campaign.subject import Subject
+from executive.campaign.end_checks import check_arm_at_rest, check_held_item, check_journal
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.clock import STEP
 from executive.cell.workcell import Workcell
@@ -48,7 +48,7 @@ CHILD_TIMEOUT = 120.0
 """Time that a child may take to halt and be checked [s]."""
 
 
-def measure(subject: Subject, period_steps: int | None = None) -> Figures:
+def measure(subject: MissionUnderTest, period_steps: int | None = None) -> Figures:
     """Halt MISSION at moments all over one run, each time as Ctrl-C would."""
     period_steps = period_steps or (10 if subject.loaded.cell_config.kind == "sim" else 1)
     with tempfile.TemporaryDirectory() as folder:
@@ -161,7 +161,7 @@ class _WatchedCell(CellWrapper):
 class _RunWithHalts:
     """The run, and the results of its children so far."""
 
-    def __init__(self, subject: Subject, period_steps: int, folder: Path) -> None:
+    def __init__(self, subject: MissionUnderTest, period_steps: int, folder: Path) -> None:
         self._period_steps = period_steps
         self._forks = ForkRunner(CHILD_TIMEOUT)
         self._journal_path = folder / "journal.jsonl"
@@ -250,8 +250,8 @@ class _RunWithHalts:
         problems = [
             *check_journal(read_journal(self._journal_path), outcome),
             *check_ledger(run.count_items(), run.count_ground_truth()),
-            *check_tool(outcome, workcell),
-            *check_rest(workcell),
+            *check_held_item(outcome, workcell),
+            *check_arm_at_rest(workcell),
         ]
         self._journal_path.unlink()
         if (outcome.status, outcome.reason) != ("HALTED", "halted"):

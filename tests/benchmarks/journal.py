@@ -7,7 +7,7 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from executive.campaign.subject import Subject
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cli.options import runs_option
 from executive.events import Event
 from executive.record.recorder import Recorder
@@ -19,7 +19,7 @@ MAX_PERCENT = 3.0
 """Limit of the journal's share of the wall time of a simulated run."""
 
 
-def measure(subject: Subject, runs: Path) -> Figures:
+def measure(subject: MissionUnderTest, runs: Path) -> Figures:
     """Measure the journal's share of a run of MISSION; the record is made below `--runs` and removed."""
     runs.mkdir(parents=True, exist_ok=True)
     times: list[float] = []

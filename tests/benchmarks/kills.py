@@ -17,7 +17,7 @@ from pathlib import Path
 import click
 import numpy as np
 
-from executive.campaign.subject import Subject
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.config import TableConfig
 from executive.cli.options import runs_option
 from executive.errors import ExecutiveError
@@ -46,7 +46,7 @@ CHANGES = ("moved", "removed", "dropped")
 """Changes of the world: an object on the table is moved or taken away, or the tool lets go."""
 
 
-def measure(subject: Subject, runs: Path, kills: int = 20, changed: int | None = None) -> Figures:
+def measure(subject: MissionUnderTest, runs: Path, kills: int = 20, changed: int | None = None) -> Figures:
     """Kill MISSION at random moments and resume it each time; runs with a problem stay in `runs/kills`."""
     random, runs = np.random.default_rng(subject.seed), runs / "kills"
     changed = kills // 4 if changed is None else changed
@@ -78,7 +78,7 @@ def measure(subject: Subject, runs: Path, kills: int = 20, changed: int | None =
     }
 
 
-def begin_run(subject: Subject, seed: int, runs: Path) -> int:
+def begin_run(subject: MissionUnderTest, seed: int, runs: Path) -> int:
     """Begin a recorded run in a child and return its process id."""
     child = os.fork()
     if child == 0:
@@ -89,7 +89,7 @@ def begin_run(subject: Subject, seed: int, runs: Path) -> int:
     return child
 
 
-def run_and_kill(subject: Subject, seed: int, runs: Path, delay: float) -> bool:
+def run_and_kill(subject: MissionUnderTest, seed: int, runs: Path, delay: float) -> bool:
     """Begin a run, kill it after `delay` [s], and return True if it had begun and not yet ended."""
     child = begin_run(subject, seed, runs)
     time.sleep(delay)
@@ -104,7 +104,7 @@ def run_and_kill(subject: Subject, seed: int, runs: Path, delay: float) -> bool:
     return InputLog.from_events(entries).start is not None and find_end(entries) is None
 
 
-def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> Figures:
+def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: str) -> Figures:
     """Change the world if asked to, resume a killed run, and return its figures and problems."""
     path = find_run(LATEST_LINK, runs)
     past = InputLog.from_events(read_journal(path / "journal.jsonl"))
@@ -134,7 +134,7 @@ def resume_killed_run(subject: Subject, seed: int, runs: Path, change: str) -> F
     return figures or {**kill, "problems": [problem]}
 
 
-def change_world(subject: Subject, seed: int, path: Path, past: InputLog, change: str) -> str:
+def change_world(subject: MissionUnderTest, seed: int, path: Path, past: InputLog, change: str) -> str:
     """Change the world of a killed run; return what was changed, or "" if nothing could be."""
     random = np.random.default_rng(seed)
     config = subject.loaded.cell_config

@@ -137,7 +137,7 @@ def measure(
     ]
     with bar("misclassifying server") as progress:
         results = run_jobs(
-            jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=print_halting
+            jobs, run_job, _describe_broken, workers=workers, progress=progress, on_halt=print_halting
         )
     done = [run for run in results if run is not None and run.status != "HALTED"]
     figures = {

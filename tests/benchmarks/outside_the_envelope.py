@@ -96,7 +96,7 @@ def measure(
             jobs += [Job(case, seed, scene, runs, wall_time_limit) for seed in range(first, first + count)]
         with bar("outside the envelope") as progress:
             results = run_jobs(
-                jobs, run_job, _describe_broken, workers=workers, progress=progress, halting=print_halting
+                jobs, run_job, _describe_broken, workers=workers, progress=progress, on_halt=print_halting
             )
     done = [result for result in results if result is not None and result.run.status != HALTED]
     figures = {"asked": len(jobs), "runs": len(done), "first_seed": first_seed, **summarize(done)}

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from executive.campaign.subject import Subject, load_subject
+from executive.campaign.mission_under_test import MissionUnderTest, load_mission_under_test
 from executive.cell.json_values import to_json
 from executive.cli.cells import load_cells
 from executive.cli.options import MISSION, json_option, oracle_option, overrides_option, seed_option
@@ -74,19 +74,19 @@ def run_command(measure: Callable[..., Figures], *options: Option) -> None:
 def run_mission_command(measure: Callable[..., Figures], *options: Option) -> None:
     """Parse the command line of a benchmark of a mission, print its figures, and exit.
 
-    `measure` gets the mission as a `Subject`, then the other options.
+    `measure` gets the mission as a `MissionUnderTest`, then the other options.
     """
 
     def measure_mission(
         mission: str, overrides: dict[str, str], oracle: bool, seed: int, **values: Any
     ) -> Figures:
-        return measure(load_subject(mission, overrides, oracle, seed), **values)
+        return measure(load_mission_under_test(mission, overrides, oracle, seed), **values)
 
     measure_mission.__doc__ = measure.__doc__
     run_command(measure_mission, MISSION, *options, oracle_option, seed_option, overrides_option)
 
 
-def record_subject(subject: Subject, seed: int, runs: Path) -> tuple[Figures, str]:
+def record_subject(subject: MissionUnderTest, seed: int, runs: Path) -> tuple[Figures, str]:
     """Run a mission to its end, recorded below `runs`; return its result and, if it failed, a sentence."""
     options = RunOptions(seed, subject.requests, kind=subject.kind)
     result = record_run(subject.loaded, subject.skills, options, runs, RecordOptions(saves_pictures=False))
@@ -100,9 +100,9 @@ def record_subject(subject: Subject, seed: int, runs: Path) -> tuple[Figures, st
     )
 
 
-def describe(subject: Subject) -> Figures:
+def describe(subject: MissionUnderTest) -> Figures:
     """Return the figures that name a mission and its cell."""
-    return {"mission": subject.name, "cell": subject.cell, "seed": subject.seed}
+    return {"mission": subject.name, "cell": subject.cell_description, "seed": subject.seed}
 
 
 def show_progress(items: Iterable[T], description: str) -> Iterable[T]:

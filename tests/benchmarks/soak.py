@@ -12,7 +12,7 @@ from pathlib import Path
 
 import click
 
-from executive.campaign.subject import Subject
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.errors import InputError
 from tests.benchmarks.report import Figures, describe, record_subject, run_mission_command, show_progress
 
@@ -26,7 +26,7 @@ MAX_OBJECTS_PER_RUN = 2.0
 """Limit of the Python objects that a run leaves behind, including its sample."""
 
 
-def measure(subject: Subject, runs: int = 100) -> Figures:
+def measure(subject: MissionUnderTest, runs: int = 100) -> Figures:
     """Record many runs of MISSION with consecutive seeds in one process, and compare its resources."""
     if not PROCESS.is_dir():
         raise InputError(f"resources of a process are read from {PROCESS}, which only Linux has; use Linux")

@@ -59,7 +59,7 @@ def heard() -> Iterator[None]:
 @pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_who_halts_this_process_alone_halts_the_runs_under_way(how: signal.Signals) -> None:
     calls: list[str] = []
-    results = run_jobs([how] * 3, halt, why, workers=1, halting=lambda: calls.append("halting"))
+    results = run_jobs([how] * 3, halt, why, workers=1, on_halt=lambda: calls.append("halting"))
     assert (results, calls) == (["halted in good order", None, None], ["halting"])
 
 
@@ -74,7 +74,7 @@ def deaf(how: signal.Signals) -> str:
 @pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_second_wish_ends_the_jobs_under_way_at_once(how: signal.Signals) -> None:
     with pytest.raises(KeyboardInterrupt):
-        run_jobs([how] * 3, deaf, why, workers=1, halting=lambda: os.kill(os.getpid(), how))
+        run_jobs([how] * 3, deaf, why, workers=1, on_halt=lambda: os.kill(os.getpid(), how))
     assert multiprocessing.active_children() == []
 
 

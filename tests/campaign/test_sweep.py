@@ -11,7 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from executive.campaign.sweep import Job, run_job, summarize, summarize_values, sweep, wilson_interval
+from executive.campaign.sweep import (
+    Job,
+    run_job,
+    run_sweep,
+    summarize_results,
+    summarize_values,
+    wilson_interval,
+)
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts, Result
 from executive.record.timeline.timeline import PlanningTotals
@@ -30,7 +37,7 @@ def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **
 def swept(seeds: range, work, **options) -> list:
     """Sweep without a mission: `work` says what comes of it."""
     jobs = [Job("sort", seed, {"a": "1"}, Path("runs"), False) for seed in seeds]
-    return sweep(jobs, work=work, **options)
+    return run_sweep(jobs, work=work, **options)
 
 
 def work(job: Job) -> Result:
@@ -72,7 +79,7 @@ def sigint():
 @pytest.mark.slow
 def test_every_run_leaves_its_record_and_its_report(tmp_path):
     few = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
-    result = run_job(Job("sort_fruit", 3, few, tmp_path, frames=False))
+    result = run_job(Job("sort_fruit", 3, few, tmp_path, saves_pictures=False))
     assert result.status == "SUCCESS"
     assert (Path(result.run) / "report.html").is_file()
 
@@ -80,7 +87,7 @@ def test_every_run_leaves_its_record_and_its_report(tmp_path):
 @pytest.mark.usefixtures("sigint")
 def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
     reported = []
-    results = swept(range(9), interrupt, workers=1, halting=lambda: reported.append("halting"))
+    results = swept(range(9), interrupt, workers=1, on_halt=lambda: reported.append("halting"))
     assert ([entry.seed for entry in results], reported) == ([0], ["halting"])
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
@@ -120,7 +127,7 @@ def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch):
 
 def test_the_summary_counts_objects_and_lists_what_went_wrong():
     wrong = result(2, right=3, audit=Audit(agrees=False, right=2, wrong_bin=1))
-    figures = summarize([result(0), result(1, "FAILURE", right=3, left=1), wrong], requested=3)
+    figures = summarize_results([result(0), result(1, "FAILURE", right=3, left=1), wrong], requested_count=3)
     assert (figures["asked"], figures["cut_off"]) == (3, False)
     assert (figures["runs"], figures["succeeded"]) == (3, 2)
     assert (figures["objects"]["right"], figures["objects"]["total"]) == (9, 11)
@@ -133,11 +140,11 @@ def test_the_summary_counts_objects_and_lists_what_went_wrong():
 
 def test_runs_that_were_halted_or_never_began_make_it_cut_off_and_count_in_nothing_else():
     whole, halted = result(0), result(1, "HALTED", right=1, left=3)
-    figures = summarize([whole, halted], requested=6)
+    figures = summarize_results([whole, halted], requested_count=6)
     assert (figures["asked"], figures["cut_off"]) == (6, True)
-    assert summarize([whole], requested=1) == {**figures, "asked": 1, "cut_off": False}
+    assert summarize_results([whole], requested_count=1) == {**figures, "asked": 1, "cut_off": False}
     # Without an audit no object counts.
-    figures = summarize([result(0, audit=None)], requested=1)
+    figures = summarize_results([result(0, audit=None)], requested_count=1)
     assert (figures["objects"]["total"], figures["disagreements"]) == (0, [])
     assert figures["robot_time_per_object_s"] is None
 

@@ -80,7 +80,7 @@ def grey(tmp_path: Path) -> Path:
 def test_evaluate_shows_how_many_images_were_searched(at_terminal: Callable[..., Result], grey: Path) -> None:
     shown = at_terminal("evaluate", "--dataset", str(grey))
     assert shown.exit_code == 0, shown.stderr
-    assert "asking embedded" in shown.stderr and "2/2" in shown.stderr
+    assert "running embedded" in shown.stderr and "2/2" in shown.stderr
 
 
 @pytest.mark.slow

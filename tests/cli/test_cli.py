@@ -289,7 +289,7 @@ def test_a_warning_is_printed_and_the_run_continues(project):
 )
 def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses, asked, code, expected):
     results = [replace(RESULT, seed=seed, status=status) for seed, status in enumerate(statuses)]
-    monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: results)
+    monkeypatch.setattr("executive.campaign.sweep.run_sweep", lambda *args, **options: results)
     shown = invoke("sweep", "sort", "--seeds", f"0-{asked - 1}", "--json", "--runs", str(tmp_path))
     assert shown.exit_code == code
     assert expected in shown.stderr
@@ -303,7 +303,7 @@ def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses,
 
 def test_a_sweep_tells_of_a_run_without_a_directory_and_of_no_place_for_any(project, monkeypatch, tmp_path):
     broken = replace(RESULT, status="FAULT", reason="fault", message="it broke", run="")
-    monkeypatch.setattr("executive.campaign.sweep.sweep", lambda *args, **options: [broken, RESULT])
+    monkeypatch.setattr("executive.campaign.sweep.run_sweep", lambda *args, **options: [broken, RESULT])
     shown = invoke("sweep", "sort", "--seeds", "7-8", "--runs", str(tmp_path))
     assert "1 runs did not succeed:\n  seed 7: FAULT: it broke\n" in shown.stderr
     (tmp_path / "file").touch()

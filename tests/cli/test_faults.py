@@ -14,8 +14,8 @@ from executive.view.figures.fault import Branch, FaultFigures, Trial
 
 FAKE = ("sort_overhead", "--set", "cell.kind=fake")
 TRIAL = Trial(
-    (1,), ("tree/Grasp missed, first: nothing seals",), "Grasp", "sort.yaml:7", "missed", "first",
-    happened=True, status="SUCCESS",
+    (1,), ("tree/Grasp missed, first: the suction cup cannot seal",), "Grasp", "sort.yaml:7", "missed",
+    "first", happened=True, status="SUCCESS",
 )  # fmt: skip
 
 
@@ -29,15 +29,15 @@ def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     fake = SimpleNamespace(asked=[], problems=(), complete=True)
 
     class Campaign:
-        def __init__(self, subject, *, workers, progress, halting):
-            fake.asked.append((subject.name, subject.cell, subject.seed, workers))
+        def __init__(self, subject, *, workers, progress, on_halt):
+            fake.asked.append((subject.name, subject.cell_description, subject.seed, workers))
             self._name = subject.name
 
-        def try_singles(self):
+        def run_single_faults(self):
             fake.asked.append("singles")
             return self._figures(pairs=False)
 
-        def try_pairs(self, count):
+        def run_fault_pairs(self, count):
             fake.asked.append(("pairs", count))
             return self._figures(pairs=True)
 
@@ -52,7 +52,7 @@ def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
 
 def test_pairs_are_tried_instead_and_an_oracle_where_one_is_wanted(campaigns):
     shown = invoke("sort_overhead", "--oracle", "--pairs", "7", "--json")
-    assert campaigns.asked == [("sort_overhead", "sim, detections from the truth", 0, 2), ("pairs", 7)]
+    assert campaigns.asked == [("sort_overhead", "sim, true detections", 0, 2), ("pairs", 7)]
     assert json.loads(shown.stdout)["pairs"] is True
 
 
@@ -61,7 +61,7 @@ def test_the_list_runs_nothing_but_the_undisturbed_mission():
     assert shown.exit_code == 0
     lines = shown.stdout.splitlines()
     assert lines[0].split(maxsplit=2)[:2] == ["1", "tree/look/try/retry/recover/MoveToScan"]
-    assert any("Grasp missed, first: nothing seals" in line for line in lines)
+    assert any("Grasp missed, first: the suction cup cannot seal" in line for line in lines)
     listed = json.loads(invoke(*FAKE, "--list", "--json").stdout)
     assert [entry["fault"] for entry in listed] == list(range(1, len(lines) + 1))
 
@@ -69,7 +69,9 @@ def test_the_list_runs_nothing_but_the_undisturbed_mission():
 @pytest.mark.slow
 def test_one_fault_is_repeated_and_recorded(tmp_path: Path):
     lines = invoke(*FAKE, "--list").stdout.splitlines()
-    number = next(line.split()[0] for line in lines if "Grasp missed, first: nothing seals" in line)
+    number = next(
+        line.split()[0] for line in lines if "Grasp missed, first: the suction cup cannot seal" in line
+    )
     shown = invoke(*FAKE, "--fault", number, "--runs", str(tmp_path))
     assert shown.exit_code == 0, shown.output
     lines = shown.stdout.splitlines()

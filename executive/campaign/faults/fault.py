@@ -12,99 +12,100 @@ from executive.skill import EMPTY, Skill
 from executive.testing.faults.script import ScheduledFault
 from executive.testing.substitutes import make_raising, make_raising_when_halted, make_substitute
 
-When = Literal["first", "middle", "late", "lasting"]
-"""Time of a fault in a run: the first activation, the middle, near the end, or repeatedly."""
-INJECTED_FAILURE = "failure injected by the campaign"
-"""Message of a skill that fails without a cause in the cell."""
+Occasion = Literal["first", "middle", "late", "lasting"]
+"""Occasion of a fault: first activation or start of the run, middle, near the end, or repeatedly."""
+INJECTED_FAILURE_MESSAGE = "failure injected by the campaign"
+"""Message of a skill that the campaign lets fail without a cause in the cell."""
 
 
 class InjectedError(Exception):
-    """The error that a campaign raises inside a skill to imitate a bug."""
+    """The error that a campaign raises in a skill to simulate a bug."""
 
 
 @dataclass(frozen=True)
 class SkillFault:
-    """A skill that misbehaves without a cause in the cell.
+    """A misbehaviour of a skill without a cause in the cell.
 
     Attributes:
-        node: Path of its node.
+        node: Path of the node that runs the skill.
         kind: The skill fails, raises an error, or raises an error when it is halted.
         reason: Reason of the failure; "" for an error.
-        starts: Activations in which it misbehaves, counted from 1; empty: all activations.
-        after: Number of control steps of the skill before the error.
+        start_numbers: Numbers of the activations in which the skill misbehaves, from 1; empty: all.
+        delay_steps: Number of control steps from the start of the skill to the error.
     """
 
     node: str
     kind: Literal["fails", "raises", "raises when halted"]
     reason: str = ""
-    starts: tuple[int, ...] = ()
-    after: int = 0
+    start_numbers: tuple[int, ...] = ()
+    delay_steps: int = 0
 
 
 @dataclass(frozen=True)
 class PlannedFault:
-    """A fault that is injected into a run; a value that can be sent to another process.
+    """A fault of a mission that a campaign injects into a run; can be pickled.
 
     Attributes:
-        affected: Path of the affected node, or the affected part: `detector`, `object`, `tool`.
-        name: Label or skill of the node, or the same as `affected`.
+        location: Path of the affected node, or affected part of the cell: `detector`, `object`, `tool`.
+        name: Label or skill of the node; name of the part.
         place: File and line of the node in the mission; "" for a part.
-        what: Reason with which the node must fail, or a description of the fault.
-        when: Time of the fault in the run.
-        cause: Description of the cause.
+        kind: Reason with which the node must fail, or kind of the fault: `target removed`.
+        occasion: Occasion of the fault in the run.
+        cause: Cause of the fault, a few words.
         cell_faults: Faults of the cell that cause the fault.
-        skill_faults: Misbehaviour of skills that causes the fault.
-        is_reason: True if `what` is a reason of the node.
-        leads_to: Reason with which skills fail because of a fault of a part; "" if there is none.
+        skill_faults: Misbehaviours of skills that cause the fault.
+        is_failure_reason: True if `kind` is a reason of the node.
+        expected_reason: Reason with which skills should fail because of a fault of a part; "": no reason.
         is_conditional: True if the node runs only after another fault.
-        replaced: Number of the fault that this one replaces if that one did not provoke its reason; 0: none.
+        replaced_number: Number of another fault, from 1, which this fault replaces if the node did not fail
+            with its reason; 0: no fault.
     """
 
-    affected: str
+    location: str
     name: str
     place: str
-    what: str
-    when: When
+    kind: str
+    occasion: Occasion
     cause: str
     cell_faults: tuple[ScheduledFault, ...] = ()
     skill_faults: tuple[SkillFault, ...] = ()
-    is_reason: bool = False
-    leads_to: str = ""
+    is_failure_reason: bool = False
+    expected_reason: str = ""
     is_conditional: bool = False
-    replaced: int = 0
+    replaced_number: int = 0
 
     @property
     def ends_run(self) -> bool:
-        """True if the run ends with the status FAULT, as after any bug."""
+        """True if the run must end with the status FAULT, as after any bug."""
         return any(skill_fault.kind != "fails" for skill_fault in self.skill_faults)
 
     def __str__(self) -> str:
         """Return a description of the fault."""
-        return f"{self.affected} {self.what}, {self.when}: {self.cause}"
+        return f"{self.location} {self.kind}, {self.occasion}: {self.cause}"
 
 
 def make_substitutes(
     skill_faults: Iterable[SkillFault], skills: Mapping[str, type[Skill]]
 ) -> dict[str, type[Skill]]:
-    """Return the substitute of each misbehaving skill; `skills` are the skills of the nodes by path."""
+    """Return the substitutes of misbehaving skills by path of the node; `skills`: all skills by path."""
     substitutes: dict[str, type[Skill]] = {}
     for fault in skill_faults:
         skill = substitutes.get(fault.node, skills[fault.node])
         error = InjectedError("a bug that the campaign injected")
         if fault.kind == "fails":
-            broken = _make_failing(skill, fault.reason)
+            faulty = _make_failing(skill, fault.reason)
         elif fault.kind == "raises":
-            broken = make_raising(skill, error, delay_steps=fault.after)
+            faulty = make_raising(skill, error, delay_steps=fault.delay_steps)
         else:
-            broken = make_raising_when_halted(skill, error)
-        substitutes[fault.node] = make_substitute(skill, "Broken", broken.run, fault.starts or None)
+            faulty = make_raising_when_halted(skill, error)
+        substitutes[fault.node] = make_substitute(skill, "Faulty", faulty.run, fault.start_numbers or None)
     return substitutes
 
 
 def _make_failing(skill: type[Skill], reason: str) -> type[Skill]:
-    """Return a skill that fails at its start, and drops its object if the failure leaves the tool empty.
+    """Return a skill that fails at its start; it drops its object if `tool_left` is EMPTY for the reason.
 
-    If the tool sticks, the object cannot fall, and the skill does its work.
+    If the object sticks to the tool and cannot fall, the original skill runs instead.
     """
     is_dropping = skill.tool_left.get(reason) is EMPTY
 
@@ -116,6 +117,6 @@ def _make_failing(skill: type[Skill], reason: str) -> type[Skill]:
                 return
             if (item := cell.ledger.find_held_item()) is not None:
                 record_drop(cell, item)
-        raise self.failure(reason, INJECTED_FAILURE)
+        raise self.failure(reason, INJECTED_FAILURE_MESSAGE)
 
     return make_substitute(skill, "Failing", run)

@@ -1,4 +1,4 @@
-"""Trial of a campaign: one run with injected faults, and its checks."""
+"""Trial of a fault campaign: one run with injected faults, and the checks of the run."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from executive.campaign.faults import judgement
+from executive.campaign.end_checks import check_arm_at_rest, check_held_item, check_journal
+from executive.campaign.faults import trial_checks
 from executive.campaign.faults.fault import (
-    INJECTED_FAILURE,
+    INJECTED_FAILURE_MESSAGE,
     InjectedError,
     PlannedFault,
     make_substitutes,
 )
-from executive.campaign.faults.listing import skill_nodes
-from executive.campaign.faults.rehearsal import Activations, Rehearsal
-from executive.campaign.halt_checks import check_journal, check_rest, check_tool
-from executive.campaign.subject import Subject
+from executive.campaign.faults.fault_list import list_skill_nodes
+from executive.campaign.faults.nominal_run import ActivationRecorder, NominalRun
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
 from executive.events import FaultInjected, InputRead, NodeEnded, RunEnded, TimedEvent
@@ -31,140 +31,142 @@ from executive.testing.faults import FaultyCell, with_faults
 from executive.view.figures.fault import Trial
 from executive.view.report.page import try_write_report
 
-Numbered = Mapping[int, PlannedFault]
-"""Faults by their numbers; the last fault is the tested one."""
+FaultsByNumber = Mapping[int, PlannedFault]
+"""Faults of a run by number; the last fault is under test, and the faults before it let it occur."""
 
 
-def try_out(subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> Trial:
-    """Run a mission with these faults and return the trial."""
-    trial_run = _TrialRun(subject, rehearsal, faults)
+def run_trial(mission: MissionUnderTest, nominal_run: NominalRun, faults: FaultsByNumber) -> Trial:
+    """Execute a mission with these faults and return the trial."""
+    trial_run = _TrialRun(mission, nominal_run, faults)
     with closing(trial_run.run):
-        return trial_run.judge(trial_run.run.execute())
+        return trial_run.make_trial(trial_run.run.execute())
 
 
-def record_trial(subject: Subject, rehearsal: Rehearsal, faults: Numbered, runs: Path) -> tuple[Trial, Path]:
-    """Run a mission with these faults; return the trial and its run directory below `runs`.
+def record_trial(
+    mission: MissionUnderTest, nominal_run: NominalRun, faults: FaultsByNumber, runs: Path
+) -> tuple[Trial, Path]:
+    """Execute and record a mission with these faults; return the trial and its directory in `runs`.
 
     Raises:
         InputError: The run directory cannot be created.
         ExecutiveError: The result cannot be written.
     """
-    start, loaded = time.perf_counter(), subject.loaded
-    trial_run = _TrialRun(subject, rehearsal, faults)
+    start, loaded = time.perf_counter(), mission.loaded
+    trial_run = _TrialRun(mission, nominal_run, faults)
     with closing(trial_run.run):
         directory = make_run_directory(trial_run.run, loaded, trial_run.options, runs)
-        recording = Recording(trial_run.run, loaded, subject.skills, directory, Recorder(directory), ())
-        result = recording.execute(subject.seed, start)
+        recording = Recording(trial_run.run, loaded, mission.skills, directory, Recorder(directory), ())
+        result = recording.execute(mission.seed, start)
         try_write_report(result.run)
-        return trial_run.judge(trial_run.outcome), directory.path
+        return trial_run.make_trial(trial_run.outcome), directory.path
 
 
-def empty_trial(faults: Numbered) -> Trial:
-    """Return the trial of a run before its end."""
+def make_empty_trial(faults: FaultsByNumber) -> Trial:
+    """Return a trial with these faults and without results."""
     last = list(faults.values())[-1]
     descriptions = tuple(map(str, faults.values()))
-    return Trial(tuple(faults), descriptions, last.name, last.place, last.what, last.when)
+    return Trial(tuple(faults), descriptions, last.name, last.place, last.kind, last.occasion)
 
 
 class _TrialRun:
-    """A run with faults, its events and its checks."""
+    """A run with injected faults; records its events and checks its end."""
 
-    def __init__(self, subject: Subject, rehearsal: Rehearsal, faults: Numbered) -> None:
-        self._subject, self._rehearsal, self._faults = subject, rehearsal, faults
+    def __init__(self, mission: MissionUnderTest, nominal_run: NominalRun, faults: FaultsByNumber) -> None:
+        self._mission, self._nominal_run, self._faults = mission, nominal_run, faults
         self._events: list[TimedEvent] = []
         self._skill_faults = [skill_fault for fault in faults.values() for skill_fault in fault.skill_faults]
-        self._activations = Activations()
-        self._stopped = False
+        self._recorder = ActivationRecorder()
+        self._is_stopped = False
         cell_faults = [cell_fault for fault in faults.values() for cell_fault in fault.cell_faults]
-        own = {node.path: subject.skills[node.skill] for node in skill_nodes(subject)}
+        skills_by_path = {node.path: mission.skills[node.skill] for node in list_skill_nodes(mission)}
         self.options = RunOptions(
-            subject.seed,
-            subject.requests,
-            kind=with_faults(self._kind, cell_faults, timeout=rehearsal.timeout),
-            substitutes=make_substitutes(self._skill_faults, own),
+            mission.seed,
+            mission.requests,
+            kind=with_faults(self._make_cell, cell_faults, timeout=nominal_run.timeout),
+            substitutes=make_substitutes(self._skill_faults, skills_by_path),
         )
-        self.run = assemble(subject.loaded, subject.skills, self.options, [self._note, self._activations])
+        self.run = assemble(mission.loaded, mission.skills, self.options, [self._on_event, self._recorder])
         workcell = self.run.workcell
         assert isinstance(workcell, FaultyCell)
         self.run.add_observer(workcell.on_event)
 
     @property
     def outcome(self) -> RunEnded:
-        """Recorded end of the run."""
+        """Recorded `RunEnded` event of the run."""
         return next(timed.event for timed in reversed(self._events) if isinstance(timed.event, RunEnded))
 
-    def judge(self, outcome: RunEnded) -> Trial:
-        """Check the run after its end and return the trial."""
+    def make_trial(self, outcome: RunEnded) -> Trial:
+        """Check the ended run and return the trial."""
         run = self.run
         items, audit = run.count_items(), run.count_ground_truth()
-        taken = judgement.count_faults(self._events, "object_removed")
-        raised = any(self._has_raised(fault) for fault in self._faults.values() if fault.ends_run)
-        faults = tuple(self._faults.values())
+        removed_count = trial_checks.count_injected_faults(self._events, "object_removed")
+        is_bug_raised = any(self._has_effect(fault) for fault in self._faults.values() if fault.ends_run)
+        faults, unobserved = tuple(self._faults.values()), self._count_unobserved_objects()
         problems = [
-            *judgement.check_end(outcome, faults, self._subject.loaded.endings, raised),
-            *judgement.check_tree(run.root),
+            *trial_checks.check_end(outcome, faults, self._mission.loaded.endings, is_bug_raised),
+            *trial_checks.check_tree(run.root),
             *check_journal(self._events, outcome),
-            *judgement.check_ledger(outcome, items, audit, taken, self._count_hidden()),
-            *judgement.check_success(outcome, audit, self._events),
-            *judgement.check_losses(audit, self._events),
-            *check_tool(outcome, run.workcell),
-            *check_rest(run.workcell),
+            *trial_checks.check_ledger(outcome, items, audit, removed_count, unobserved),
+            *trial_checks.check_success(outcome, audit, self._events),
+            *trial_checks.check_losses(audit, self._events),
+            *check_held_item(outcome, run.workcell),
+            *check_arm_at_rest(run.workcell),
         ]
         return replace(
-            empty_trial(self._faults),
-            happened=all(map(self._has_happened, faults)),
-            raised=self._has_raised(faults[-1]),
-            is_halted_by_user=outcome.status == "HALTED" and not self._stopped,
+            make_empty_trial(self._faults),
+            happened=all(map(self._has_occurred, faults)),
+            raised=self._has_effect(faults[-1]),
+            is_halted_by_user=outcome.status == "HALTED" and not self._is_stopped,
             status=outcome.status,
             reason=outcome.reason,
             message=outcome.message,
             node=outcome.node,
-            missing=self._rehearsal.placed - items["placed"],
+            missing=self._nominal_run.placed_count - items["placed"],
             items=items,
             audit=audit,
             robot_time=outcome.robot_time,
-            entered_paths=frozenset(self._activations.counts),
+            entered_paths=frozenset(self._recorder.counts),
             problems=tuple(problems),
-            remark=judgement.describe_other_reason(outcome, faults),
+            remark=trial_checks.describe_unexpected_reason(outcome, faults),
         )
 
-    def _kind(self, *args: Any, **options: Any) -> Workcell:
-        kind = self._subject.kind or cell_kind(self._subject.loaded.cell_config.kind)
-        return CellWrapper(kind(*args, **options), after_step=self._stop_if_due)
+    def _make_cell(self, *args: Any, **options: Any) -> Workcell:
+        make_inner_cell = self._mission.kind or cell_kind(self._mission.loaded.cell_config.kind)
+        return CellWrapper(make_inner_cell(*args, **options), after_step=self._stop_run_if_due)
 
-    def _note(self, timed: TimedEvent) -> None:
+    def _on_event(self, timed: TimedEvent) -> None:
         if not isinstance(timed.event, InputRead):
             self._events.append(timed)
 
-    def _stop_if_due(self) -> None:
-        """Stop the run if a skill must be halted now."""
+    def _stop_run_if_due(self) -> None:
+        """Stop the run if the error of a halted skill is due."""
         for skill_fault in self._skill_faults:
-            start = self._activations.starts.get(skill_fault.node)
-            is_intended = self._activations.counts[skill_fault.node] in skill_fault.starts
-            is_due = start is not None and self.run.tick >= start + skill_fault.after
+            start = self._recorder.start_ticks.get(skill_fault.node)
+            is_intended = self._recorder.counts[skill_fault.node] in skill_fault.start_numbers
+            is_due = start is not None and self.run.tick >= start + skill_fault.delay_steps
             if skill_fault.kind == "raises when halted" and is_intended and is_due:
-                self._stopped = True
+                self._is_stopped = True
                 self.run.control.stop()
 
-    def _count_hidden(self) -> judgement.HiddenCounts:
-        workcell = self.run.workcell
+    def _count_unobserved_objects(self) -> trial_checks.UnobservedCounts:
+        workcell, count = self.run.workcell, trial_checks.count_unobserved_objects
         assert isinstance(workcell, FaultyCell)
-        return judgement.count_hidden(workcell.world.objects, workcell.cell.bins.values(), self._events)
+        return count(workcell.world.objects, workcell.cell.bins.values(), self._events)
 
-    def _has_happened(self, fault: PlannedFault) -> bool:
-        """Return True if a fault was injected."""
+    def _has_occurred(self, fault: PlannedFault) -> bool:
+        """Return True if a fault was injected into the cell or into a skill."""
         names = {cell_fault.effect.name for cell_fault in fault.cell_faults}
         injected = {timed.event.name for timed in self._events if isinstance(timed.event, FaultInjected)}
-        return not names.isdisjoint(injected) or (bool(fault.skill_faults) and self._has_raised(fault))
+        return not names.isdisjoint(injected) or (bool(fault.skill_faults) and self._has_effect(fault))
 
-    def _has_raised(self, fault: PlannedFault) -> bool:
-        """Return True if the node of a fault ended as intended; True for a fault without a node."""
+    def _has_effect(self, fault: PlannedFault) -> bool:
+        """Return True if the node of a fault ended as the fault requires, or the fault requires no end."""
         ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
-        node_ends = [end for end in ends if end.node == fault.affected]
+        node_ends = [end for end in ends if end.node == fault.location]
         if fault.ends_run:
             return any(end.status == "INVALID" and InjectedError.__name__ in end.message for end in node_ends)
-        failures = [end for end in node_ends if (end.status, end.reason) == ("FAILURE", fault.what)]
+        failures = [end for end in node_ends if (end.status, end.reason) == ("FAILURE", fault.kind)]
         messages = [end.message for end in failures]
-        return not fault.is_reason or any(
-            not fault.skill_faults or message == INJECTED_FAILURE for message in messages
+        return not fault.is_failure_reason or any(
+            not fault.skill_faults or message == INJECTED_FAILURE_MESSAGE for message in messages
         )

@@ -11,11 +11,11 @@ from executive.testing import faults
 from executive.testing.faults.effect import Effect, Occurrence
 
 SEAL_BREAK_INTERVALS = 20
-"""Number of equal intervals of a run; per boundary of an interval, one run in which the seal breaks there."""
+"""Number of equal intervals of a run; for each boundary, the seal breaks there in a run of its own."""
 START_MOTION_STEPS = 24
-"""Duration of a motion of the arm that precedes the skill [control steps]."""
+"""Duration of the motion that the arm still makes when the skill starts [control steps]."""
 MAX_REMOVED_OBJECTS = 10
-"""Number of faults that remove one object each, to empty the table."""
+"""Maximum number of objects on the table, which are all removed."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from executive.geometry import tool_down
 from executive.mission.model.port_types import describe_type
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 
-SMALL_NUMBER = 0.1
+GENERATED_NUMBER = 0.1
 """Value generated for a number, within the bounds of its param; small, because it may be a duration [s]."""
 
 _HOLDING_BY_STATE: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY: (False, True)}
@@ -145,20 +145,20 @@ def _generate_value(declared: Param | Port, scene: SkillScene) -> Any:
         return _find_name_in_scene(declared.refers, scene)
     if declared.type not in (int, float):
         return {str: f"some {declared.name}", bool: False}.get(declared.type)
-    number = 1 if declared.type is int else SMALL_NUMBER
+    number = 1 if declared.type is int else GENERATED_NUMBER
     number = number if declared.ge is None else max(number, declared.ge)
     return declared.type(number if declared.le is None else min(number, declared.le))
 
 
-def _find_value_of_type(kind: Any, refers: str, scene: SkillScene) -> Any:
+def _find_value_of_type(value_type: Any, refers: str, scene: SkillScene) -> Any:
     """Return a value of this type from the scene; None if the scene has none."""
-    if kind is str:
+    if value_type is str:
         return _find_name_in_scene(refers, scene)
-    if get_origin(kind) in (Union, types.UnionType):
-        return _find_value_of_type(get_args(kind)[0], refers, scene)
-    if kind == list[Target]:
+    if get_origin(value_type) in (Union, types.UnionType):
+        return _find_value_of_type(get_args(value_type)[0], refers, scene)
+    if value_type == list[Target]:
         return list(scene.targets)
-    return {Target: scene.targets[0], Detections: scene.detections}.get(kind)
+    return {Target: scene.targets[0], Detections: scene.detections}.get(value_type)
 
 
 def _find_name_in_scene(refers: str, scene: SkillScene) -> str | None:

@@ -106,7 +106,15 @@ def detector_blind() -> Effect:
 
 @dataclass
 class FaultyRequest:
-    """A request to a faulty detector; implements `Request`. For the attributes see `faulty_detector`."""
+    """A request to a faulty detector; implements `Request`.
+
+    Attributes:
+        request: The request without a fault.
+        occurrence: Occurrence of the fault during which the request was made.
+        change: Changes the answer; None: no change.
+        delay: Delay of the answer [s].
+        hang_end: Time on the run's clock before which the request hangs during the occurrence [s].
+    """
 
     request: Request
     occurrence: Occurrence

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from executive.campaign.faults.campaign import Campaign
-from executive.campaign.subject import Subject
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
 from executive.plugins import discover
 
 
-def subject_of(mission: str, seed: int = 0, **overrides: str) -> Subject:
-    return Subject(load_mission(mission, discover(), overrides), discover(), FakeCell, "fake", seed)
+def subject_of(mission: str, seed: int = 0, **overrides: str) -> MissionUnderTest:
+    return MissionUnderTest(load_mission(mission, discover(), overrides), discover(), FakeCell, "fake", seed)
 
 
 @pytest.fixture(scope="session")

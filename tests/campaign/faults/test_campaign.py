@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from executive.campaign.faults.campaign import Campaign, find_branches
-from executive.campaign.subject import Subject
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
@@ -43,21 +43,21 @@ tree:
 
 
 @pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+def small(tmp_path_factory: pytest.TempPathFactory) -> MissionUnderTest:
     folder = tmp_path_factory.mktemp("small")
     missions = Path(__file__).parents[3] / "missions"
     (folder / "cells").mkdir()
     shutil.copy(missions / "cells" / "fruit.yaml", folder / "cells")
     (folder / "small.yaml").write_text(MISSION)
     loaded = load_mission(folder / "small.yaml", discover(), {"cell.table.objects": "[1, 1]"})
-    return Subject(loaded, discover(), FakeCell, "fake", 0)
+    return MissionUnderTest(loaded, discover(), FakeCell, "fake", 0)
 
 
 @pytest.fixture(scope="module")
-def figures(small: Subject) -> FaultFigures:
+def figures(small: MissionUnderTest) -> FaultFigures:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("executive.campaign.faults.campaign.run_jobs", one_after_the_other)
-        return Campaign(small).try_singles()
+        return Campaign(small).run_single_faults()
 
 
 def one_after_the_other(
@@ -67,7 +67,9 @@ def one_after_the_other(
     return [work(job) for job in jobs]
 
 
-def test_every_fault_is_tried_once_in_the_order_of_the_list(figures: FaultFigures, small: Subject) -> None:
+def test_every_fault_is_tried_once_in_the_order_of_the_list(
+    figures: FaultFigures, small: MissionUnderTest
+) -> None:
     last = [trial.fault_numbers[-1] for trial in figures.trials]
     assert last == sorted(set(last))
     faults = Campaign(small).faults
@@ -75,7 +77,7 @@ def test_every_fault_is_tried_once_in_the_order_of_the_list(figures: FaultFigure
     # Only what the cell brought about already is not said by the skill, too.
     raised = {trial.fault_numbers[-1] for trial in figures.trials if trial.raised}
     assert left_out
-    assert all(faults[number - 1].replaced in raised for number in left_out)
+    assert all(faults[number - 1].replaced_number in raised for number in left_out)
     assert (figures.complete, figures.listed) == (True, len(faults))
 
 
@@ -88,11 +90,13 @@ def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: F
     assert figures.unentered_branches == ()
     behind = next(trial for trial in figures.trials if trial.name == "RejectTarget")
     assert (len(behind.fault_numbers), behind.descriptions[0].rpartition("/")[2]) == (
-        2, "Grasp missed, first: nothing seals",
+        2, "Grasp missed, first: the suction cup cannot seal",
     )  # fmt: skip
 
 
-def test_a_recovery_without_a_run_is_listed_with_its_position(figures: FaultFigures, small: Subject) -> None:
+def test_a_recovery_without_a_run_is_listed_with_its_position(
+    figures: FaultFigures, small: MissionUnderTest
+) -> None:
     without = [trial for trial in figures.trials if "Grasp missed" not in " ".join(trial.descriptions)]
     without = [trial for trial in without if not trial.what.startswith("no seal")]
     assert [branch.what for branch in find_branches(small.loaded.tree, without) if not branch.entered] == [
@@ -102,11 +106,11 @@ def test_a_recovery_without_a_run_is_listed_with_its_position(figures: FaultFigu
 
 @pytest.mark.slow
 def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_of_workers(
-    small: Subject, monkeypatch: pytest.MonkeyPatch
+    small: MissionUnderTest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    two = Campaign(small, workers=2).try_pairs(3)
+    two = Campaign(small, workers=2).run_fault_pairs(3)
     monkeypatch.setattr("executive.campaign.faults.campaign.run_jobs", one_after_the_other)
-    one, other = Campaign(small).try_pairs(3), Campaign(replace(small, seed=3)).try_pairs(3)
+    one, other = Campaign(small).run_fault_pairs(3), Campaign(replace(small, seed=3)).run_fault_pairs(3)
     assert (one, [len(trial.fault_numbers) for trial in one.trials]) == (two, [2] * 3)
     assert [trial.label for trial in one.trials] != [trial.label for trial in other.trials]
 
@@ -126,16 +130,16 @@ def interrupt(*progress: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("sigint")
-def test_after_ctrl_c_the_finished_trials_are_reported(small: Subject) -> None:
+def test_after_ctrl_c_the_finished_trials_are_reported(small: MissionUnderTest) -> None:
     messages: list[str] = []
-    campaign = Campaign(small, workers=1, progress=interrupt, halting=lambda: messages.append("halting"))
-    figures = campaign.try_singles()
+    campaign = Campaign(small, workers=1, progress=interrupt, on_halt=lambda: messages.append("halting"))
+    figures = campaign.run_single_faults()
     assert (len(figures.trials), figures.complete, messages) == (1, False, ["halting"])
 
 
 def test_an_unknown_number_is_refused_with_the_valid_range(campaign: Campaign) -> None:
     with pytest.raises(InputError) as caught:
-        campaign.select((1, 9999))
+        campaign.select_faults((1, 9999))
     assert str(caught.value) == (
         f"sort_overhead has no fault 9999; the numbers are 1 to {len(campaign.faults)}, and --list shows them"
     )
@@ -149,7 +153,7 @@ class Empty(FakeCell):
 
 
 def test_a_mission_that_does_not_succeed_by_itself_or_with_wrong_books_is_not_tried(
-    small: Subject, tmp_path: Path
+    small: MissionUnderTest, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=r"without a fault, small with seed 0 ends as FAULT .* another seed"):
         Campaign(replace(small, kind=Empty))
@@ -159,5 +163,5 @@ def test_a_mission_that_does_not_succeed_by_itself_or_with_wrong_books_is_not_tr
         "mission: blind\ndescription: d\ncell: cells/fruit.yaml\n"
         "routes: {apple: premium_crate}\ntree: MoveToScan\n"
     )
-    with pytest.raises(InputError, match=r"without a fault, blind .* or a mission that looks at the whole"):
+    with pytest.raises(InputError, match=r"without a fault, blind .* or a mission that observes the whole"):
         Campaign(replace(small, loaded=load_mission(file, discover())))

@@ -9,7 +9,7 @@ import pytest
 
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.faults.fault import SkillFault, make_substitutes
-from executive.campaign.faults.trial import record_trial, try_out
+from executive.campaign.faults.trial import record_trial, run_trial
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, ItemChanged, NodeEnded, RunEnded
 from executive.plugins import discover
@@ -23,13 +23,13 @@ def number_of(campaign: Campaign, name: str, what: str, when: str = "first", *, 
     return next(
         number
         for number, fault in enumerate(campaign.faults, 1)
-        if (fault.name, fault.what, fault.when, fault.is_conditional) == (name, what, when, behind)
-        and not fault.replaced
+        if (fault.name, fault.kind, fault.occasion, fault.is_conditional) == (name, what, when, behind)
+        and not fault.replaced_number
     )
 
 
 def tried(campaign: Campaign, *numbers: int) -> Trial:
-    return try_out(campaign.subject, campaign.rehearsal, campaign.select(numbers))
+    return run_trial(campaign.mission, campaign.nominal_run, campaign.select_faults(numbers))
 
 
 SLOW = pytest.mark.slow
@@ -41,14 +41,14 @@ SLOW = pytest.mark.slow
         ("Grasp", "missed", "first", "ok"),
         ("Grasp", "missed", "lasting", "ok -6"),
         ("Release", "stuck", "lasting", "FAILURE Release.stuck"),
-        ("Approach", "target taken", "middle", "FAILURE lost"),
-        ("detector", "hangs for ever", "middle", "FAILURE Detect.unavailable"),
+        ("Approach", "target removed", "middle", "FAILURE lost"),
+        ("detector", "hangs to the end", "middle", "FAILURE Detect.unavailable"),
         pytest.param("Approach", "no_contact", "middle", "ok", marks=SLOW),
         pytest.param("Approach", "unreachable", "middle", "ok -1", marks=SLOW),
         pytest.param("Detect", "unavailable", "lasting", "FAILURE Detect.unavailable", marks=SLOW),
         pytest.param("SelectTarget", "doubtful", "middle", "ok", marks=SLOW),
         pytest.param("detector", "dead for 0.5 s", "first", "ok", marks=SLOW),
-        pytest.param("object", "taken", "late", "FAILURE lost", marks=SLOW),
+        pytest.param("object", "removed", "late", "FAILURE lost", marks=SLOW),
         pytest.param("object", "bumped", "late", "ok", marks=SLOW),
         pytest.param("tool", "no seal on object 1", "lasting", "ok -1", marks=SLOW),
     ],
@@ -73,7 +73,7 @@ def test_a_bug_ends_the_run_as_a_fault_of_its_node(
     trial = tried(campaign, number)
     assert (trial.status, trial.happened, trial.problems) == ("FAULT", True, ())
     assert "InjectedError" in trial.message
-    assert campaign.faults[number - 1].affected in (trial.node, trial.message.partition(": ")[0])
+    assert campaign.faults[number - 1].location in (trial.node, trial.message.partition(": ")[0])
 
 
 def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campaign) -> None:
@@ -82,7 +82,7 @@ def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campai
     assert (alone.verdict, alone.status) == ("-", "SUCCESS")
     both = tried(campaign, number_of(campaign, "Transit", "unreachable"), behind)
     assert (both.verdict, both.raised, both.problems) == ("ok", True, ())
-    assert campaign.faults[behind - 1].affected in both.entered_paths
+    assert campaign.faults[behind - 1].location in both.entered_paths
     assert both.label.endswith(f"+{behind}")
 
 
@@ -101,9 +101,9 @@ def test_what_cannot_happen_there_found_no_occasion(campaign: Campaign) -> None:
 def test_a_run_that_never_ends_is_ended_and_found(campaign: Campaign) -> None:
     number = number_of(campaign, "SelectTarget", "unseen", "lasting")
     fault = campaign.faults[number - 1]
-    ever = replace(fault, skill_faults=(replace(fault.skill_faults[0], starts=()),))
-    short = replace(campaign.rehearsal, robot_time=-5.0)
-    trial = try_out(campaign.subject, short, {number: ever})
+    ever = replace(fault, skill_faults=(replace(fault.skill_faults[0], start_numbers=()),))
+    short = replace(campaign.nominal_run, robot_time=-5.0)
+    trial = run_trial(campaign.mission, short, {number: ever})
     assert trial.problems[0] == (
         "it ended as FAULT at no node: the mission has not ended after 10 s on its clock"
     )
@@ -126,12 +126,13 @@ class Restless(FakeCell):
 
 
 @pytest.mark.parametrize(
-    ("kind", "problem"), [(Liar, "1 misplaced; the ledger says seen 6"), (Restless, "the arm is not at rest")]
+    ("kind", "problem"),
+    [(Liar, "1 objects in wrong bins; the ledger says seen 6"), (Restless, "the arm is not at rest")],
 )
 def test_what_is_not_as_it_has_to_be_is_found(campaign: Campaign, kind: type[FakeCell], problem: str) -> None:
-    subject = replace(campaign.subject, kind=kind)
+    subject = replace(campaign.mission, kind=kind)
     number = number_of(campaign, "Grasp", "missed")
-    trial = try_out(subject, campaign.rehearsal, campaign.select((number,)))
+    trial = run_trial(subject, campaign.nominal_run, campaign.select_faults((number,)))
     assert trial.verdict == "!!"
     assert trial.problems[0].startswith(problem)
 
@@ -139,7 +140,9 @@ def test_what_is_not_as_it_has_to_be_is_found(campaign: Campaign, kind: type[Fak
 @pytest.mark.slow
 def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> None:
     numbers = (number_of(campaign, "Grasp", "missed"),)
-    trial, path = record_trial(campaign.subject, campaign.rehearsal, campaign.select(numbers), tmp_path)
+    trial, path = record_trial(
+        campaign.mission, campaign.nominal_run, campaign.select_faults(numbers), tmp_path
+    )
     assert trial == tried(campaign, *numbers)
     kinds = [type(timed.event) for timed in read_journal(path / "journal.jsonl")]
     assert (kinds.count(FaultInjected), kinds[-1]) == (1, RunEnded)

@@ -9,14 +9,14 @@ import pytest
 from events import at, frame_searched, item_changed
 
 from executive.campaign.faults.fault import PlannedFault, SkillFault
-from executive.campaign.faults.judgement import (
-    HiddenCounts,
+from executive.campaign.faults.trial_checks import (
+    UnobservedCounts,
     check_end,
     check_ledger,
     check_losses,
     check_success,
-    count_hidden,
-    describe_other_reason,
+    count_unobserved_objects,
+    describe_unexpected_reason,
 )
 from executive.cell.frame import FrameCaptured
 from executive.cells.fake.cell import FakeCell
@@ -27,7 +27,7 @@ from executive.testing.faults.world_access import TrueObject
 BUG = PlannedFault(
     "tree/Grasp", "Grasp", "", "raises", "first", "", skill_faults=(SkillFault("tree/Grasp", "raises"),)
 )
-MISS = PlannedFault("tree/Grasp", "Grasp", "", "missed", "first", "", is_reason=True)
+MISS = PlannedFault("tree/Grasp", "Grasp", "", "missed", "first", "", is_failure_reason=True)
 ENDINGS = (Ending("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "skipped": 0, "lost": 0, "phantom": 0}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
@@ -80,7 +80,7 @@ def test_the_books_have_to_be_what_the_world_is() -> None:
     assert problem.startswith("the ledger says seen 3, placed 2, rejected 0, skipped 0, lost 1")
     assert "the audit right 2, wrong_bin 0, left 1" in problem
     (problem,) = books(outcome("SUCCESS"), ITEMS, {**AUDIT, "right": 1, "wrong_bin": 1})
-    assert problem.startswith("1 misplaced; ")
+    assert problem.startswith("1 objects in wrong bins; ")
     (problem,) = books(outcome("SUCCESS"), {**ITEMS, "seen": 4}, AUDIT)
     assert problem.startswith("the ledger does not balance: ")
 
@@ -92,7 +92,7 @@ def test_the_books_have_to_be_what_the_world_is() -> None:
         # One that never looked does not say that nothing is there.
         ("SUCCESS", "", False, []),
         ("SUCCESS", "", True, [
-            "success, and 1 objects were never seen; "
+            "it succeeded, but 1 objects were never seen; "
             "the audit right 2, wrong_bin 0, left 2, elsewhere 0, unseen 1",
         ]),
     ],
@@ -130,17 +130,19 @@ def test_only_what_the_fault_reached_for_may_be_out_of_reach() -> None:
 
 
 def test_a_failure_for_another_reason_is_remarked() -> None:
-    assert describe_other_reason(outcome("FAILURE", "Grasp.missed"), [MISS]) == ""
+    assert describe_unexpected_reason(outcome("FAILURE", "Grasp.missed"), [MISS]) == ""
     assert (
-        describe_other_reason(outcome("FAILURE", "lost"), [MISS])
-        == describe_other_reason(outcome("SUCCESS"), [MISS])
+        describe_unexpected_reason(outcome("FAILURE", "lost"), [MISS])
+        == describe_unexpected_reason(outcome("SUCCESS"), [MISS])
         == ""
     )
-    said = describe_other_reason(outcome("FAILURE", "Transit.dropped"), [MISS])
+    said = describe_unexpected_reason(outcome("FAILURE", "Transit.dropped"), [MISS])
     assert said == "failed because of Transit.dropped, not of missed"
-    dead = PlannedFault("detector", "detector", "", "dead for ever", "first", "", leads_to="unavailable")
-    assert describe_other_reason(outcome("FAILURE", "Detect.unavailable"), [MISS, dead]) == ""
-    assert describe_other_reason(outcome("FAILURE", "SelectTarget.unseen"), [dead]) == (
+    dead = PlannedFault(
+        "detector", "detector", "", "dead for ever", "first", "", expected_reason="unavailable"
+    )
+    assert describe_unexpected_reason(outcome("FAILURE", "Detect.unavailable"), [MISS, dead]) == ""
+    assert describe_unexpected_reason(outcome("FAILURE", "SelectTarget.unseen"), [dead]) == (
         "failed because of SelectTarget.unseen, not of unavailable"
     )
 
@@ -148,16 +150,16 @@ def test_a_failure_for_another_reason_is_remarked() -> None:
 @pytest.mark.parametrize(
     ("changes", "hidden", "problems"),
     [
-        ({}, HiddenCounts(1, 0), 0),
-        ({"right": 3, "left": 0}, HiddenCounts(0, 1), 0),
-        ({}, HiddenCounts(0, 0), 1),
-        ({}, HiddenCounts(0, 1), 1),
+        ({}, UnobservedCounts(1, 0), 0),
+        ({"right": 3, "left": 0}, UnobservedCounts(0, 1), 0),
+        ({}, UnobservedCounts(0, 0), 1),
+        ({}, UnobservedCounts(0, 1), 1),
         # Only one of two is hidden.
-        ({"right": 1, "left": 2}, HiddenCounts(1, 0), 1),
+        ({"right": 1, "left": 2}, UnobservedCounts(1, 0), 1),
     ],
 )
 def test_what_fell_where_no_look_shows_it_is_out_of_reach_wherever_it_lies(
-    changes: dict[str, int], hidden: HiddenCounts, problems: int
+    changes: dict[str, int], hidden: UnobservedCounts, problems: int
 ) -> None:
     lost = {**ITEMS, "rejected": 0, "lost": 1}
     assert len(books(outcome("FAILURE", "lost"), lost, {**AUDIT, **changes}, 0, hidden)) == problems
@@ -171,8 +173,8 @@ def test_an_object_is_out_of_sight_if_no_look_since_the_last_fall_shows_its_plac
     look = at(20, FrameCaptured(camera.capture()))
     before = at(5, look.event)
     things = [seen, beside, inside]
-    assert count_hidden(things, bins, [fall, look]) == HiddenCounts(1, 0)
-    assert count_hidden(things, bins, [before, fall]) == HiddenCounts(2, 1), (
+    assert count_unobserved_objects(things, bins, [fall, look]) == UnobservedCounts(1, 0)
+    assert count_unobserved_objects(things, bins, [before, fall]) == UnobservedCounts(2, 1), (
         "what was seen before it fell is old"
     )
-    assert count_hidden(things, bins, [look]) == HiddenCounts(0, 0), "nothing fell"
+    assert count_unobserved_objects(things, bins, [look]) == UnobservedCounts(0, 0), "nothing fell"

@@ -7,8 +7,8 @@ import pickle
 import pytest
 
 from executive.campaign.faults.campaign import Campaign
-from executive.campaign.faults.listing import list_faults, skill_nodes
-from executive.campaign.subject import Subject
+from executive.campaign.faults.fault_list import list_faults, list_skill_nodes
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
 from executive.plugins import discover
@@ -18,9 +18,9 @@ from executive.plugins import discover
     "mission", ["pick_on_request", pytest.param("sort_overhead", marks=pytest.mark.slow)]
 )
 def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in_each(mission: str) -> None:
-    subject = Subject(load_mission(mission, discover()), discover(), FakeCell, "fake", 0)
-    listed = {(fault.affected, fault.what, fault.when) for fault in Campaign(subject).faults}
-    nodes = skill_nodes(subject)
+    subject = MissionUnderTest(load_mission(mission, discover()), discover(), FakeCell, "fake", 0)
+    listed = {(fault.location, fault.kind, fault.occasion) for fault in Campaign(subject).faults}
+    nodes = list_skill_nodes(subject)
     assert len(nodes) >= 20
     for node in nodes:
         assert (node.path, "raises", "first") in listed
@@ -30,36 +30,44 @@ def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in
 
 def test_a_node_that_runs_often_goes_wrong_in_the_middle_too(campaign: Campaign) -> None:
     middle = {
-        (fault.name, fault.what) for fault in campaign.faults if fault.when == "middle" and fault.is_reason
+        (fault.name, fault.kind)
+        for fault in campaign.faults
+        if fault.occasion == "middle" and fault.is_failure_reason
     }
     assert {("Grasp", "missed"), ("Transit", "dropped"), ("Approach", "no_contact")} <= middle
 
 
 def test_detectors_objects_and_the_tool_go_wrong_too(campaign: Campaign) -> None:
     def list_effects(name: str) -> set[str]:
-        return {fault.what for fault in campaign.faults if fault.name == name and not fault.is_reason}
+        return {fault.kind for fault in campaign.faults if fault.name == name and not fault.is_failure_reason}
 
     ways = ("hangs", "dead", "unsure")
     lasting = {f"{way} for {time}" for way in ways for time in ("0.5 s", "5 s")}
-    ever = {f"{way} for ever" for way in ways}
+    ever = {f"{way} to the end" for way in ways}
     assert list_effects("detector") == {"slow by 0.5 s", "slow by 5 s"} | lasting | ever
-    assert list_effects("object") == {"taken", "bumped"}
-    assert list_effects("Approach") >= {"target taken", "target bumped"}
-    assert list_effects("Transit") >= {"lets go", "lets go over another bin"}
+    assert list_effects("object") == {"removed", "bumped"}
+    assert list_effects("Approach") >= {"target removed", "target bumped"}
+    assert list_effects("Transit") >= {"seal breaks", "seal breaks over a wrong bin"}
     assert list_effects("tool") >= {"no seal for 5 s", "no seal on object 1"}
 
 
 def test_a_reason_is_brought_about_in_the_cell_and_else_said_by_the_skill(campaign: Campaign) -> None:
     for number, fault in enumerate(campaign.faults, 1):
-        if fault.replaced:
-            physical = campaign.faults[fault.replaced - 1]
-            assert fault.replaced == number - 1
-            assert (physical.affected, physical.what) == (fault.affected, fault.what)
-            assert physical.when == fault.when
+        if fault.replaced_number:
+            physical = campaign.faults[fault.replaced_number - 1]
+            assert fault.replaced_number == number - 1
+            assert (physical.location, physical.kind) == (fault.location, fault.kind)
+            assert physical.occasion == fault.occasion
             assert physical.cell_faults
             assert fault.skill_faults
-    of = {fault.what: fault for fault in campaign.faults if fault.is_reason and not fault.replaced}
-    assert (of["missed"].cause, of["doubtful"].cause) == ("nothing seals", "the skill fails by itself")
+    of = {
+        fault.kind: fault
+        for fault in campaign.faults
+        if fault.is_failure_reason and not fault.replaced_number
+    }
+    assert (of["missed"].cause, of["doubtful"].cause) == (
+        "the suction cup cannot seal", "the skill fails without a cause",
+    )  # fmt: skip
 
 
 def test_what_runs_only_after_something_else_is_marked(campaign: Campaign) -> None:
@@ -72,5 +80,5 @@ def test_what_runs_only_after_something_else_is_marked(campaign: Campaign) -> No
 def test_the_numbers_are_always_the_same_and_faults_can_be_sent_to_another_process(
     campaign: Campaign,
 ) -> None:
-    again = list_faults(campaign.subject, campaign.rehearsal)
+    again = list_faults(campaign.mission, campaign.nominal_run)
     assert (again, pickle.loads(pickle.dumps(again))) == (tuple(campaign.faults), again)

@@ -1,4 +1,4 @@
-"""The mission of a campaign and the cell in which it runs."""
+"""Mission of a campaign or benchmark, and the cell in which it runs."""
 
 from __future__ import annotations
 
@@ -13,49 +13,51 @@ from executive.skill import Skill
 
 
 @dataclass(frozen=True)
-class Subject:
-    """A mission, and the cell in which it runs.
+class MissionUnderTest:
+    """A loaded mission, and all that its runs need.
 
     Attributes:
-        loaded: The mission and its cell file.
+        loaded: The mission, checked together with its cell file.
         skills: Installed skills by name.
-        kind: Function that makes the work cell; None: the kind in the cell file.
-        cell: Description of the kind of cell.
+        kind: Function that makes the work cell; None: the kind of cell in the cell file.
+        cell_description: Kind of the cell, and source of the detections.
         seed: Random seed; in a series of runs, the seed of the first run.
     """
 
     loaded: LoadedMission
     skills: Mapping[str, type[Skill]]
     kind: Callable[..., Workcell] | None
-    cell: str
+    cell_description: str
     seed: int
 
     @property
     def name(self) -> str:
-        """The mission's name."""
+        """Name of the mission."""
         return self.loaded.mission.name
 
     @property
     def requests(self) -> list[str]:
-        """Requests of the operator: each class in turn, as often as the maximum number of objects."""
+        """Requests of the operator: all classes of the mission, repeated as often as there may be objects."""
         return [*self.loaded.routes] * self.loaded.cell_config.table.objects[1]
 
 
-def load_subject(mission: str, overrides: Mapping[str, str], oracle: bool, seed: int) -> Subject:
-    """Return a mission and its cell; with `oracle` a simulated cell with true detections.
+def load_mission_under_test(
+    mission: str, overrides: Mapping[str, str], oracle: bool, seed: int
+) -> MissionUnderTest:
+    """Load a mission; if `oracle` is True, its simulated cell gets true detections.
 
     Raises:
-        InputError: The mission is missing or wrong, or `oracle` is set and the cell is not simulated.
+        InputError: The mission does not exist or has errors, or the cell of an `oracle` is not simulated.
     """
     skills = discover()
     loaded = load_mission(mission, skills, overrides, cell_kind)
     kind = loaded.cell_config.kind
     if not oracle:
-        return Subject(loaded, skills, None, kind, seed)
+        return MissionUnderTest(loaded, skills, None, kind, seed)
     if kind != "sim":
         raise InputError(
-            f"--oracle is for simulated cells, but {loaded.mission.name} has a cell of kind {kind}; omit it"
+            f"--oracle requires a simulated cell, but the cell of {loaded.mission.name} is of kind {kind}"
         )
     from executive.testing.oracle import make_oracle_kind
 
-    return Subject(loaded, skills, make_oracle_kind(), "sim, detections from the truth", seed)
+    return MissionUnderTest(loaded, skills, make_oracle_kind(), "sim, true detections", seed)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from events import at, item_changed
 
-from executive.campaign.halt_checks import check_journal, check_rest, check_tool
+from executive.campaign.end_checks import check_arm_at_rest, check_held_item, check_journal
 from executive.cell.arm import Task
 from executive.cells.fake.cell import FakeCell
 from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
@@ -27,10 +27,10 @@ def journal_of(*statuses: tuple[str, str], end: RunEnded = HALTED) -> list[Timed
 
 
 def test_a_moving_arm_is_reported(fake: FakeCell) -> None:
-    assert list(check_rest(fake)) == []
+    assert list(check_arm_at_rest(fake)) == []
     fake.arm.start(fake.arm._plan_motion(fake.arm.destination, "home", Task()) or pytest.fail())
     fake.arm._path *= 20
-    found = list(check_rest(fake))
+    found = list(check_arm_at_rest(fake))
     assert found[0] == "the arm is not at rest"
 
 
@@ -40,7 +40,7 @@ def test_a_moving_arm_is_reported(fake: FakeCell) -> None:
         ([("a", "RUNNING"), ("b", "RUNNING"), ("b", "SUCCESS"), ("b", "RUNNING"), ("b", "INVALID"),
           ("a", "INVALID")], []),
         ([("a", "RUNNING"), ("b", "RUNNING"), ("b", "INVALID")],
-         ["the journal has no end of a, which started at tick 0"]),
+         ["in the journal a starts at tick 0 and does not end"]),
         ([("a", "RUNNING"), ("a", "RUNNING"), ("a", "INVALID")],
          ["in the journal a starts at tick 1, but it is running already"]),
     ],
@@ -57,9 +57,7 @@ def test_every_node_of_a_journal_begins_once_and_ends(
 def test_a_journal_without_exactly_one_end_is_reported(journal: list[TimedEvent]) -> None:
     (problem,) = check_journal(journal, HALTED)
     ends = sum(isinstance(timed.event, RunEnded) for timed in journal)
-    assert (
-        problem == f"the journal has {ends} ends in its {len(journal)} entries; only the last may be an end"
-    )
+    assert problem == f"the journal has {ends} RunEnded in {len(journal)} events; only the last may be one"
 
 
 def test_a_journal_with_another_end_than_the_run_is_reported() -> None:
@@ -72,9 +70,9 @@ def test_a_journal_with_another_end_than_the_run_is_reported() -> None:
     [
         (True, "cube_1", []),
         (False, "", []),
-        (True, "", ['the tool holds an object, but the run names ""']),
-        (True, "something", ['the tool holds an object, but the run names "something"']),
-        (False, "cube_1", ['the tool holds nothing, but the run names "cube_1"']),
+        (True, "", ['the tool holds an object, but the held item of the run is ""']),
+        (True, "something", ['the tool holds an object, but the held item of the run is "something"']),
+        (False, "cube_1", ['the tool is empty, but the held item of the run is "cube_1"']),
     ],
 )
 def test_the_held_item_must_be_named(holding: bool, statuses: str, problem: list[str]) -> None:
@@ -82,4 +80,4 @@ def test_the_held_item_must_be_named(holding: bool, statuses: str, problem: list
         cell=SimpleNamespace(tool=SimpleNamespace(holding=holding)),
         accounts=SimpleNamespace(summaries=lambda: [item_changed("cube_1")]),
     )
-    assert list(check_tool(replace(HALTED, holds=statuses), workcell)) == problem
+    assert list(check_held_item(replace(HALTED, holds=statuses), workcell)) == problem

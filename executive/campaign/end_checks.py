@@ -1,0 +1,58 @@
+"""Checks of a run after its end: the arm is at rest, and journal and tool agree with its `RunEnded`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from executive.cell.workcell import Workcell
+from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
+
+REST_CHECK_STEPS = 6
+"""Number of control steps after the end of a run during which the arm must not move."""
+MAX_MOVEMENT_AT_REST = 1e-5
+"""Maximum movement of a joint of an arm at rest [rad]; for a fake arm, movement of the tool [m]."""
+
+
+def check_arm_at_rest(workcell: Workcell) -> Iterator[str]:
+    """Yield a problem if the arm is not at rest now, or moves during `REST_CHECK_STEPS` control steps."""
+    arm = workcell.cell.arm
+    if not arm.at_rest:
+        yield "the arm is not at rest"
+    positions = [arm.q]
+    for _ in range(REST_CHECK_STEPS):
+        workcell.advance()
+        positions.append(arm.q)
+    movement = float(np.ptp(positions, axis=0).max())
+    if movement > MAX_MOVEMENT_AT_REST:
+        yield f"the arm moved by {movement:.1e} after the run had ended"
+
+
+def check_journal(events: Sequence[TimedEvent], outcome: RunEnded) -> Iterator[str]:
+    """Yield a problem if the last event is not the only `RunEnded`, or if starts and ends of nodes differ."""
+    ends = [timed.event for timed in events if isinstance(timed.event, RunEnded)]
+    if len(ends) != 1 or events[-1].event is not ends[0]:
+        yield f"the journal has {len(ends)} RunEnded in {len(events)} events; only the last may be one"
+    elif ends[0] != outcome:
+        yield f"the journal ends with {ends[0]}, but the run ended with {outcome}"
+    start_ticks_by_path: dict[str, int] = {}
+    for timed in events:
+        match timed.event:
+            case NodeEnded(node):
+                start_ticks_by_path.pop(node, None)
+            case NodeStarted(node) if node in start_ticks_by_path:
+                yield f"in the journal {node} starts at tick {timed.tick}, but it is running already"
+            case NodeStarted(node):
+                start_ticks_by_path[node] = timed.tick
+    for node, tick in start_ticks_by_path.items():
+        yield f"in the journal {node} starts at tick {tick} and does not end"
+
+
+def check_held_item(outcome: RunEnded, workcell: Workcell) -> Iterator[str]:
+    """Yield a problem if tool and `RunEnded` disagree on whether an item is held at the end."""
+    holding = workcell.cell.tool.holding
+    if holding and outcome.holds not in {item.item for item in workcell.accounts.summaries()}:
+        yield f'the tool holds an object, but the held item of the run is "{outcome.holds}"'
+    if not holding and outcome.holds:
+        yield f'the tool is empty, but the held item of the run is "{outcome.holds}"'
