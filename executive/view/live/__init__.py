@@ -1,5 +1,5 @@
-"""Live page, on which a user with its address watches and controls a run in a browser.
+"""Live page, on which a user who knows its address watches and controls a run in a browser.
 
-A process of its own serves the page, on loopback only. Every request must contain the token of the address
-and come from the page itself, so that no other page in the browser can read or control anything.
+A separate process serves the page, on loopback only. Every request must contain the token of the address and
+come from the page itself, so that no other page in the browser can read or control the run.
 """

@@ -1,11 +1,11 @@
-"""Process of the live page, with a lower priority than the run."""
+"""Entry point of the server process of the live page, which has a lower priority than the run."""
 
 from __future__ import annotations
 
 import os
 
 if __name__ == "__main__":
-    os.nice(5)  # Lower the priority: the tick loop of the run goes first.
+    os.nice(5)  # The tick loop of the run has precedence.
 
     from executive.view.live.program import main
 

@@ -1,4 +1,4 @@
-"""Messages between a run and the server of its page."""
+"""Messages between a run and the server of its live page."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from executive.geometry import Pose
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """End of the run: status, sentence, run directory, and file of the report or ""."""
+class RunOutcome:
+    """End of the run: status, message, run directory, and file of the report or ""."""
 
     status: str
-    sentence: str
+    message: str
     run: str
     report: str
 
 
 @dataclass(frozen=True)
-class Change:
-    """Change of the page that does not follow from an event; None for an unchanged part.
+class PageChange:
+    """Change of the page that does not follow from an event; None for an unchanged value.
 
     Attributes:
-        clock: Time of the run [s].
-        tree: Drawing of the tree as SVG.
+        clock: Current time on the clock of the run [s].
+        tree: Drawing of the tree as an SVG document.
         paused: True if the run is paused.
-        note: Sentence about the record.
+        note: Sentence about the record of the run.
         result: End of the run.
     """
 
@@ -39,52 +39,53 @@ class Change:
     tree: str | None = None
     paused: bool | None = None
     note: str | None = None
-    result: Outcome | None = None
+    result: RunOutcome | None = None
 
 
 @dataclass(frozen=True)
 class CameraImage:
-    """Frame in which a detector searched, without its depth, and the detections."""
+    """Frame without its depth image, and the event with the detections in the frame."""
 
     frame: Frame
     look: FrameSearched
 
 
-Bodies = Mapping[str, Sequence[float]]
+BodyPoses = Mapping[str, Sequence[float]]
 """Poses of all bodies by name: position [m] and quaternion (w, x, y, z), `(7,)`."""
 
 
 @dataclass(frozen=True)
 class SceneChange:
-    """Change of the three-dimensional scene: its shapes at the start, then the poses of its bodies."""
+    """Change of the three-dimensional scene: all shapes at the start, later the poses of the bodies."""
 
     shapes: Sequence[Shape] | None = None
-    bodies: Bodies | None = None
+    body_poses: BodyPoses | None = None
 
 
-Message = TimedEvent | Change | CameraImage | SceneChange
-"""Message of the run to the server."""
+Message = TimedEvent | PageChange | CameraImage | SceneChange
+"""Message from the run to the server of the page."""
 
 
 @dataclass(frozen=True)
 class PageCommand:
-    """Command of a watcher, or the number of watchers.
+    """Command of a watcher (a browser that shows the page), or information about the watchers.
 
     Attributes:
-        do: `pause`, `resume`, `step`, `stop`, `request`, or `watched`.
-        word: The requested class, `rescan` or `quit`.
-        watchers: Number of watchers.
-        is_sparing: True if a browser renders on the CPU, which the run needs.
+        name: `pause`, `resume`, `step`, `stop`, `request`; `render_on_cpu` if the browser renders on the CPU;
+            `watchers` if the number of watchers changed.
+        text: For `request`: the requested class, `rescan` or `quit`.
+        watcher_count: For `watchers`: number of watchers.
+        is_cpu_rendering: For `watchers`: True if a browser renders on the CPU, and so slows down the run.
     """
 
-    do: str
-    word: str = ""
-    watchers: int = 0
-    is_sparing: bool = False
+    name: str
+    text: str = ""
+    watcher_count: int = 0
+    is_cpu_rendering: bool = False
 
 
-def encode_poses(poses: Mapping[str, Pose]) -> Bodies:
-    """Return the poses of bodies as positions and quaternions."""
+def encode_poses(poses: Mapping[str, Pose]) -> BodyPoses:
+    """Return the poses of bodies by name as positions and quaternions."""
     return {
         name: (*X_WB.position.tolist(), *np.roll(X_WB.quaternion, 1).tolist()) for name, X_WB in poses.items()
     }

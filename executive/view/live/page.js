@@ -2,29 +2,30 @@
 // Shows the messages of the server, and sends commands of the user to it.
 
 const SVG = "http://www.w3.org/2000/svg";
-const STATUS = ["running", "success", "failure", "invalid"];
-const COLOURS = ["#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00"];
-const SCROLL_PERIOD = 400; // ms
+const STATUS_CLASSES = ["running", "success", "failure", "invalid"];
+const CLASS_COLOURS = ["#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00"];
+const SCROLL_PERIOD = 400; // minimum time between two scrolls of the tree [ms]
+const MAX_TARGET_DISTANCE = 0.03; // maximum distance between the target and its detection [m]
 
 const find = (id) => document.getElementById(id);
-const state = { nodes: {}, items: {}, paused: false, over: false };
-const groups = new Map();
-const classes = [];
-let lastScroll = 0;
+const state = { nodes: {}, items: {}, paused: false, has_ended: false }; // all values that the server sent
+const groups = new Map(); // SVG group of each node by its path
+const classes = []; // object classes in the order of their first detection
+let lastScrollTime = 0;
 
 const address = new URL("live", location.href);
 address.protocol = "ws:";
 const socket = new WebSocket(address);
 socket.onopen = () => {
-  if (rendersOnCpu()) send({ do: "spare" });
+  if (rendersOnCpu()) send({ name: "render_on_cpu" });
 };
-socket.onmessage = (message) => show(JSON.parse(message.data));
+socket.onmessage = (message) => applyChanges(JSON.parse(message.data));
 socket.onclose = () => {
-  if (!state.result) headline("failure", "the run is gone");
+  if (!state.result) showRunStatus("failure", "connection lost");
   for (const button of document.querySelectorAll("button")) button.disabled = true;
 };
 find("whole").onchange = () => document.querySelector("#tree .scroll").classList.toggle("whole", find("whole").checked);
-for (const command of ["pause", "resume", "step", "stop"]) find(command).onclick = () => send({ do: command });
+for (const command of ["pause", "resume", "step", "stop"]) find(command).onclick = () => send({ name: command });
 
 function send(command) {
   if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
@@ -36,17 +37,17 @@ function rendersOnCpu() {
   return !extension || /swiftshader|llvmpipe|software/i.test(context.getParameter(extension.UNMASKED_RENDERER_WEBGL));
 }
 
-function show(changes) {
-  const { nodes, items, ...rest } = changes;
-  Object.assign(state, rest);
+function applyChanges(changes) {
+  const { nodes, items, ...others } = changes;
+  Object.assign(state, others);
   if ("tree" in changes) showTree(changes.tree);
   for (const [path, node] of Object.entries(nodes ?? {})) {
     state.nodes[path] = node;
-    showStatus(path, node);
-    // The last failure is shown with the message of its skill; control nodes only pass it on.
+    showNodeStatus(path, node);
+    // Only failures of skills are shown, because control nodes only pass them on.
     const group = groups.get(path);
-    if (node.status === "failure" && node.said && group?.classList.contains("skill")) {
-      find("said").textContent = `${path.split("/").pop().split(":").pop()}: ${node.said}`;
+    if (node.status === "failure" && node.failure && group?.classList.contains("skill")) {
+      find("message").textContent = `${path.split("/").pop().split(":").pop()}: ${node.failure}`;
     }
   }
   Object.assign(state.items, items);
@@ -57,61 +58,61 @@ function show(changes) {
   if ("clock" in changes) find("clock").textContent = `${changes.clock.toFixed(1)} s`;
   if (items) showItems();
   if ("look" in changes || "decision" in changes || (items && state.look)) showCamera();
-  if ("asking" in changes) ask(changes.asking);
-  if (changes.note) find("said").textContent = changes.note;
+  if ("choices" in changes) showChoices(changes.choices);
+  if (changes.note) find("message").textContent = changes.note;
   if (nodes) scrollToRunning();
   if ("result" in changes) showResult(changes.result);
   else if (!state.result) {
-    const status = state.paused ? "paused" : state.asking ? "asking" : "running";
-    headline(state.over ? "invalid" : "running", state.over ? "ending" : status);
+    const status = state.paused ? "paused" : state.choices ? "waiting for a request" : "running";
+    showRunStatus(state.has_ended ? "invalid" : "running", state.has_ended ? "ending" : status);
   }
-  find("pause").disabled = state.paused || state.over;
-  find("resume").disabled = !state.paused || state.over;
-  find("step").disabled = find("stop").disabled = state.over;
+  find("pause").disabled = state.paused || state.has_ended;
+  find("resume").disabled = !state.paused || state.has_ended;
+  find("step").disabled = find("stop").disabled = state.has_ended;
 }
 
-function headline(kind, text) {
-  find("head").className = kind;
+function showRunStatus(statusClass, text) {
+  find("head").className = statusClass;
   find("status").textContent = text;
 }
 
-function showTree(text) {
-  const tree = document.importNode(new DOMParser().parseFromString(text, "image/svg+xml").documentElement, true);
+function showTree(svg) {
+  const tree = document.importNode(new DOMParser().parseFromString(svg, "image/svg+xml").documentElement, true);
   document.querySelector("#tree .scroll").replaceChildren(tree);
   groups.clear();
   for (const group of tree.querySelectorAll("g.node")) groups.set(group.dataset.path, group);
-  for (const [path, node] of Object.entries(state.nodes)) showStatus(path, node);
+  for (const [path, node] of Object.entries(state.nodes)) showNodeStatus(path, node);
 }
 
-function showStatus(path, node) {
+function showNodeStatus(path, node) {
   const group = groups.get(path);
   if (!group) return;
-  group.classList.remove(...STATUS);
+  group.classList.remove(...STATUS_CLASSES);
   group.classList.add(node.status);
   const counts = [[node.done, "✓"], [node.failed, "✗"], [node.halted, "–"]];
-  const texts = counts.filter(([number]) => number).map(([number, mark]) => `${number} ${mark}`);
+  const texts = counts.filter(([count]) => count).map(([count, mark]) => `${count} ${mark}`);
   const note = group.querySelector(".note");
   if (note) note.textContent = texts.join("  ");
-  // Draw the line to a running node above the lines to its siblings.
+  // The line to a running node is drawn above the lines to its siblings.
   if (node.status === "running" && group.nextElementSibling) group.parentNode.append(group);
 }
 
 function scrollToRunning() {
   const now = performance.now();
-  if (!find("follow").checked || now - lastScroll < SCROLL_PERIOD) return;
+  if (!find("follow").checked || now - lastScrollTime < SCROLL_PERIOD) return;
   const running = [...groups.values()].filter((g) => g.classList.contains("skill") && g.classList.contains("running"));
   const target = running[0];
   if (!target) return;
-  lastScroll = now;
-  const frame = document.querySelector("#tree .scroll");
+  lastScrollTime = now;
+  const container = document.querySelector("#tree .scroll");
   const box = target.querySelector(".box").getBoundingClientRect();
-  const view = frame.getBoundingClientRect();
-  const inside = box.left >= view.left && box.right <= view.right && box.top >= view.top && box.bottom <= view.bottom;
-  if (inside) return;
-  // Without animation: the smooth scroll of a large drawing would slow down the run.
-  frame.scrollTo({
-    left: frame.scrollLeft + box.left - view.left - 0.62 * view.width,
-    top: frame.scrollTop + box.top - view.top - 0.4 * view.height,
+  const view = container.getBoundingClientRect();
+  const isVisible = box.left >= view.left && box.right <= view.right && box.top >= view.top && box.bottom <= view.bottom;
+  if (isVisible) return;
+  // The scroll has no animation, which would slow down the run if the drawing is large.
+  container.scrollTo({
+    left: container.scrollLeft + box.left - view.left - 0.62 * view.width,
+    top: container.scrollTop + box.top - view.top - 0.4 * view.height,
   });
 }
 
@@ -130,60 +131,61 @@ function showItems() {
 function showCamera() {
   const look = state.look;
   if (!look) return;
-  const shown = makeElement("svg", { viewBox: `0 0 ${look.width} ${look.height}`, class: "look" });
-  shown.append(makeElement("image", { href: look.source, width: look.width, height: look.height }));
-  const chosen = findChosen(look);
-  look.found.forEach((box, number) => shown.append(...drawBox(box, number === chosen)));
-  document.querySelector("#look .picture").replaceChildren(shown);
+  const drawing = makeElement("svg", { viewBox: `0 0 ${look.width} ${look.height}`, class: "look" });
+  drawing.append(makeElement("image", { href: look.source, width: look.width, height: look.height }));
+  const targetIndex = findTarget(look);
+  look.found.forEach((detection, index) => drawing.append(...drawDetection(detection, index === targetIndex)));
+  document.querySelector("#look .picture").replaceChildren(drawing);
   find("frame").textContent = `${look.camera}, frame ${look.frame} at ${look.stamp.toFixed(2)} s, by ${look.detector}`;
 }
 
-function drawBox(box, chosen) {
-  const [left, top, right, bottom] = box.box;
-  if (!classes.includes(box.label)) classes.push(box.label);
-  const colour = COLOURS[classes.indexOf(box.label) % COLOURS.length];
-  const drawn = makeElement("rect", { x: left, y: top, width: right - left, height: bottom - top, class: chosen ? "chosen" : "" });
-  drawn.style.stroke = colour;
+function drawDetection(detection, isTarget) {
+  const [left, top, right, bottom] = detection.box;
+  if (!classes.includes(detection.label)) classes.push(detection.label);
+  const colour = CLASS_COLOURS[classes.indexOf(detection.label) % CLASS_COLOURS.length];
+  const box = makeElement("rect", { x: left, y: top, width: right - left, height: bottom - top, class: isTarget ? "target" : "" });
+  box.style.stroke = colour;
   const label = makeElement("text", { x: left, y: top - 4 });
-  label.textContent = `${chosen ? state.decision.item : box.label} ${box.confidence.toFixed(2)}`;
+  label.textContent = `${isTarget ? state.decision.item : detection.label} ${detection.confidence.toFixed(2)}`;
   label.style.fill = colour;
-  return [drawn, label];
+  return [box, label];
 }
 
-function findChosen(look) {
+// Return the index of the detection of the selected target, or -1.
+function findTarget(look) {
   const item = state.decision && state.items[state.decision.item];
   if (!item || !item.position || item.state === "placed") return -1;
-  const distance = (box) => (box.position ? Math.hypot(box.position[0] - item.position[0], box.position[1] - item.position[1]) : Infinity);
-  const best = look.found.reduce((a, box, number) => (a < 0 || distance(box) < distance(look.found[a]) ? number : a), -1);
-  return best >= 0 && distance(look.found[best]) < 0.03 ? best : -1;
+  const distance = (detection) => (detection.position ? Math.hypot(detection.position[0] - item.position[0], detection.position[1] - item.position[1]) : Infinity);
+  const nearest = look.found.reduce((best, detection, index) => (best < 0 || distance(detection) < distance(look.found[best]) ? index : best), -1);
+  return nearest >= 0 && distance(look.found[nearest]) < MAX_TARGET_DISTANCE ? nearest : -1;
 }
 
 function makeElement(tag, attributes) {
-  const made = document.createElementNS(SVG, tag);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
+  const element = document.createElementNS(SVG, tag);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  return element;
 }
 
-function ask(choices) {
-  const panel = find("asking");
+function showChoices(choices) {
+  const panel = find("request");
   panel.hidden = !choices;
   for (const button of panel.querySelectorAll("button")) button.remove();
-  const words = choices ? [...choices, "rescan", "quit"] : [];
-  for (const word of words) {
+  const texts = choices ? [...choices, "rescan", "quit"] : [];
+  for (const text of texts) {
     const button = panel.appendChild(document.createElement("button"));
-    button.textContent = word;
-    button.onclick = () => send({ do: "request", word });
+    button.textContent = text;
+    button.onclick = () => send({ name: "request", text });
   }
 }
 
 function showResult(result) {
-  const kinds = { SUCCESS: "success", FAILURE: "failure", FAULT: "failure" };
-  headline(kinds[result.status] ?? "invalid", result.status);
+  const statusClass = { SUCCESS: "success", FAILURE: "failure", FAULT: "failure" }[result.status] ?? "invalid";
+  showRunStatus(statusClass, result.status);
   const panel = find("outcome");
   panel.hidden = false;
-  panel.className = kinds[result.status] ?? "invalid";
+  panel.className = statusClass;
   const lines = [
-    result.sentence,
+    result.message,
     result.report ? `report: ${result.report}` : `record: ${result.run}`,
   ];
   panel.replaceChildren(...lines.filter(Boolean).map((line) => {

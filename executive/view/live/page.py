@@ -1,4 +1,4 @@
-"""Live page: a view that sends messages to the process of the page, and runs its commands."""
+"""Live page: a view that sends messages to the server process of the page, and runs its commands."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from executive.record.result import Result
 from executive.run.run import Run
 from executive.view.live.messages import (
     CameraImage,
-    Change,
     Message,
-    Outcome,
+    PageChange,
     PageCommand,
+    RunOutcome,
     SceneChange,
     encode_poses,
 )
@@ -39,24 +39,25 @@ LOOPBACK = "127.0.0.1"
 POSE_PERIOD = 1 / 10
 """Period at which poses are sent while a browser shows the page [s]."""
 CPU_RENDERING_POSE_PERIOD = 2.5
-"""Period at which poses are sent if a browser renders on the CPU, which the run needs [s]."""
-BATCH_TIME = 0.03
-"""Time for which messages are collected before they are sent [s]."""
+"""Period at which poses are sent if a browser renders on the CPU and so slows down the run [s]."""
+BATCH_PERIOD = 0.03
+"""Period at which queued messages are sent in a batch [s]."""
 SHUTDOWN_TIMEOUT = 3.0
-"""Longest wait for the end of the page's server [s]."""
+"""Maximum time to wait for the end of the server process [s]."""
 MAX_QUEUED_MESSAGES = 32
-"""Queue length above which images [1 MB] and poses are dropped."""
+"""Length of the queue above which images (about 1 MB each) and poses are dropped."""
 REQUIRED_PACKAGES = ("aiohttp", "trimesh", "viser")
+"""Optional dependencies of the project that the live page needs."""
 
 
 class LivePage:
     """Shows a run in browsers that open `address`, and runs their commands; implements `View`.
 
-    While no browser shows the page, only events are sent, which are small. After an error of the page the run
-    goes on without it.
+    While no browser shows the page, only events are sent, which are small. An error of the page does not
+    affect the run.
 
     Attributes:
-        address: Address of the page; every user who knows it can watch and control the run.
+        address: Address of the page; every user who knows the address can watch and control the run.
 
     Raises:
         InputError: A package in `REQUIRED_PACKAGES` is not installed.
@@ -69,105 +70,106 @@ class LivePage:
                 'or pip install "executive[view]"'
             )
         token = secrets.token_urlsafe(24)
-        self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the page)
+        self._error_file = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the page)
         with socket.create_server((LOOPBACK, 0)) as listener:
             port = listener.getsockname()[1]
             self.address = f"http://{LOOPBACK}:{port}/{token}/"
             self._server = subprocess.Popen(
                 build_command("executive.view.live", str(listener.fileno())),
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._error_file,
                 pass_fds=[listener.fileno()],
-                # In a session of its own the server gets no Ctrl-C: it must still show the result of the run.
+                # In a separate session the server gets no Ctrl-C, and can still show the result of the run.
                 start_new_session=True,
             )  # fmt: skip
         self._queue: queue.SimpleQueue[tuple[str, int] | Message | None] = queue.SimpleQueue()
         self._run: Run | None = None
         self._visuals: Visuals | None = None
         self._is_closed = False
-        self._watchers = 0
-        self._next_poses_at = 0.0
-        self._period = POSE_PERIOD
-        self._paused = False
+        self._watcher_count = 0
+        self._next_pose_time = 0.0
+        self._pose_period = POSE_PERIOD
+        self._was_paused = False
         self._last_frame: Frame | None = None
         self._last_look: CameraImage | None = None
         self.problem = ""
         """Description of the first error of the page, or ""."""
-        # Every user of the machine can read the arguments of a process: the token is sent instead.
+        # The token is sent through the pipe, because every user of the machine can read process arguments.
         self._queue.put((token, port))
         self._threads = [
-            threading.Thread(target=work, name="page", daemon=True) for work in (self._send, self._listen)
+            threading.Thread(target=target, name="page", daemon=True)
+            for target in (self._send_messages, self._read_commands)
         ]
         for thread in self._threads:
             thread.start()
 
     def open(self, run: Run) -> None:
-        """Show the tree and the scene of a run, and begin to send its state."""
+        """Show the tree and the scene of a run, and start to send the state of the run."""
         nodes = outline(run.root)
         mission = run.mission
         self._run = run
-        with self._errors_noted():
+        with self._record_errors():
             self._visuals = run.workcell.visuals()
-        # Every node has a line for its counts.
-        blank = {node.path: NodeNote("", ("",)) for node in nodes}
+        # Every node gets an empty line, in which the page writes the counts of the node.
+        empty_notes = {node.path: NodeNote("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(SceneChange(shapes=shapes))
-        self._enqueue(Change(tree=draw_svg(nodes, mission, blank)))
+        self._enqueue(PageChange(tree=draw_svg(nodes, mission, empty_notes)))
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
     def __call__(self, timed: TimedEvent) -> None:
         """Send an event that changes the page."""
         event = timed.event
-        with self._errors_noted():
+        with self._record_errors():
             if isinstance(event, FrameCaptured):
                 # The page does not show the depth, which is three times as large as the rest.
                 self._last_frame = replace(event.frame, depth=None)
             elif isinstance(event, FrameSearched) and self._last_frame is not None:
                 self._last_look = CameraImage(self._last_frame, event)
-                if self._watchers and self._is_queue_short:
+                if self._watcher_count and self._is_queue_short:
                     self._enqueue(self._last_look)
             elif not isinstance(event, InputRead):
                 self._enqueue(timed)
 
     def close(self) -> None:
-        """Do nothing: the page stays open until `finish`."""
+        """Do nothing: the page stays open until `finish` is called."""
 
     def note(self, sentence: str) -> None:
-        """Show a sentence about the record."""
-        self._enqueue(Change(note=sentence))
+        """Show a sentence about the record of the run."""
+        self._enqueue(PageChange(note=sentence))
 
     def finish(self, result: Result | None = None, report: str = "") -> None:
         """Show the result of the run, and end the server; a second call does nothing."""
         if not self._threads:
             return
         if result is not None:
-            sentence = result.message if result.story is None else result.story.verdict
-            self._enqueue(Change(result=Outcome(result.status, sentence, result.run, report)))
+            message = result.message if result.story is None else result.story.verdict
+            self._enqueue(PageChange(result=RunOutcome(result.status, message, result.run, report)))
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:
-                self.problem = self.problem or f"the page ended before the run: {self._last_error()}"
+                self.problem = self.problem or f"the page ended before the run: {self._read_last_error()}"
         except subprocess.TimeoutExpired:
             self._server.kill()
             self._server.wait()
         for thread in self._threads:
             thread.join()
         self._threads = []
-        self._errors.close()
+        self._error_file.close()
 
     def _send_state(self) -> None:
-        """Send the state of control and the poses if they are due; called between two ticks."""
+        """Send the time, the poses and whether the run is paused, if they are due; called between ticks."""
         now = time.monotonic()
-        if now < self._next_poses_at or self._run is None:
+        if now < self._next_pose_time or self._run is None:
             return
-        self._next_poses_at = now + self._period
-        with self._errors_noted():
-            if self._run.control.is_paused != self._paused:
-                self._paused = not self._paused
-                self._enqueue(Change(paused=self._paused))
-            if self._watchers and self._is_queue_short and self._visuals is not None:
-                self._enqueue(Change(clock=self._run.now))
-                self._enqueue(SceneChange(bodies=encode_poses(self._visuals.poses())))
+        self._next_pose_time = now + self._pose_period
+        with self._record_errors():
+            if self._run.control.is_paused != self._was_paused:
+                self._was_paused = not self._was_paused
+                self._enqueue(PageChange(paused=self._was_paused))
+            if self._watcher_count and self._is_queue_short and self._visuals is not None:
+                self._enqueue(PageChange(clock=self._run.now))
+                self._enqueue(SceneChange(body_poses=encode_poses(self._visuals.poses())))
 
     @property
     def _is_queue_short(self) -> bool:
@@ -178,53 +180,53 @@ class LivePage:
             self._queue.put(message)
 
     @contextlib.contextmanager
-    def _errors_noted(self) -> Iterator[None]:
-        """Note an exception as the problem of the page, so that the run continues."""
+    def _record_errors(self) -> Iterator[None]:
+        """Store an exception as the problem of the page instead of raising it, so that the run continues."""
         try:
             yield
         except Exception as error:
-            self.problem = self.problem or f"not all was shown on the page: {type(error).__name__}: {error}"
+            self.problem = self.problem or f"the page is incomplete: {type(error).__name__}: {error}"
 
-    def _send(self) -> None:
-        """Send queued messages in batches until the end marker None."""
+    def _send_messages(self) -> None:
+        """Send the queued messages in batches, up to the end marker None."""
         assert self._server.stdin is not None
-        over = False
+        must_end = False
         with contextlib.suppress(BrokenPipeError), self._server.stdin as pipe:
-            while not over:
+            while not must_end:
                 batch = [self._queue.get()]
                 while not self._queue.empty():
                     batch.append(self._queue.get())
-                over = None in batch
+                must_end = None in batch
                 pickle.dump(
                     [message for message in batch if message is not None], pipe, pickle.HIGHEST_PROTOCOL
                 )
                 pipe.flush()
-                if not over:
-                    time.sleep(BATCH_TIME)
+                if not must_end:
+                    time.sleep(BATCH_PERIOD)
         self._is_closed = True
 
-    def _last_error(self) -> str:
-        """Return the last line of the server's error output, or its exit status."""
-        self._errors.seek(0)
-        lines = self._errors.read().decode(errors="replace").strip().splitlines()
+    def _read_last_error(self) -> str:
+        """Return the last line that the server wrote to stderr, or the exit status of the server."""
+        self._error_file.seek(0)
+        lines = self._error_file.read().decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else f"exit status {self._server.returncode}"
 
-    def _listen(self) -> None:
+    def _read_commands(self) -> None:
         """Run the commands of the page until its server ends."""
         assert self._server.stdout is not None
         for line in self._server.stdout:
-            with self._errors_noted():
+            with self._record_errors():
                 self._run_command(PageCommand(**json.loads(line)))
-        self._watchers, self._is_closed = 0, True
+        self._watcher_count, self._is_closed = 0, True
 
     def _run_command(self, command: PageCommand) -> None:
         control = None if self._run is None else self._run.control
-        if command.do == "watched":
-            self._watchers = command.watchers
-            self._period = CPU_RENDERING_POSE_PERIOD if command.is_sparing else POSE_PERIOD
-            if self._watchers and self._last_look is not None:
+        if command.name == "watchers":
+            self._watcher_count = command.watcher_count
+            self._pose_period = CPU_RENDERING_POSE_PERIOD if command.is_cpu_rendering else POSE_PERIOD
+            if self._watcher_count and self._last_look is not None:
                 self._enqueue(self._last_look)
-        elif control is not None and command.do == "request":
-            control.add_request(command.word)
+        elif control is not None and command.name == "request":
+            control.add_request(command.text)
         elif control is not None:
-            getattr(control, command.do)()
+            getattr(control, command.name)()

@@ -1,4 +1,4 @@
-"""Server program of the live page: it reads messages from stdin and writes commands to stdout."""
+"""Program of the server process of the live page: reads messages from stdin, writes commands to stdout."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from pathlib import Path
 
 from aiohttp import web
 
-from executive.view.live.board import Board
 from executive.view.live.messages import Message, PageCommand, SceneChange
+from executive.view.live.page_state import PageState
+from executive.view.live.scene_proxy import SceneProxy
 from executive.view.live.server import Server
-from executive.view.live.tunnel import Tunnel
 
 
 def main() -> None:
-    """Serve until standard input ends."""
+    """Serve the page until standard input ends; the first argument is the descriptor of the open socket."""
     listener = socket.socket(fileno=int(sys.argv[1]))
-    # The run reads commands from stdout: text that libraries print goes to stderr.
+    # The run reads commands from stdout, so text that libraries print is redirected to stderr.
     commands = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
 
@@ -35,24 +35,24 @@ def main() -> None:
 
     with tempfile.TemporaryDirectory(prefix="executive-") as folder:
         asyncio.run(_serve(listener, Path(folder) / "scene", write_command))
-    # The run waits for this process, which has nothing left to clean up.
+    # Exit without the clean-up of libraries, because the run waits for this process.
     os._exit(0)
 
 
 async def _serve(listener: socket.socket, path: Path, write_command: Callable[[PageCommand], None]) -> None:
-    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    loop, input_ended = asyncio.get_running_loop(), asyncio.Event()
     (token, port), *first_messages = pickle.load(sys.stdin.buffer)
-    board, tunnel = Board(), Tunnel(path)
-    server = Server(board, tunnel, write_command, token, port)
+    page_state, scene_proxy = PageState(), SceneProxy(path)
+    server = Server(page_state, scene_proxy, write_command, token, port)
 
     def apply_batch(batch: list[Message]) -> None:
         for message in batch:
             if not isinstance(message, SceneChange):
-                board.apply(message)
+                page_state.apply(message)
             elif message.shapes is not None:
-                tunnel.show(message.shapes)
-            elif message.bodies is not None:
-                tunnel.move(message.bodies)
+                scene_proxy.set_shapes(message.shapes)
+            elif message.body_poses is not None:
+                scene_proxy.set_body_poses(message.body_poses)
 
     def read_batches() -> None:
         try:
@@ -61,8 +61,8 @@ async def _serve(listener: socket.socket, path: Path, write_command: Callable[[P
         except EOFError:
             pass
         finally:
-            # The input also ends if the run was killed, even in the middle of a message.
-            loop.call_soon_threadsafe(ended.set)
+            # If the run was killed, the input may end in the middle of a message.
+            loop.call_soon_threadsafe(input_ended.set)
 
     apply_batch(first_messages)
     runner = web.AppRunner(server.app, access_log=None)
@@ -70,6 +70,6 @@ async def _serve(listener: socket.socket, path: Path, write_command: Callable[[P
     await web.SockSite(runner, listener).start()
     sending = asyncio.create_task(server.send_periodically())
     threading.Thread(target=read_batches, daemon=True).start()
-    await ended.wait()
+    await input_ended.wait()
     sending.cancel()
     await server.end()

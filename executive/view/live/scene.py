@@ -1,4 +1,4 @@
-"""Three-dimensional scene of the cell: a viser server on a Unix socket, out of reach of browsers."""
+"""Three-dimensional scene of the cell: a viser server on a Unix socket, which browsers cannot open."""
 
 from __future__ import annotations
 
@@ -15,26 +15,27 @@ import websockets.asyncio.server
 from executive.cell.visuals import Shape
 
 CAMERA_POSITION, CAMERA_TARGET = (1.35, -0.68, 0.95), (0.33, 0.0, 0.2)
-"""Initial position of the camera, and the point in the middle of its image [m]."""
+"""Initial position of the virtual camera, and the point at which it looks, in the world frame [m]."""
 BACKGROUND = (243, 245, 248)
+"""Colour of the background, RGB, 0 to 255."""
 
 
 class LiveScene:
-    """A viser server that shows shapes.
+    """A viser server that shows shapes, some of which are attached to moving bodies.
 
     Args:
-        path: Unix socket of the server, its only one: viser does not check who connects.
-        shapes: The shapes.
+        path: Unix socket of the server; no other socket is opened, because viser does not check who connects.
+        shapes: The shapes, which are attached to a body or fixed in the world.
     """
 
     def __init__(self, path: Path, shapes: Sequence[Shape]) -> None:
-        with _servers_on_socket(path):
+        with _serve_on_unix_socket(path):
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self._bodies: dict[str, viser.FrameHandle] = {}
         scene = self._server.scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
-        # Without a graphics card, browsers render shadows and reflections most slowly.
+        # Shadows and reflections are off, because they are slow in browsers without a graphics card.
         scene.configure_default_lights(cast_shadow=False)
         scene.configure_environment_map(None)
         scene.add_light_ambient("/light", intensity=1.6)
@@ -42,27 +43,27 @@ class LiveScene:
         self._server.initial_camera.position = CAMERA_POSITION
         self._server.initial_camera.look_at = CAMERA_TARGET
         self._server.gui.configure_theme(control_width="small", show_logo=False, show_share_button=False)
-        # The scene has no settings: the buttons are on the page.
+        # The panel of viser is not used: the buttons are on the page.
         self._server.gui.main_panel.minimize()
         for number, shape in enumerate(shapes):
             if shape.body and shape.body not in self._bodies:
                 self._bodies[shape.body] = self._server.scene.add_frame(
-                    _scene_path(shape.body), show_axes=False
+                    _make_scene_path(shape.body), show_axes=False
                 )
-            parent = _scene_path(shape.body) if shape.body else "/fixed"
-            self._add(f"{parent}/{number}", shape)
+            parent = _make_scene_path(shape.body) if shape.body else "/fixed"
+            self._add_shape(f"{parent}/{number}", shape)
 
-    def move(self, bodies: Mapping[str, Sequence[float]]) -> None:
-        """Set the poses of bodies: position [m] and quaternion (w, x, y, z); hide bodies without a pose."""
+    def set_body_poses(self, poses: Mapping[str, Sequence[float]]) -> None:
+        """Set the poses of bodies by name: position [m] and quaternion (w, x, y, z); hide other bodies."""
         with self._server.atomic():
             for name, frame in self._bodies.items():
-                pose = bodies.get(name)
+                pose = poses.get(name)
                 if frame.visible != (pose is not None):
                     frame.visible = pose is not None
                 if pose is not None:
                     frame.position, frame.wxyz = np.array(pose[:3]), np.array(pose[3:])
 
-    def _add(self, name: str, shape: Shape) -> None:
+    def _add_shape(self, name: str, shape: Shape) -> None:
         scene, colour = self._server.scene, shape.colour
         pose: dict[str, Any] = {"position": shape.X_BS.position, "wxyz": np.roll(shape.X_BS.quaternion, 1)}
         if shape.kind == "box":
@@ -78,8 +79,8 @@ class LiveScene:
 
 
 @contextlib.contextmanager
-def _servers_on_socket(path: Path) -> Iterator[None]:
-    """Make viser listen on a Unix socket, which its own options do not allow."""
+def _serve_on_unix_socket(path: Path) -> Iterator[None]:
+    """Make viser servers listen on a Unix socket if they are created in this context; viser has no option."""
     serve = websockets.asyncio.server.serve
 
     def serve_on_socket(handler: Any, host: Any, port: Any, **options: Any) -> Any:
@@ -93,5 +94,5 @@ def _servers_on_socket(path: Path) -> Iterator[None]:
         websockets.asyncio.server.serve = serve  # type: ignore[misc]
 
 
-def _scene_path(body: str) -> str:
+def _make_scene_path(body: str) -> str:
     return "/bodies/" + body.replace(" ", "_").replace("/", "_")

@@ -91,11 +91,11 @@ def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> 
 
 def test_a_watcher_sees_a_first_step_then_the_run_to_its_end(tmp_path: Path) -> None:
     async def do(watched: Watched) -> None:
-        await watched.wish(do="step")
+        await watched.wish(name="step")
         await watched.until(lambda shown: shown.get("clock", 0.0) > 0.0)
         assert watched.run.tick == 1
-        await watched.wish(do="resume")
-        shown = await watched.until(lambda shown: shown.get("over"))
+        await watched.wish(name="resume")
+        shown = await watched.until(lambda shown: shown.get("has_ended"))
         assert '<svg xmlns="http://www.w3.org/2000/svg" class="behaviour-tree"' in shown["tree"]
         assert shown["nodes"]["tree/Release"]["status"] == "success"
         assert shown["run"] == {"mission": "bring_one", "seed": 3}
@@ -111,12 +111,12 @@ def test_a_watcher_sees_a_first_step_then_the_run_to_its_end(tmp_path: Path) -> 
 @pytest.mark.slow
 def test_what_is_to_be_picked_can_be_said_on_the_page(tmp_path: Path) -> None:
     async def do(watched: Watched) -> None:
-        await watched.wish(do="resume")
-        shown = await watched.until(lambda shown: shown.get("asking"))
-        assert shown["asking"] == ["cube", "sphere", "duck"]
-        for word in ("a unicorn", "sphere"):
-            await watched.wish(do="request", word=word)
-        await watched.until(lambda shown: shown.get("over"))
+        await watched.wish(name="resume")
+        shown = await watched.until(lambda shown: shown.get("choices"))
+        assert shown["choices"] == ["cube", "sphere", "duck"]
+        for text in ("a unicorn", "sphere"):
+            await watched.wish(name="request", text=text)
+        await watched.until(lambda shown: shown.get("has_ended"))
 
     asking = re.sub(r"tree: .*", "tree: [AwaitRequest]", MISSION)
     assert watch(asking, tmp_path, do).status == "SUCCESS"
@@ -185,7 +185,7 @@ def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
             page(at(1, FrameCaptured(object())))
             page(at(1, frame_searched()))
         assert page.problem == (
-            "not all was shown on the page: TypeError: replace() should be called on dataclass instances"
+            "the page is incomplete: TypeError: replace() should be called on dataclass instances"
         )
     finally:
         page.finish()

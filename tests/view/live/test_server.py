@@ -18,14 +18,14 @@ from events import at, run_started
 from executive.cell.visuals import Shape
 from executive.geometry import Pose
 from executive.view.live import scene
-from executive.view.live.board import Board
-from executive.view.live.messages import Change, PageCommand
-from executive.view.live.server import HEADERS, POLICY, Server, find_refusal, parse_command
-from executive.view.live.tunnel import Tunnel
+from executive.view.live.messages import PageChange, PageCommand
+from executive.view.live.page_state import PageState
+from executive.view.live.scene_proxy import SceneProxy
+from executive.view.live.server import CONTENT_POLICY, SECURITY_HEADERS, Server, find_refusal, parse_command
 
 TOKEN = "a-token"
 HOST = "127.0.0.1:8123"
-NO_TOKEN = "the address lacks the token of this run; take it from the terminal that the run is in"
+NO_TOKEN = "the address lacks the token of this run; copy the address from the terminal of the run"
 OTHER_PAGE = "another page may neither read nor control this run"
 
 
@@ -48,7 +48,7 @@ NAMES = ("evil.example", "localhost:8123", "127.0.0.1", f"{HOST}.evil")
         (f"/{TOKEN}/", {"Origin": f"http://{HOST}", "Upgrade": "websocket"}, ""),
         *((path, {}, NO_TOKEN) for path in PATHS),
         *((f"/{TOKEN}/", {"Origin": origin}, OTHER_PAGE) for origin in ORIGINS),
-        (f"/{TOKEN}/", {"Upgrade": "WebSocket"}, "a connection must name the origin of its page"),
+        (f"/{TOKEN}/", {"Upgrade": "WebSocket"}, "a WebSocket request must contain the origin of its page"),
         *(
             (f"/{TOKEN}/", {"Host": name}, "the page must be opened by the address of this machine")
             for name in NAMES
@@ -67,7 +67,7 @@ class Site:
     server: Server
     session: aiohttp.ClientSession
     address: str
-    board: Board
+    page_state: PageState
     wishes: list[PageCommand]
 
 
@@ -77,13 +77,13 @@ def serve(do: Callable[[Site], Awaitable[None]]) -> None:
     async def work() -> None:
         wishes: list[PageCommand] = []
         listener = socket.create_server(("127.0.0.1", 0))
-        port, board = listener.getsockname()[1], Board()
-        server = Server(board, Tunnel(Path("nowhere")), wishes.append, TOKEN, port)
+        port, page_state = listener.getsockname()[1], PageState()
+        server = Server(page_state, SceneProxy(Path("nowhere")), wishes.append, TOKEN, port)
         runner = web.AppRunner(server.app)
         await runner.setup()
         await web.SockSite(runner, listener).start()
         async with aiohttp.ClientSession() as session:
-            await do(Site(server, session, f"http://127.0.0.1:{port}", board, wishes))
+            await do(Site(server, session, f"http://127.0.0.1:{port}", page_state, wishes))
         await runner.cleanup()
 
     asyncio.run(work())
@@ -102,14 +102,14 @@ def test_serves_the_page_to_the_page_and_nothing_else() -> None:
             status, text, headers = await get(site, f"/{TOKEN}/{file}")
             assert (status, headers["Content-Type"]) == (200, f"{kind}; charset=utf-8")
             assert text
-            assert headers.items() >= (HEADERS | {"Content-Security-Policy": POLICY}).items()
+            assert headers.items() >= (SECURITY_HEADERS | {"Content-Security-Policy": CONTENT_POLICY}).items()
         for path in ("page.py", "../guard.py", "%2e%2e/guard.py", "scene.py"):
             status, text, _ = await get(site, f"/{TOKEN}/{path}")
             assert (status, text) in [(404, "there is no such file\n"), (403, text)]
         for path in ("/", "/live", "/scene", "/wrong/", "/wrong/live", "/wrong/scene/"):
             status, text, headers = await get(site, path)
             assert (status, text) == (403, f"{NO_TOKEN}\n")
-            assert headers.items() >= HEADERS.items()
+            assert headers.items() >= SECURITY_HEADERS.items()
         for path in ("live", "scene"):
             for origin in ({}, {"Origin": "http://evil.example"}, {"Origin": "null"}):
                 with pytest.raises(aiohttp.WSServerHandshakeError) as refused:
@@ -118,34 +118,42 @@ def test_serves_the_page_to_the_page_and_nothing_else() -> None:
         assert site.wishes == []
 
     serve(look)
-    assert POLICY.startswith("default-src 'none'; script-src 'self'; ")
-    assert "frame-ancestors 'none'" in POLICY
-    assert (HEADERS["Referrer-Policy"], HEADERS["Cache-Control"]) == ("no-referrer", "no-store")
+    assert CONTENT_POLICY.startswith("default-src 'none'; script-src 'self'; ")
+    assert "frame-ancestors 'none'" in CONTENT_POLICY
+    assert (SECURITY_HEADERS["Referrer-Policy"], SECURITY_HEADERS["Cache-Control"]) == (
+        "no-referrer",
+        "no-store",
+    )
 
 
 def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> None:
     async def look(site: Site) -> None:
-        site.board.apply(at(0, run_started(mission="sort", seed=3)))
+        site.page_state.apply(at(0, run_started(mission="sort", seed=3)))
         origin = {"Origin": site.address}
         async with site.session.ws_connect(f"{site.address}/{TOKEN}/live", headers=origin) as socket:
             assert (await socket.receive_json())["run"] == {"mission": "sort", "seed": 3}
-            assert site.wishes == [PageCommand("watched", watchers=1)]
-            site.board.take_changes()
-            site.board.apply(Change(paused=True))
+            assert site.wishes == [PageCommand("watchers", watcher_count=1)]
+            site.page_state.take_changes()
+            site.page_state.apply(PageChange(paused=True))
             await site.server.send_changes()
             assert await socket.receive_json() == {"paused": True}
-            wishes = ('{"do": "spare"}', '{"do": "pause"}', "rubbish", '{"do": "request", "word": "cube"}')
-            for said in (*wishes, '{"do": "fly"}', '{"do": "stop"}'):
+            wishes = (
+                '{"name": "render_on_cpu"}',
+                '{"name": "pause"}',
+                "rubbish",
+                '{"name": "request", "text": "cube"}',
+            )
+            for said in (*wishes, '{"name": "fly"}', '{"name": "stop"}'):
                 await socket.send_str(said)
             while site.wishes[-1] != PageCommand("stop"):
                 await asyncio.sleep(0)
-            site.board.apply(Change(note="over"))
+            site.page_state.apply(PageChange(note="over"))
             await site.server.end()
             assert await socket.receive_json() == {"note": "over"}
             assert (await socket.receive()).type is aiohttp.WSMsgType.CLOSE
-        while site.wishes[-1] != PageCommand("watched"):
+        while site.wishes[-1] != PageCommand("watchers"):
             await asyncio.sleep(0)
-        assert site.wishes[1] == PageCommand("watched", watchers=1, is_sparing=True)
+        assert site.wishes[1] == PageCommand("watchers", watcher_count=1, is_cpu_rendering=True)
         assert site.wishes[2:-1] == [
             PageCommand("pause"),
             PageCommand("request", "cube"),
@@ -158,9 +166,9 @@ def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> No
 @pytest.mark.parametrize(
     ("text", "wish"),
     [
-        ("", None), ("[]", None), ("null", None), ('"pause"', None), ("{", None), ('{"do": null}', None),
-        ('{"do": "watched", "by": 7}', None), ('{"do": ["pause"]}', None), ('{"do": "request"}', None),
-        ('{"do": "request", "word": 3}', None), ('{"do": "stop", "word": "x"}', PageCommand("stop")),
+        ("", None), ("[]", None), ("null", None), ('"pause"', None), ("{", None), ('{"name": null}', None),
+        ('{"name": "watchers", "by": 7}', None), ('{"name": ["pause"]}', None), ('{"name": "request"}', None),
+        ('{"name": "request", "text": 3}', None), ('{"name": "stop", "text": "x"}', PageCommand("stop")),
     ],
 )  # fmt: skip
 def test_wishes_that_nobody_can_have_are_dropped(text: str, wish: object) -> None:
@@ -180,7 +188,7 @@ class Built:
         self.received: list[object] = [path, shapes]
         self.made.append(self)
 
-    def move(self, bodies: object) -> None:
+    def set_body_poses(self, bodies: object) -> None:
         self.received.append(bodies)
 
 
@@ -190,16 +198,16 @@ def test_the_scene_is_built_once_when_somebody_looks_and_there_is_one(monkeypatc
     monkeypatch.setattr(scene, "LiveScene", Built)
 
     async def work() -> None:
-        tunnel = Tunnel(Path("socket"))
-        early = asyncio.create_task(tunnel.session()) if looked_at else None
+        scene_proxy = SceneProxy(Path("socket"))
+        early = asyncio.create_task(scene_proxy.open_session()) if looked_at else None
         await asyncio.sleep(0.02)
         assert not Built.made
-        tunnel.show((BOX,))
-        tunnel.move({"tool": PLACE})
+        scene_proxy.set_shapes((BOX,))
+        scene_proxy.set_body_poses({"tool": PLACE})
         if early is not None:
-            for session in (await early, await tunnel.session()):
+            for session in (await early, await scene_proxy.open_session()):
                 await session.close()
-            tunnel.move({})
+            scene_proxy.set_body_poses({})
 
     asyncio.run(work())
     assert [one.received for one in Built.made] == [[Path("socket"), (BOX,), {"tool": PLACE}, {}]] * looked_at

@@ -1,4 +1,4 @@
-"""Proxy from the page's server to the server of the scene, which starts with the first request."""
+"""Proxy between the server of the page and the server of the scene, which starts at the first request."""
 
 from __future__ import annotations
 
@@ -15,60 +15,60 @@ from executive.cell.visuals import Shape
 if TYPE_CHECKING:
     from executive.view.live.scene import LiveScene
 
-POLICY = (
+CONTENT_POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' data: blob:; "
     "connect-src 'self' data: blob:; frame-ancestors 'self'"
 )
-"""Content security policy: the page of viser must not load anything from other servers."""
+"""Content security policy of the page of viser, which must not load anything from other servers."""
 MAX_MESSAGE_SIZE = 64 * 1024 * 1024
-"""Largest message of the scene [bytes]: meshes are large."""
+"""Maximum size of a message of the scene, which may contain a mesh [bytes]."""
 
 Connection = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 
-class Tunnel:
-    """Keeps shapes and poses until the scene exists, and forwards requests to the scene.
+class SceneProxy:
+    """Stores shapes and poses until the scene exists, and forwards requests to the server of the scene.
 
     Args:
-        path: Unix socket of the scene.
+        path: Unix socket of the server of the scene.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._shapes: asyncio.Future[Sequence[Shape]] = asyncio.get_running_loop().create_future()
-        self._bodies: Mapping[str, Sequence[float]] = {}
+        self._body_poses: Mapping[str, Sequence[float]] = {}
         self._scene: LiveScene | None = None
-        self._building = asyncio.Lock()
+        self._start_lock = asyncio.Lock()
 
-    def show(self, shapes: Sequence[Shape]) -> None:
-        """Set the shapes of the scene, which can start afterwards."""
+    def set_shapes(self, shapes: Sequence[Shape]) -> None:
+        """Set the shapes of the scene, without which the server of the scene does not start."""
         self._shapes.set_result(shapes)
 
-    def move(self, bodies: Mapping[str, Sequence[float]]) -> None:
-        """Set the poses of bodies: position [m] and quaternion (w, x, y, z)."""
-        self._bodies = bodies
+    def set_body_poses(self, poses: Mapping[str, Sequence[float]]) -> None:
+        """Set the poses of bodies by name: position [m] and quaternion (w, x, y, z)."""
+        self._body_poses = poses
         if self._scene is not None:
-            self._scene.move(bodies)
+            self._scene.set_body_poses(poses)
 
-    async def page(self, request: web.Request) -> web.Response:
-        """Forward the request of a file to the scene."""
-        async with await self.session() as session:
+    async def forward_file(self, request: web.Request) -> web.Response:
+        """Forward the request for a file to the server of the scene, and return the response."""
+        async with await self.open_session() as session:
             answer = await session.get(f"http://scene/{request.match_info['file']}")
             return web.Response(
                 status=answer.status,
                 body=await answer.read(),
                 content_type=answer.content_type,
-                headers={"Content-Security-Policy": POLICY},
+                headers={"Content-Security-Policy": CONTENT_POLICY},
             )
 
-    async def socket(self, request: web.Request) -> web.WebSocketResponse:
-        """Forward messages in both directions until one connection ends."""
+    async def forward_messages(self, request: web.Request) -> web.WebSocketResponse:
+        """Forward WebSocket messages between browser and scene until one of the two connections ends."""
         header = request.headers.get("Sec-WebSocket-Protocol", "")
-        protocols = [word.strip() for word in header.split(",") if word.strip()]
+        protocols = [name.strip() for name in header.split(",") if name.strip()]
         browser = web.WebSocketResponse(protocols=protocols, max_msg_size=MAX_MESSAGE_SIZE)
         await browser.prepare(request)
         async with (
-            await self.session() as session,
+            await self.open_session() as session,
             session.ws_connect("http://scene/", protocols=protocols, max_msg_size=MAX_MESSAGE_SIZE) as scene,
         ):
             tasks = [
@@ -81,14 +81,14 @@ class Tunnel:
         await browser.close()
         return browser
 
-    async def session(self) -> aiohttp.ClientSession:
-        """Return a session with the scene's server; wait for the shapes, and start the server once."""
+    async def open_session(self) -> aiohttp.ClientSession:
+        """Return a session with the server of the scene; the first call starts it, once shapes are set."""
         shapes = await asyncio.shield(self._shapes)
-        async with self._building:
+        async with self._start_lock:
             if self._scene is None:
                 # The start takes 1.5 s (imports and meshes); in a thread it does not block other requests.
                 self._scene = await asyncio.to_thread(_make_scene, self._path, shapes)
-                self._scene.move(self._bodies)
+                self._scene.set_body_poses(self._body_poses)
         return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(self._path)))
 
 

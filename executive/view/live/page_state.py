@@ -1,0 +1,105 @@
+"""State of the live page, and the changes since the last message to the browsers."""
+
+from __future__ import annotations
+
+import base64
+from collections import Counter
+from dataclasses import asdict
+from typing import cast
+
+import numpy as np
+
+from executive import events
+from executive.cell.frame import Frame
+from executive.record.timeline.timeline import Timeline
+from executive.view.live.messages import CameraImage, Message, PageChange
+
+QUALITY = 80
+"""JPEG quality of the camera image, 0 to 100."""
+OCCLUSION_DARKENING = 0.45
+"""Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
+
+Json = dict[str, object]
+"""JSON object for `page.js`: nodes by path, items by name, and one key for each other part of the page."""
+
+
+class PageState:
+    """State of the live page, updated by the messages of a run.
+
+    Attributes:
+        values: All values that the page shows, as JSON.
+    """
+
+    def __init__(self) -> None:
+        self.values: Json = {"paused": False, "has_ended": False, "nodes": {}, "items": {}}
+        self._changes: Json = {}
+        self._timeline = Timeline(keeps_history=False)
+
+    def apply(self, message: Message) -> None:
+        """Update the state by a message of the run."""
+        match message:
+            case events.TimedEvent():
+                self._timeline(message)
+                self._set_values(clock=message.clock)
+                self._apply_event(message.event)
+            case CameraImage():
+                self._set_values(look=_encode_look(message.frame, message.look))
+            case PageChange():
+                values = asdict(message)
+                self._set_values(**{name: values[name] for name in values if values[name] is not None})
+
+    def take_changes(self) -> Json:
+        """Return the values that changed since the last call; empty if there are none."""
+        changes, self._changes = self._changes, {}
+        return changes
+
+    def _apply_event(self, event: events.Event) -> None:
+        match event:
+            case events.NodeStarted(node) | events.NodeEnded(node):
+                self._set_entry("nodes", node, self._describe_node(node))
+            case events.ItemChanged():
+                self._set_entry("items", event.item, vars(event))
+            case events.TargetSelected():
+                self._set_values(decision=vars(event))
+            case events.RunStarted():
+                self._set_values(run={"mission": event.mission, "seed": event.seed})
+            case events.OperatorAsked():
+                self._set_values(choices=event.choices)
+            case events.RequestGiven():
+                self._set_values(choices=None)
+            case events.RunEnded():
+                self._set_values(choices=None, has_ended=True)
+
+    def _describe_node(self, path: str) -> Json:
+        last, counts = self._timeline.nodes[path], self._timeline.end_counts.get(path, Counter())
+        statuses = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
+        return {
+            **{name: counts[status] for name, status in statuses.items()},
+            "status": last.status.lower(), "failure": last.failure, "item": last.item,
+        }  # fmt: skip
+
+    def _set_values(self, **values: object) -> None:
+        self.values |= values
+        self._changes |= values
+
+    def _set_entry(self, key: str, name: str, value: Json) -> None:
+        for values in (self.values, self._changes):
+            entries = cast("Json", values.setdefault(key, {}))
+            entries[name] = value
+
+
+def _encode_look(frame: Frame, look: events.FrameSearched) -> Json:
+    """Return the detections in a frame and its image as JPEG, darkened where the arm occludes the scene."""
+    import cv2
+
+    image = cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR)
+    if frame.visible is not None:
+        occluded = ~frame.visible
+        image[occluded] = (image[occluded] * (1 - OCCLUSION_DARKENING)).astype(np.uint8)
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    height, width = frame.image.shape[:2]
+    return {
+        "source": "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode(),
+        "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
+        "detector": look.detector, "stamp": frame.stamp, "found": [vars(one) for one in look.found],
+    }  # fmt: skip
