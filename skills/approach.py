@@ -14,8 +14,8 @@ from executive.manipulation.tool_goals import (
     OVERTRAVEL,
     PROBE_CLEARANCE,
     SPIRAL_SPACING,
-    approach,
-    lowest_contact,
+    compute_lowest_contact,
+    make_approach,
 )
 from executive.perception.evidence import describe_wrong_height, may_miss_top
 from executive.skill import EMPTY, In, Metres, Skill, param, port
@@ -62,7 +62,7 @@ class Approach(Skill):
             raise self.failure("stale", f"{seen}, and the robot may have moved it since; look again")
 
         def find_goal() -> tuple[Goal, Task]:
-            return approach(cell, self.target, self.overtravel, self.offset)
+            return make_approach(cell, self.target, self.overtravel, self.offset)
 
         motion = yield from plan(self, cell.arm, find_goal)
         goal, _ = find_goal()
@@ -79,7 +79,7 @@ class Approach(Skill):
             met = f"the tool met something at {height * 1000:.0f} mm"
             raise self.failure("blocked", f"{met}, on its way to {item}, which was {expected}")
         contradiction = describe_wrong_height(self.target.label, height, cell.classes)
-        is_near_top = height >= lowest_contact(kind, middle, self.overtravel)
+        is_near_top = height >= compute_lowest_contact(kind, middle, self.overtravel)
         missed_top = is_near_top and may_miss_top(self.target.label, height, cell.classes)
         if not cell.ledger.record_touch(item, contradiction, may_miss_top=missed_top):
             raise self.failure("contradicted", f"{item} may be no {self.target.label}: {contradiction}")

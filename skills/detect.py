@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from executive.cell.detection import Detections
 from executive.cell.protocols import Cell, MinTimes, Steps
 from executive.errors import Crowded, Unavailable
-from executive.manipulation.obstacles import shows_bin_content
+from executive.manipulation.obstacles import is_detection_in_bin
 from executive.skill import Out, Skill, param, port
 
 
@@ -60,7 +60,7 @@ class Detect(Skill):
             raise self.failure("crowded", str(error)) from error
         except Unavailable as error:
             raise self.failure("unavailable", str(error)) from error
-        on_table = (box for box in answer.doubtful if not shows_bin_content(cell, box, frame))
+        on_table = (box for box in answer.doubtful if not is_detection_in_bin(cell, box, frame))
         if not answer.found and self.doubtful == "fail" and (best := next(on_table, None)):
             raise self.failure("unsure", answer.describe_doubt(best))
         self.detections = Detections(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.motions import follow, plan, task_of_moving, wait_for_rest
+from executive.manipulation.motions import follow, make_task, plan, wait_for_rest
 from executive.skill import Skill, param
 
 
@@ -33,7 +33,7 @@ class MoveToScan(Skill):
         if self.pose == "auto" and cell.camera.sees_table():
             return
         name = self._name(cell)
-        motion = yield from plan(self, cell.arm, lambda: (name, task_of_moving(cell)))
+        motion = yield from plan(self, cell.arm, lambda: (name, make_task(cell)))
         yield from follow(self, cell, motion)
 
     def _name(self, cell: Cell) -> str:

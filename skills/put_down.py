@@ -8,8 +8,8 @@ import numpy as np
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.motions import carry, let_go
-from executive.manipulation.tool_goals import goal_aside
+from executive.manipulation.motions import release_item, transport
+from executive.manipulation.tool_goals import make_put_down_goal
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, SkillFailed, param, port
 
 MIN_LIFT_HEIGHT = 0.003
@@ -36,16 +36,16 @@ class PutDown(Skill):
     def run(self, cell: Cell) -> Steps:
         """Carry the item to the place, lower it, release it."""
         kind = cell.classes[cell.ledger.get_label(self.held)]
-        goal, height = goal_aside(cell, kind, self.drop, self.held), kind.height
+        goal, height = make_put_down_goal(cell, kind, self.drop, self.held), kind.height
         lying_height = float(cell.safe_place[2]) + height
         try:
-            yield from carry(self, cell, self.held, goal, "the safe place")
+            yield from transport(self, cell, self.held, goal, "the safe place")
         except SkillFailed as failure:
             # An item that was not lifted can stay at its position.
             if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > lying_height + MIN_LIFT_HEIGHT:
                 raise
         x, y, _ = cell.arm.tool_pose.position
         place = np.array((x, y, lying_height - height / 2))
-        yield from let_go(
+        yield from release_item(
             self, cell, self.held, self.settle, lambda: cell.ledger.record_put_down(self.held, place)
         )

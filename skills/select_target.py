@@ -7,7 +7,7 @@ from typing import ClassVar
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
 from executive.manipulation.obstacles import count_used_slots
-from executive.manipulation.tool_goals import nearest_first
+from executive.manipulation.tool_goals import sort_pickable_targets
 from executive.perception.evidence import describe_unknown
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 
@@ -34,7 +34,9 @@ class SelectTarget(Skill):
     def run(self, cell: Cell) -> None:
         """Take the first candidate in the preferred order."""
         candidates = [
-            target for target in nearest_first(cell, self.targets) if self._is_requested(cell, target.item)
+            target
+            for target in sort_pickable_targets(cell, self.targets)
+            if self._is_requested(cell, target.item)
         ]
         if not candidates:
             raise self._explain_none(cell)

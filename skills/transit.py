@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, MinTimes, Steps
-from executive.manipulation.motions import carry
-from executive.manipulation.tool_goals import DROP_HEIGHT, goal_in_bin
+from executive.manipulation.motions import transport
+from executive.manipulation.tool_goals import DROP_HEIGHT, make_bin_goal
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 
@@ -40,5 +40,5 @@ class Transit(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Plan the motion, then follow it while the seal holds."""
-        goal = goal_in_bin(cell, self.bin, self.held, self.drop)
-        yield from carry(self, cell, self.held, goal, self.bin)
+        goal = make_bin_goal(cell, self.bin, self.held, self.drop)
+        yield from transport(self, cell, self.held, goal, self.bin)

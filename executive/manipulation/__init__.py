@@ -1,1 +1,1 @@
-"""Functions that skills share: tool goals, motions, obstacles, drops."""
+"""Functions that several skills use: tool goals, motions, obstacles, and detection of drops."""

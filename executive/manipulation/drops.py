@@ -1,4 +1,4 @@
-"""Detection of items that the tool loses during a motion, and prediction of their landing."""
+"""Detection of items that the tool loses during a motion, and prediction of their landing position."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from executive.cell.protocols import Cell
 from executive.geometry import GRAVITY, Array
 
 MAX_PREDICTABLE_SPEED = 0.2
-"""Tool speed up to which the landing of a lost item can be predicted [m/s]; a faster item rolls."""
+"""Maximum tool speed at which the landing position of a lost item is predictable [m/s]; faster items roll."""
 
 
-def record_drop(cell: Cell, item: Item) -> bool:
-    """Return True if the tool has lost the carried item, and record the drop; called in every control step.
+def detect_and_record_drop(cell: Cell, item: Item) -> bool:
+    """Return True if the tool has lost the item; the first call after the loss records the drop.
 
-    The drop is recorded at once, because a look while the arm brakes may already show the item elsewhere.
+    A skill calls the function in every control step of a transport, because an image that is captured while
+    the arm brakes may already show the item at its new position.
     """
     if cell.tool.holding:
         return False
@@ -31,14 +32,14 @@ def record_drop(cell: Cell, item: Item) -> bool:
 
 
 def predict_landing(position: Array, velocity: Array, height: float) -> Array:
-    """Return the centre `(3,)` [m] of a lost object on the table after its ballistic flight, without rolling.
+    """Return the centre `(3,)` [m] at which a lost object lies after a ballistic fall, if it does not roll.
 
     Args:
         position: Position of the tool centre point at the loss `(3,)` [m].
         velocity: Velocity of the tool at the loss `(3,)` [m/s].
         height: Height of the object [m].
     """
-    up = float(velocity[2])
-    fall_time = (up + math.sqrt(up**2 + 2 * GRAVITY * max(float(position[2]) - height, 0.0))) / GRAVITY
+    vertical_speed, fall_height = float(velocity[2]), max(float(position[2]) - height, 0.0)
+    fall_time = (vertical_speed + math.sqrt(vertical_speed**2 + 2 * GRAVITY * fall_height)) / GRAVITY
     x, y = (position + velocity * fall_time)[:2]
     return np.array((x, y, height / 2))

@@ -1,4 +1,4 @@
-"""Motions of the arm for skills: plan, follow, carry an item, release an item."""
+"""Motions of the arm for skills: planning, execution, transport of an item, release of an item."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from executive.cell.arm import Arm, Goal, Motion, Task
 from executive.cell.objects import Item, Load
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Unreachable
-from executive.manipulation.drops import record_drop
+from executive.manipulation.drops import detect_and_record_drop
 from executive.manipulation.obstacles import list_obstacles
 from executive.skill import Skill, SkillFailed
 
 MAX_PLANS = 3
-"""Largest number of times that a motion is planned, if the obstacles change during the planning."""
+"""Maximum number of plans for one motion whose obstacles change while the motion is planned."""
 
 
 def wait_for_rest(arm: Arm) -> Steps:
@@ -27,8 +27,8 @@ def plan(
 ) -> Generator[None, None, Motion]:
     """Yield until the arm is at rest and a motion is planned, and return the motion.
 
-    `find_goal` returns the goal or the name of a pose, and the task. If it returns others after the planning,
-    because of a new look, the motion is planned again.
+    `find_goal` returns a goal or the name of a pose, and the task. If the values have changed at the end of
+    the planning, because a detector has updated the ledger, the motion is planned again.
 
     Raises:
         SkillFailed: No motion was found; the reason is `unreachable` or `blocked`.
@@ -52,11 +52,10 @@ def plan(
 def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
     """Yield while the arm follows `motion`, until the arm is at rest again.
 
-    The arm brakes along its path as soon as `until` returns True, after a collision, and if the skill is
-    halted.
+    The arm brakes along its path when `until` returns True, after a collision, and if the skill is halted.
 
     Raises:
-        SkillFailed: The arm collided with something; the reason is `blocked`.
+        SkillFailed: The arm collided with an obstacle; the reason is `blocked`.
     """
     arm = cell.arm
     arm.start(motion)
@@ -71,29 +70,29 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
         raise skill.failure("blocked", arm.collision)
 
 
-def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str) -> Steps:
-    """Yield until `item` has been carried to `goal`; the sensor of the tool is read in every control step.
+def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str) -> Steps:
+    """Yield until the arm has moved `item` to `goal`; the vacuum sensor is read in every control step.
 
     Args:
-        skill: The skill that carries the item.
+        skill: The skill that moves the item.
         cell: The work cell.
         item: Item in the tool.
         goal: Goal of the motion.
         destination: Name of the goal in error messages.
 
     Raises:
-        SkillFailed: No motion was found, or the arm collided, and the tool still holds the item: the reason
-            is `unreachable` or `blocked`. Or the seal broke: then the arm is at rest, the tool is open, the
-            ledger has recorded the drop, and the reason is `dropped`.
+        SkillFailed: The reason is `unreachable` or `blocked` if no motion was found or the arm collided, and
+            the tool still holds the item. The reason is `dropped` if the seal broke; then the arm is at rest,
+            the tool is open, and the ledger has recorded the drop.
     """
     try:
-        motion = yield from plan(skill, cell.arm, lambda: (goal, task_of_carrying(cell, item)))
-        yield from follow(skill, cell, motion, until=lambda: record_drop(cell, item))
+        motion = yield from plan(skill, cell.arm, lambda: (goal, make_transport_task(cell, item)))
+        yield from follow(skill, cell, motion, until=lambda: detect_and_record_drop(cell, item))
     except SkillFailed:
-        # A lost item outranks the other failure: without the item, a put-down is impossible.
-        if not record_drop(cell, item):
+        # The reason `dropped` replaces another reason, because a put-down is impossible without the item.
+        if not detect_and_record_drop(cell, item):
             raise
-    if record_drop(cell, item):
+    if detect_and_record_drop(cell, item):
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
         raise skill.failure(
@@ -102,32 +101,34 @@ def carry(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str) ->
         )
 
 
-def let_go(skill: Skill, cell: Cell, item: Item, wait: float, record: Callable[[], None]) -> Steps:
-    """Switch the vacuum off and yield for `wait` [s]; afterwards the sensor must report an empty tool.
+def release_item(
+    skill: Skill, cell: Cell, item: Item, settle_time: float, record_release: Callable[[], None]
+) -> Steps:
+    """Switch the vacuum off and yield for `settle_time` [s]; then the tool must be empty.
 
-    `record` records the new place of the item in the ledger; it is called if the tool is empty, even if the
-    skill is halted during the wait.
+    `record_release` records the new position of the item in the ledger. The function is called if the tool is
+    empty, even if the skill is halted during the wait.
 
     Raises:
         SkillFailed: The item still hangs on the tool; the reason is `stuck`.
     """
     cell.tool.open()
     try:
-        yield from cell.clock.sleep(wait)
+        yield from cell.clock.sleep(settle_time)
     finally:
         if not cell.tool.holding:
-            record()
+            record_release()
     if cell.tool.holding:
-        raise skill.failure("stuck", f"{item} hangs on the tool {wait:.2f} s after release")
+        raise skill.failure("stuck", f"{item} hangs on the tool {settle_time:.2f} s after release")
 
 
-def task_of_moving(cell: Cell) -> Task:
-    """Return the task of a motion with the present content of the tool."""
+def make_task(cell: Cell) -> Task:
+    """Return load and obstacles of a motion with the present content of the tool."""
     held = cell.ledger.find_held_item()
-    return Task(around=list_obstacles(cell)) if held is None else task_of_carrying(cell, held)
+    return Task(around=list_obstacles(cell)) if held is None else make_transport_task(cell, held)
 
 
-def task_of_carrying(cell: Cell, item: Item) -> Task:
-    """Return the task of a motion with `item` in the tool."""
+def make_transport_task(cell: Cell, item: Item) -> Task:
+    """Return load and obstacles of a motion with `item` in the tool."""
     kind = cell.classes[cell.ledger.get_label(item)]
     return Task(Load(kind, cell.tool.holding_force), list_obstacles(cell, item))

@@ -12,17 +12,17 @@ from executive.cell.protocols import Cell
 from executive.errors import NoDepth
 
 MAX_ROLL_DISTANCE = 0.002
-"""Largest distance of an object in a bin from the place of its release [m]."""
+"""Maximum distance of an object in a bin from the position of its release [m]."""
 
 
 def list_obstacles(cell: Cell, excluded: Item | None = None) -> tuple[Obstacle, ...]:
     """Return the objects on the table and in the bins as obstacles, without the item `excluded`."""
-    targets = [one for one in cell.ledger.find_objects_on_table() if one.item != excluded]
+    targets = [target for target in cell.ledger.find_objects_on_table() if target.item != excluded]
     return (*(make_obstacle(cell, target) for target in targets), *_list_bin_contents(cell, excluded))
 
 
-def shows_bin_content(cell: Cell, detection: Detection, frame: Frame) -> bool:
-    """Return True if a detection is at a position inside a bin or its walls."""
+def is_detection_in_bin(cell: Cell, detection: Detection, frame: Frame) -> bool:
+    """Return True if a detected object lies inside a bin or over its walls; False without a depth value."""
     try:
         position = cell.localizer.locate(detection, frame)
     except NoDepth:
@@ -31,9 +31,9 @@ def shows_bin_content(cell: Cell, detection: Detection, frame: Frame) -> bool:
 
 
 def count_used_slots(cell: Cell, bin: str, excluded: Item | None = None) -> int:
-    """Return the number of objects in `bin` without the item `excluded`: the index of the next free slot.
+    """Return the number of objects in `bin` without the item `excluded`, which is the index of the next slot.
 
-    An item that is being carried into the bin counts, so that a plan stays valid after its release.
+    An item that the arm is moving into the bin counts, so that a plan remains valid after its release.
     """
     held = cell.ledger.find_held_item()
     is_arriving = held not in (None, excluded) and cell.bins[bin].contains(cell.arm.destination)
@@ -41,28 +41,28 @@ def count_used_slots(cell: Cell, bin: str, excluded: Item | None = None) -> int:
 
 
 def make_obstacle(cell: Cell, target: Target) -> Obstacle:
-    """Return a target as an obstacle."""
-    x, y, middle = (float(value) for value in target.position)
+    """Return the obstacle that a target is for the arm."""
+    x, y, z = (float(value) for value in target.position)
     kind = cell.classes[target.label]
-    return Obstacle(x, y, kind.radius, middle + kind.height / 2, target.item)
+    return Obstacle(x, y, kind.radius, z + kind.height / 2, target.item)
 
 
-def max_object_height(cell: Cell) -> float:
+def find_max_object_height(cell: Cell) -> float:
     """Return the height of the tallest class of objects [m]."""
     return max(kind.height for kind in cell.classes.values())
 
 
-def layer_height(bin: Bin, layer: int, max_object_height: float) -> float:
-    """Return the largest height of the underside of a layer in a bin [m]; layer 0 lies on the floor."""
+def compute_layer_height(bin: Bin, layer: int, max_object_height: float) -> float:
+    """Return the maximum height of the underside of a layer of objects in a bin [m]; layer 0 is lowest."""
     return float(bin.position[2]) + BIN_THICKNESS + layer * max_object_height
 
 
 def _list_bin_contents(cell: Cell, excluded: Item | None) -> Iterator[Obstacle]:
     """Yield an obstacle for each used slot of a bin, without the item `excluded`."""
-    max_radius, max_height = max(kind.radius for kind in cell.classes.values()), max_object_height(cell)
+    max_radius, max_height = max(kind.radius for kind in cell.classes.values()), find_max_object_height(cell)
     for name, bin in cell.bins.items():
         count, slots = count_used_slots(cell, name, excluded), len(bin.slots)
-        for number, (x, y) in enumerate(bin.slots[:count]):
-            top = layer_height(bin, (count - 1 - number) // slots + 1, max_height)
-            label = f"what lies in slot {number + 1} of {name}"
-            yield Obstacle(float(x), float(y), max_radius + MAX_ROLL_DISTANCE, top, label)
+        for index, (x, y) in enumerate(bin.slots[:count]):
+            top = compute_layer_height(bin, (count - 1 - index) // slots + 1, max_height)
+            text = f"the objects in slot {index + 1} of {name}"
+            yield Obstacle(float(x), float(y), max_radius + MAX_ROLL_DISTANCE, top, text)

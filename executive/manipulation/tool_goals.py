@@ -1,4 +1,4 @@
-"""Goals of the tool: on an object, over a slot of a bin, over a free place on the table."""
+"""Goals of the tool: on an object, over a slot of a bin, and over a free position on the table."""
 
 from __future__ import annotations
 
@@ -14,49 +14,49 @@ from executive.cell.objects import Item, ObjectClass, Target
 from executive.cell.protocols import Cell
 from executive.geometry import Array
 from executive.manipulation.obstacles import (
+    compute_layer_height,
     count_used_slots,
-    layer_height,
+    find_max_object_height,
     list_obstacles,
     make_obstacle,
-    max_object_height,
 )
 
 DROP_HEIGHT = 0.01
-"""Default height of an item's underside above the floor of a bin, or the layer of objects there, at its
-release [m]."""
+"""Default height, at the release in a bin, of an item's underside above the floor or the next lower layer of
+objects [m]."""
 OVERTRAVEL = 0.015
 """Default depth below the expected surface down to which an approach searches for contact [m]."""
 PROBE_CLEARANCE = 0.005
-"""Height above the table down to which later attempts search for contact [m]."""
+"""Height above the table at which an approach ends after `ATTEMPTS_BEFORE_PROBE` failed attempts [m]."""
 ATTEMPTS_BEFORE_PROBE = 3
 """Number of failed attempts after which an approach descends almost to the table."""
 SPIRAL_SPACING = 0.0025
-"""Default spacing of the spiral of contact points of further attempts [m]."""
+"""Default distance between the contact points of successive attempts, which form a spiral [m]."""
 MIN_GAP = 0.02
-"""Smallest distance between the outlines of an object that is put down and of its neighbours [m]."""
-PLACES_PER_SIDE = 2
-"""Number of candidate places on each side of the safe place for a put-down."""
+"""Minimum distance between the outlines of an object that is put down and of its neighbours [m]."""
+POSITIONS_PER_SIDE = 2
+"""Number of candidate positions for a put-down on each side of the safe place."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
 
 
-def approach(
+def make_approach(
     cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = SPIRAL_SPACING
 ) -> tuple[Goal, Task]:
     """Return goal and task of an approach to a point below the surface of `target`.
 
-    The last part of the motion is guarded: the arm stops on contact. Each further attempt is offset from the
-    previous one. From the fourth attempt on, the motion ends almost at the table: without a contact, the item
-    is a false detection.
+    The last part of the motion is guarded: the arm stops on contact. Each attempt has another horizontal
+    offset. From the fourth attempt on, the motion ends almost at the table, because the item may be a false
+    detection.
 
     Args:
         cell: The work cell.
         target: Target to touch.
         overtravel: Depth below the expected surface down to which the first attempts search for contact [m];
-            limited to half of the height.
-        spacing: Spacing of the spiral of further attempts [m].
+            at most half of the object's height is used.
+        spacing: Distance between the contact points of successive attempts [m].
     """
-    goal = goal_on_object(
+    goal = make_object_goal(
         cell.classes[target.label],
         target.position,
         cell.descent,
@@ -68,7 +68,7 @@ def approach(
     return goal, Task(around=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
 
 
-def goal_on_object(
+def make_object_goal(
     kind: ObjectClass,
     position: Array,
     descent: float,
@@ -86,37 +86,37 @@ def goal_on_object(
         descent: Length of the guarded part above the expected surface [m].
         descent_speed: Tool speed of the guarded part [m/s].
         attempt: Number of failed attempts before this one.
-        overtravel: See `approach`.
-        spacing: See `approach`.
+        overtravel: Depth below the expected surface down to which the first attempts search for contact [m].
+        spacing: Distance between the contact points of successive attempts [m].
     """
-    x, y, middle = (float(value) for value in position)
-    dx, dy = _attempt_offset(attempt, kind.ring, spacing)
-    surface = middle + kind.height / 2
-    lowest = lowest_contact(kind, middle, overtravel)
+    x, y, z = (float(value) for value in position)
+    dx, dy = _compute_attempt_offset(attempt, kind.ring, spacing)
+    surface = z + kind.height / 2
+    lowest = compute_lowest_contact(kind, z, overtravel)
     if attempt >= ATTEMPTS_BEFORE_PROBE:
-        lowest = min(lowest, middle - kind.height / 2 + PROBE_CLEARANCE)
+        lowest = min(lowest, z - kind.height / 2 + PROBE_CLEARANCE)
     return Goal((x + dx, y + dy, lowest), guarded=surface + descent - lowest, speed=descent_speed)
 
 
-def lowest_contact(kind: ObjectClass, middle: float, overtravel: float) -> float:
-    """Return the lowest height of a contact that may be the top of an object [m].
+def compute_lowest_contact(kind: ObjectClass, centre_height: float, overtravel: float) -> float:
+    """Return the smallest height at which a contact may be with the top of an object [m].
 
     Args:
         kind: Class of the object.
-        middle: Height of its centre [m].
-        overtravel: See `approach`.
+        centre_height: Height of the centre of the object [m].
+        overtravel: Maximum depth of the contact below the expected surface [m].
     """
-    return max(middle + kind.height / 2 - overtravel, middle)
+    return max(centre_height + kind.height / 2 - overtravel, centre_height)
 
 
-def nearest_first(cell: Cell, targets: Sequence[Target]) -> list[Target]:
+def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     """Return the targets that can be picked, in the order of their distance from the arm's destination.
 
-    A target can be picked if its item is open and certain, its class has a route, and nothing may have moved
-    the item since its last detection.
+    A target can be picked if its item is unsorted and certain, cannot have moved since its last detection,
+    and has a class with a route.
     """
-    ledger, here = cell.ledger, cell.arm.destination[:2]
-    possible = [
+    ledger, arm_position = cell.ledger, cell.arm.destination[:2]
+    pickable = [
         target
         for target in targets
         if ledger.is_open(target.item)
@@ -124,65 +124,65 @@ def nearest_first(cell: Cell, targets: Sequence[Target]) -> list[Target]:
         and ledger.is_certain(target.item)
         and ledger.get_label(target.item) in cell.routes
     ]
-    return sorted(possible, key=lambda t: (float(np.linalg.norm(t.position[:2] - here)), t.item))
+    return sorted(pickable, key=lambda t: (float(np.linalg.norm(t.position[:2] - arm_position)), t.item))
 
 
-def goal_in_bin(cell: Cell, bin: str, item: Item, drop: float = DROP_HEIGHT) -> Goal:
-    """Return the goal of a transit: `drop` [m] above the next free slot of a bin, or the layer there."""
+def make_bin_goal(cell: Cell, bin: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
+    """Return the goal of a transit: the item is `drop_height` [m] above the next free slot of a bin."""
     height = cell.classes[cell.ledger.get_label(item)].height
-    return goal_over_slot(
-        cell.bins[bin], count_used_slots(cell, bin, item), height, max_object_height(cell), drop
+    return make_slot_goal(
+        cell.bins[bin], count_used_slots(cell, bin, item), height, find_max_object_height(cell), drop_height
     )
 
 
-def goal_over_slot(
-    bin: Bin, number: int, height: float, max_object_height: float, drop: float = DROP_HEIGHT
+def make_slot_goal(
+    bin: Bin, count: int, height: float, max_object_height: float, drop_height: float = DROP_HEIGHT
 ) -> Goal:
-    """Return the goal of a transit over a slot of a bin.
+    """Return the goal of a transit over the next free slot of a bin.
 
     Args:
         bin: The bin.
-        number: Number of objects in the bin before; with every slot used, the next layer begins.
-        height: Height of the carried object [m].
-        max_object_height: Height of the tallest objects that may lie in a layer below [m].
-        drop: Height of the underside of the carried object above that layer, or the floor [m].
+        count: Number of objects in the bin; a new layer begins if all slots are used.
+        height: Height of the object in the tool [m].
+        max_object_height: Height of the tallest objects that may lie in a lower layer [m].
+        drop_height: Height of the underside of the object above the lower layer or the floor [m].
     """
-    layer, slot = divmod(number, len(bin.slots))
+    layer, slot = divmod(count, len(bin.slots))
     x, y = (float(value) for value in bin.slots[slot])
-    return Goal((x, y, layer_height(bin, layer, max_object_height) + height + drop))
+    return Goal((x, y, compute_layer_height(bin, layer, max_object_height) + height + drop_height))
 
 
-def goal_aside(cell: Cell, kind: ObjectClass, drop: float, item: Item | None = None) -> Goal:
-    """Return the goal of a put-down: `drop` [m] above the free place nearest to the safe place.
+def make_put_down_goal(cell: Cell, kind: ObjectClass, drop_height: float, item: Item | None = None) -> Goal:
+    """Return the goal of a put-down: `drop_height` [m] above the free position nearest to the safe place.
 
-    A place is free if neither an obstacle nor a bin is there. If no candidate is free, the goal is the safe
-    place. The obstacles do not include `item`.
+    A position is free if it is neither in an obstacle (except `item`) nor in a bin. If no candidate is free,
+    the goal is over the safe place.
     """
     pitch = 2 * kind.radius + MIN_GAP
     x, y, floor = (float(value) for value in cell.safe_place)
-    offsets = [step * pitch for step in range(-PLACES_PER_SIDE, PLACES_PER_SIDE + 1)]
+    offsets = [step * pitch for step in range(-POSITIONS_PER_SIDE, POSITIONS_PER_SIDE + 1)]
     nearest = sorted(product(offsets, offsets), key=lambda offset: math.hypot(*offset))
-    places = [(x + dx, y + dy) for dx, dy in nearest]
+    candidates = [(x + dx, y + dy) for dx, dy in nearest]
     radius = kind.radius + MIN_GAP
-    place = next((place for place in places if _is_free(cell, np.array(place), radius, item)), (x, y))
-    return Goal((*place, floor + kind.height + drop))
+    free = (candidate for candidate in candidates if _is_free(cell, np.array(candidate), radius, item))
+    return Goal((*next(free, (x, y)), floor + kind.height + drop_height))
 
 
-def _is_free(cell: Cell, place: Array, radius: float, excluded: Item | None) -> bool:
-    """Return True if nothing but `excluded` is within `radius` [m] of a place `(2,)` [m] on the table."""
-    if any(bin.contains(place, radius + BIN_THICKNESS) for bin in cell.bins.values()):
+def _is_free(cell: Cell, position: Array, radius: float, excluded: Item | None) -> bool:
+    """Return True if only `excluded` may be within `radius` [m] of a position `(2,)` [m] on the table."""
+    if any(bin.contains(position, radius + BIN_THICKNESS) for bin in cell.bins.values()):
         return False
     return all(
-        math.dist(place, (obstacle.x, obstacle.y)) > radius + obstacle.radius
+        math.dist(position, (obstacle.x, obstacle.y)) > radius + obstacle.radius
         for obstacle in list_obstacles(cell, excluded)
     )
 
 
-def _attempt_offset(attempt: int, ring: float, spacing: float) -> tuple[float, float]:
-    """Return the horizontal offset (x, y) [m] of an attempt: a point of the ring, or of a Vogel spiral.
+def _compute_attempt_offset(attempt: int, ring: float, spacing: float) -> tuple[float, float]:
+    """Return the horizontal offset (x, y) [m] of an attempt: a point on a circle, or on a Vogel spiral.
 
-    The orientation of a part is unknown, and each point of its ring is equally suitable. The spiral begins
-    at the centre.
+    If `ring` [m] is not 0, it is the radius of the circle: the orientation of the part is unknown, and all
+    points of the circle are equally suitable. The spiral begins at the centre of the object.
     """
     angle = attempt * GOLDEN_ANGLE
     distance = ring or spacing * math.sqrt(attempt)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell
 from executive.events import FrameSearched, MotionPlanned, TargetSelected, TimedEvent, ToolCommanded
-from executive.manipulation.motions import task_of_carrying
-from executive.manipulation.tool_goals import approach, goal_in_bin, nearest_first
+from executive.manipulation.motions import make_transport_task
+from executive.manipulation.tool_goals import make_approach, make_bin_goal, sort_pickable_targets
 
 
 class LookaheadPlanner:
@@ -48,11 +48,11 @@ class LookaheadPlanner:
         if self._is_closing and self._delivery and cell.ledger.find_held_item() is None and cell.tool.holding:
             self._is_closing = False
             item, bin = self._delivery
-            cell.arm.plan_ahead(goal_in_bin(cell, bin, item), task_of_carrying(cell, item))
+            cell.arm.plan_ahead(make_bin_goal(cell, bin, item), make_transport_task(cell, item))
         elif self._is_approach_outdated and self._is_transporting():
             self._is_approach_outdated = False
-            for target in nearest_first(cell, cell.ledger.find_targets())[:1]:
-                cell.arm.plan_ahead(*approach(cell, target))
+            for target in sort_pickable_targets(cell, cell.ledger.find_targets())[:1]:
+                cell.arm.plan_ahead(*make_approach(cell, target))
 
     def _is_transporting(self) -> bool:
         """Return True if the arm transports an item to a bin."""

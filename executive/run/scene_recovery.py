@@ -14,7 +14,7 @@ from executive.cell.objects import Load
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Fault, NoDepth, Unavailable, Unreachable
 from executive.manipulation.obstacles import list_obstacles
-from executive.manipulation.tool_goals import DROP_HEIGHT, goal_aside
+from executive.manipulation.tool_goals import DROP_HEIGHT, make_put_down_goal
 
 LOOKS_PER_POSE = 3
 """Number of looks from each camera pose; a look is one image with its detections."""
@@ -57,7 +57,7 @@ def recover_scene(cell: Cell) -> Steps:
 def _put_down(cell: Cell) -> Steps:
     """Transport the object in the tool, whose class is unknown, to a free position on the table."""
     tallest = max(cell.classes.values(), key=lambda each: each.height)
-    goal = goal_aside(cell, tallest, DROP_HEIGHT)
+    goal = make_put_down_goal(cell, tallest, DROP_HEIGHT)
     problems = []
     # With the tallest class as the load, the start may seem to be in collision: then plan without a load.
     for load in (Load(tallest, cell.tool.holding_force), None):

@@ -20,7 +20,7 @@ from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.cells.sim.world import World
 from executive.errors import InputError, Unreachable
 from executive.geometry import tool_down
-from executive.manipulation.tool_goals import goal_on_object, goal_over_slot
+from executive.manipulation.tool_goals import make_object_goal, make_slot_goal
 from executive.motion.arms import build_planner
 from executive.motion.planner import Planner
 
@@ -130,9 +130,9 @@ class SceneGenerator:
         kind = self._kind(first)
         target, *others = (self._make_obstacle(body, number) for number, body in enumerate(bodies, start=1))
         centre = np.array([target.x, target.y, target.top - kind.height / 2])
-        approach = goal_on_object(kind, centre, motion.descent, motion.descent_speed)
+        approach = make_object_goal(kind, centre, motion.descent, motion.descent_speed)
         surface, force = self._measure_seal(first, approach.position[:2], target.top)
-        drop = goal_over_slot(bin, slot, kind.height, self._tallest)
+        drop = make_slot_goal(bin, slot, kind.height, self._tallest)
         return Scene(first, kind, surface + TOUCH_DISTANCE, force, target, tuple(others), approach, drop)
 
     def _make_obstacle(self, body: int, number: int) -> Obstacle:

@@ -8,7 +8,7 @@ from at_hand import look, pick
 
 from executive.cells.fake.cell import FakeCell
 from executive.geometry import GRAVITY
-from executive.manipulation.drops import MAX_PREDICTABLE_SPEED, predict_landing, record_drop
+from executive.manipulation.drops import MAX_PREDICTABLE_SPEED, detect_and_record_drop, predict_landing
 from executive.testing.run_skill import run_skill
 from skills.transit import Transit
 
@@ -48,10 +48,10 @@ def held(fake: FakeCell) -> str:
 
 
 def test_a_drop_is_recorded_once(fake: FakeCell, held: str) -> None:
-    assert not record_drop(fake.cell, held)
+    assert not detect_and_record_drop(fake.cell, held)
     fake.tool.break_seal()
-    assert record_drop(fake.cell, held)
-    assert record_drop(fake.cell, held)
+    assert detect_and_record_drop(fake.cell, held)
+    assert detect_and_record_drop(fake.cell, held)
     (row,) = fake.ledger.summaries()
     assert (row.state, row.attempts) == ("dropped", 1)
 
@@ -66,6 +66,6 @@ def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
     run_skill(Transit(held=held, bin="red_bin"), fake)
     monkeypatch.setattr(type(fake.arm), "tool_velocity", np.array((0.0, speed, 0.0)))
     fake.tool.break_seal()
-    assert record_drop(fake.cell, held)
+    assert detect_and_record_drop(fake.cell, held)
     fake.ledger.close(completed=True)
     assert [row.state for row in fake.ledger.summaries()] == [state]

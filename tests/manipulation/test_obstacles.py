@@ -9,9 +9,9 @@ from at_hand import look, pick
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
-from executive.manipulation.motions import task_of_carrying, task_of_moving
+from executive.manipulation.motions import make_task, make_transport_task
 from executive.manipulation.obstacles import count_used_slots, list_obstacles
-from executive.manipulation.tool_goals import approach, goal_in_bin
+from executive.manipulation.tool_goals import make_approach, make_bin_goal
 from executive.testing.run_skill import run_skill
 from skills.release import Release
 from skills.transit import Transit
@@ -25,7 +25,7 @@ def test_what_stands_on_the_table_is_in_the_way_but_for_what_is_to_be_touched(
     fake: FakeCell, targets: list[Target]
 ) -> None:
     assert names(fake) == ["cube-1", "duck-1"]
-    _, task = approach(fake.cell, targets[0])
+    _, task = make_approach(fake.cell, targets[0])
     (duck,) = task.around
     kind = fake.cell.classes["duck"]
     assert (duck.name, duck.radius) == ("duck-1", kind.radius)
@@ -33,11 +33,11 @@ def test_what_stands_on_the_table_is_in_the_way_but_for_what_is_to_be_touched(
 
 
 def test_what_is_to_be_touched_is_named_as_it_stands_there(fake: FakeCell, targets: list[Target]) -> None:
-    _, task = approach(fake.cell, targets[0])
+    _, task = make_approach(fake.cell, targets[0])
     assert task.target == next(thing for thing in list_obstacles(fake.cell) if thing.name == "cube-1")
-    assert task_of_moving(fake.cell).target is None
+    assert make_task(fake.cell).target is None
     pick(fake, targets[0])
-    assert task_of_carrying(fake.cell, "cube-1").target is None
+    assert make_transport_task(fake.cell, "cube-1").target is None
 
 
 def test_a_rejected_item_stands_there_still(fake: FakeCell, targets: list[Target]) -> None:
@@ -46,15 +46,15 @@ def test_a_rejected_item_stands_there_still(fake: FakeCell, targets: list[Target
 
 
 def test_what_is_carried_is_the_load_and_in_nobodys_way(fake: FakeCell, targets: list[Target]) -> None:
-    assert task_of_moving(fake.cell).load is None
+    assert make_task(fake.cell).load is None
     pick(fake, targets[0])
-    task = task_of_moving(fake.cell)
-    assert task == task_of_carrying(fake.cell, "cube-1")
+    task = make_task(fake.cell)
+    assert task == make_transport_task(fake.cell, "cube-1")
     assert task.load is not None
     assert (task.load.kind.label, task.load.holding_force) == ("cube", 7.9)
     assert [obstacle.name for obstacle in task.around] == ["duck-1"]
     fake.tool.breakaway_force = 3.0
-    assert task_of_moving(fake.cell).load.holding_force == 3.0  # type: ignore[union-attr]
+    assert make_task(fake.cell).load.holding_force == 3.0  # type: ignore[union-attr]
 
 
 def test_what_lies_in_a_bin_is_in_the_way_as_high_as_it_is_piled(fake: FakeCell) -> None:
@@ -82,8 +82,8 @@ def test_what_hangs_over_a_bin_counts_as_let_go_there_but_for_its_own_way(
     first, second = fake.cell.bins["red_bin"].slots[:2]
     assert (count_used_slots(fake.cell, "red_bin"), count_used_slots(fake.cell, "blue_bin")) == (1, 0)
     assert count_used_slots(fake.cell, "red_bin", "cube-1") == 0
-    assert np.allclose(goal_in_bin(fake.cell, "red_bin", "cube-1").position[:2], first)
-    assert np.allclose(goal_in_bin(fake.cell, "red_bin", "duck-1").position[:2], second)
+    assert np.allclose(make_bin_goal(fake.cell, "red_bin", "cube-1").position[:2], first)
+    assert np.allclose(make_bin_goal(fake.cell, "red_bin", "duck-1").position[:2], second)
     before = list_obstacles(fake.cell)
     run_skill(Release(held="cube-1", bin="red_bin"), fake)
     assert list_obstacles(fake.cell) == before

@@ -15,10 +15,10 @@ from executive.cells.fake.cell import FakeCell
 from executive.manipulation.tool_goals import (
     DROP_HEIGHT,
     MIN_GAP,
-    approach,
-    goal_aside,
-    goal_on_object,
-    goal_over_slot,
+    make_approach,
+    make_object_goal,
+    make_put_down_goal,
+    make_slot_goal,
 )
 from executive.testing.run_skill import run_skill
 from skills.put_down import PutDown
@@ -40,7 +40,7 @@ def picked(fake: FakeCell, label: str) -> str:
 
 def test_it_is_the_safe_place_if_that_is_free(fake: FakeCell, held: str) -> None:
     cube = fake.cell.classes["cube"]
-    assert goal_aside(fake.cell, cube, 0.01, held).position == pytest.approx((*SAFE, 0.05 + 0.01))
+    assert make_put_down_goal(fake.cell, cube, 0.01, held).position == pytest.approx((*SAFE, 0.05 + 0.01))
 
 
 def test_what_is_put_down_one_after_another_stands_side_by_side(fake: FakeCell, held: str) -> None:
@@ -62,16 +62,16 @@ def test_what_is_put_down_one_after_another_stands_side_by_side(fake: FakeCell, 
 def test_where_nothing_is_free_it_is_the_safe_place_all_the_same(
     fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("executive.manipulation.tool_goals.PLACES_PER_SIDE", 0)
+    monkeypatch.setattr("executive.manipulation.tool_goals.POSITIONS_PER_SIDE", 0)
     run_skill(PutDown(held=held), fake)
     fake.world.put("cube", 0.5, 0.1)
     item, cube = picked(fake, "cube"), fake.cell.classes["cube"]
-    assert goal_aside(fake.cell, cube, 0.01, item).position[:2] == pytest.approx(SAFE)
+    assert make_put_down_goal(fake.cell, cube, 0.01, item).position[:2] == pytest.approx(SAFE)
 
 
 def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slow(fake: FakeCell) -> None:
     fake.world.put("cube", 0.5, 0.0)
-    goal, _ = approach(fake.cell, look(fake, "full")[0])
+    goal, _ = make_approach(fake.cell, look(fake, "full")[0])
     assert goal.position == pytest.approx((0.5, 0.0, 0.035))
     assert goal.position[2] + goal.guarded == pytest.approx(0.05 + fake.cell.descent)
     assert goal.speed == fake.cell.descent_speed
@@ -79,10 +79,10 @@ def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slo
 
 def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:
     washer = ObjectClass("washer", 0.006, 0.025, ring=0.017)
-    goal = goal_on_object(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05)  # on another one
+    goal = make_object_goal(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05)  # on another one
     assert goal.position == pytest.approx((0.517, 0.1, 0.013))
     assert (goal.guarded, goal.speed) == pytest.approx((0.003 + 0.02, 0.05))
-    further = goal_on_object(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05, attempt=1, overtravel=0.001)
+    further = make_object_goal(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05, attempt=1, overtravel=0.001)
     assert further.position[2] == pytest.approx(0.015)
     assert np.hypot(further.position[0] - 0.5, further.position[1] - 0.1) == pytest.approx(0.017)
 
@@ -92,9 +92,11 @@ def test_what_goes_onto_a_layer_hangs_as_far_above_it_as_the_first_ones_above_th
 ) -> None:
     box = fake.cell.bins["red_bin"]
     first, second = (
-        goal_over_slot(box, number, 0.05, max_object_height=0.07) for number in (1, len(box.slots) + 1)
+        make_slot_goal(box, number, 0.05, max_object_height=0.07) for number in (1, len(box.slots) + 1)
     )
     floor = float(box.position[2]) + BIN_THICKNESS
     assert first == Goal((*map(float, box.slots[1]), floor + 0.05 + DROP_HEIGHT))
     assert second.position == pytest.approx((*box.slots[1], floor + 0.07 + 0.05 + DROP_HEIGHT))
-    assert goal_over_slot(box, 1, 0.05, 0.07, drop=0.03).position[2] == pytest.approx(floor + 0.05 + 0.03)
+    assert make_slot_goal(box, 1, 0.05, 0.07, drop_height=0.03).position[2] == pytest.approx(
+        floor + 0.05 + 0.03
+    )

@@ -13,7 +13,7 @@ from executive.cell.arm import Goal
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.events import MotionPlanned, TargetSelected, TimedEvent
-from executive.manipulation.tool_goals import nearest_first
+from executive.manipulation.tool_goals import sort_pickable_targets
 from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.run_context import RunContext
 from executive.skill import Skill, SkillFailed
@@ -132,7 +132,7 @@ def test_an_approach_that_was_not_foreseen_is_waited_for(bench: Bench, change: s
     if change == "moved":
         duck.position[0] += 0.002
         targets = bench.look()
-    bench.run(Approach(target=nearest_first(bench.context.cell, targets)[change == "another"]))
+    bench.run(Approach(target=sort_pickable_targets(bench.context.cell, targets)[change == "another"]))
     assert (bench.ahead[-1], bench.plans[-1].waits) == (False, LATENCY)
 
 

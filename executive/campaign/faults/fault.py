@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.drops import record_drop
+from executive.manipulation.drops import detect_and_record_drop
 from executive.skill import EMPTY, Skill
 from executive.testing.faults.script import ScheduledFault
 from executive.testing.substitutes import make_raising, make_raising_when_halted, make_substitute
@@ -116,7 +116,7 @@ def _make_failing(skill: type[Skill], reason: str) -> type[Skill]:
                 yield from skill.run(self, cell) or ()
                 return
             if (item := cell.ledger.find_held_item()) is not None:
-                record_drop(cell, item)
+                detect_and_record_drop(cell, item)
         raise self.failure(reason, INJECTED_FAILURE_MESSAGE)
 
     return make_substitute(skill, "Failing", run)

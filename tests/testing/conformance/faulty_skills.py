@@ -9,7 +9,7 @@ from typing import ClassVar
 from executive.cell.arm import Goal
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.motions import carry, follow, plan, task_of_moving
+from executive.manipulation.motions import follow, make_task, plan, transport
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Seconds, Skill, SkillFailed, param, port
 
 
@@ -25,9 +25,7 @@ class Push(Skill):
 
     def run(self, cell: Cell) -> Steps:
         x, y, z = (float(value) for value in self.target.position)
-        motion = yield from plan(
-            self, cell.arm, lambda: (Goal((x, y, z + self.height)), task_of_moving(cell))
-        )
+        motion = yield from plan(self, cell.arm, lambda: (Goal((x, y, z + self.height)), make_task(cell)))
         yield from follow(self, cell, motion)
 
 
@@ -103,7 +101,7 @@ class BadResources(Pause):
 
 class StepsNotTaken(Push):
     def run(self, cell: Cell) -> Steps:
-        motion = yield from plan(self, cell.arm, lambda: ("aside", task_of_moving(cell)))
+        motion = yield from plan(self, cell.arm, lambda: ("aside", make_task(cell)))
         follow(self, cell, motion)
         steps = follow(self, cell, motion)  # noqa: F841
         cell.clock.sleep(1.0)
@@ -145,7 +143,7 @@ class Shake(Skill):
     def run(self, cell: Cell) -> Steps:
         x, y, z = (float(value) for value in cell.arm.tool_pose.position)
         for stroke in self.strokes:
-            yield from carry(self, cell, self.held, Goal((x, y, z + stroke)), "its place")
+            yield from transport(self, cell, self.held, Goal((x, y, z + stroke)), "its place")
 
 
 class ShakeInTheAir(Shake):
@@ -257,7 +255,7 @@ class HoldsOnWhenHalted(GraspTarget):
 
 class RunsOnWhenHalted(Push):
     def run(self, cell: Cell) -> Steps:
-        motion = yield from plan(self, cell.arm, lambda: ("aside", task_of_moving(cell)))
+        motion = yield from plan(self, cell.arm, lambda: ("aside", make_task(cell)))
         cell.arm.start(motion)
         while not cell.arm.at_rest:
             yield
