@@ -79,7 +79,7 @@ def command(
     )
     with stdout_kept_clean():
         from executive.cell.json_values import to_json
-        from executive.record.diagnosis.text import diagnosis_lines
+        from executive.record.diagnosis.text import format_diagnosis
         from executive.record.guarded_view import GuardedView
         from executive.record.recorded_run import RecordOptions
         from executive.record.result import describe_disagreement, find_exit_code
@@ -117,7 +117,7 @@ def command(
             items = terminal_view.timeline.items.list_items()
             click.echo(format_summary(result, items, repeat, report), err=True, nl=False)
         elif result.story is not None:
-            click.echo("\n".join(diagnosis_lines(result.story, result.run, repeat, report)), err=True)
+            click.echo("\n".join(format_diagnosis(result.story, result.run, repeat, report)), err=True)
         elif result.status == "INCOMPLETE" or describe_disagreement(result):
             ended = describe_end(result.status, result.reason, result.node, result.message)
             click.echo("\n".join(filter(None, (describe_disagreement(result), ended))), err=True)

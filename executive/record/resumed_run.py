@@ -30,10 +30,7 @@ UNREPEATED_EVENTS = (RunStarted, MotionPlanned, RequestGiven)
 
 
 def resume_run(
-    path: Path,
-    skills: Mapping[str, type[Skill]],
-    options: RunOptions,
-    record: RecordOptions,
+    path: Path, skills: Mapping[str, type[Skill]], options: RunOptions, record: RecordOptions
 ) -> Result:
     """Resume the run in a directory, and return its result.
 

@@ -103,9 +103,9 @@ def test_an_undeclared_reason_is_reported_at_the_line_of_its_skill() -> None:
     ("at_rest", "arm", "first"),
     [
         (lambda: True, "at rest", "repair the code or the cell"),
-        (lambda: False, "it was commanded to brake and is not at rest",
+        (lambda: False, "it is not at rest after the command to brake",
          "keep away from the arm until you have seen it stand still: it"),
-        (lambda: 1 / 0, "it does not say whether it is at rest (ZeroDivisionError: division by zero)",
+        (lambda: 1 / 0, "the state of the arm cannot be read (ZeroDivisionError: division by zero)",
          "keep away from the arm"),
     ],
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Advice after a run that did not succeed."""
+"""Advice to a person after a run that did not succeed."""
 
 from __future__ import annotations
 
@@ -8,87 +8,87 @@ from executive.errors import Unavailable
 from executive.mission.model.instance import node_of
 from executive.mission.model.nodes import InnerNode
 from executive.mission.model.values import Literal
-from executive.record.diagnosis.case import FailedRun
-from executive.record.diagnosis.chain import Link
+from executive.record.diagnosis.failed_run import FailedRun
+from executive.record.diagnosis.failure_path import FailurePathNode
 from executive.record.timeline.activation import Reading
 from executive.record.timeline.items import ItemTimeline
 from executive.tree.inspection import Advice
 from executive.tree.registry import load_control_nodes
 
-REMEDIES: Mapping[str, str] = {
+REMEDY_BY_REASON: Mapping[str, str] = {
     "camera_moved": "mount camera and bins as the cell file says, or measure the pose again"
 }
-"""Advice by the reason of a failure after which all looks mislead, so that no mission can continue."""
+"""Advice by the reason of a failure that makes all positions from the camera wrong."""
 
 
-def give_advice(case: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
-    """Yield advice for a person, the most urgent first.
+def give_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
+    """Yield advice in sentences, the most urgent first.
 
     Args:
-        case: The run.
-        arm: State of the arm in words.
-        reads: Answers of the cell to the failed skill.
+        run: The run.
+        arm: State of the arm as text, `at rest` if it is at rest.
+        reads: Inputs that the failed skill read from the cell.
     """
     if arm != "at rest":
         yield f"keep away from the arm until you have seen it stand still: {arm}"
-    if case.end.holds:
-        content = "what is in it" if case.end.holds == "something" else case.end.holds
-        can_resume = case.end.status != "FAILURE"
-        resumption = f"to go on with this run leave {content} in the tool; " if can_resume else ""
-        yield f"{resumption}take {content} out of the tool before another run"
+    if run.end.holds:
+        content = "the object" if run.end.holds == "something" else run.end.holds
+        can_resume = run.end.status != "FAILURE"
+        resumption = f"to resume this run, leave {content} in the tool; " if can_resume else ""
+        yield f"{resumption}take {content} out of the tool before a new run"
     else:
-        for name in case.timeline.items.find_in_states("held"):
+        for name in run.timeline.items.find_in_states("held"):
             yield f"find {name} in the cell: the tool released it at the end of the run"
     for reading in reads:
         if reading.raised == Unavailable.__name__:
             yield f"make sure that {reading.name} answers again"
         elif reading.name == "arm.met":
             yield f"find what the arm collided with: {reading.value}"
-    if case.is_unrecorded:
-        yield "free some space on the disk of the run directory, or name another place with --runs DIR"
-    elif case.end.status == "FAULT":
+    if run.is_unrecorded:
+        yield "free some space on the disk of the run directory, or name another folder with --runs DIR"
+    elif run.end.status == "FAULT":
         yield "repair the code or the cell: a fault is never retried"
-    if remedy := REMEDIES.get(case.end.reason.rpartition(".")[2]):
+    if remedy := REMEDY_BY_REASON.get(run.end.reason.rpartition(".")[2]):
         yield remedy
-    elif changes := list(_suggest_changes(case)):
-        yield f"to let the mission go on after {case.end.reason}: {', or '.join(changes)}"
-    for name, item in case.lost.items():
+    elif changes := list(_list_changes(run)):
+        yield f"to let the mission continue after {run.end.reason}: {', or '.join(changes)}"
+    for name, item in run.lost.items():
         yield f"look for {name} by hand, {_describe_position(item)}"
 
 
 def _describe_position(item: ItemTimeline) -> str:
     if item.drop_time is not None and (item.sighting is None or item.sighting.clock < item.drop_time):
-        return "below where it was dropped"
+        return "below the place where it was dropped"
     return "around ({:.2f}, {:.2f}) m".format(*item.last_change.position)
 
 
-def _suggest_changes(case: FailedRun) -> Iterator[str]:
-    """Yield changes of the mission with which the failure would not end the run."""
-    if not case.links:
+def _list_changes(run: FailedRun) -> Iterator[str]:
+    """Yield changes of the mission after which the failure would not end the run."""
+    if not run.failure_path:
         return
     advice = [
-        (link, change)
-        for link in reversed(case.links)
-        if link.model
-        for change in link.model.advise(link.failure)
+        (entry, change)
+        for entry in reversed(run.failure_path)
+        if entry.model
+        for change in entry.model.advise(entry.failure)
     ]
-    handlers = [(link, change) for link, change in advice if link.model and link.model.remedy]
+    handlers = [(entry, change) for entry, change in advice if entry.model and entry.model.remedy]
     if handlers:
-        yield _add_place(case, *handlers[0])
+        yield _format_advice(run, *handlers[0])
     else:
         remedy = next(kind.remedy for kind in load_control_nodes().values() if kind.remedy)
-        yield f"{remedy} {case.locate(case.links[-1].node)}"
-    for link, change in advice:
-        if (link, change) not in handlers:
-            yield _add_place(case, link, change)
-            if link.attempt:
+        yield f"{remedy} {run.format_place(run.failure_path[-1].node)}"
+    for entry, change in advice:
+        if (entry, change) not in handlers:
+            yield _format_advice(run, entry, change)
+            if entry.attempt:
                 return
 
 
-def _add_place(case: FailedRun, link: Link, advice: Advice) -> str:
+def _format_advice(run: FailedRun, entry: FailurePathNode, advice: Advice) -> str:
     """Return advice with the place of the change: option `--set` for a param, else the line of the node."""
-    at = node_of(advice.child) if advice.child else link.node
-    value = link.node.values.get(advice.key) if isinstance(link.node, InnerNode) else None
-    params = case.loaded.mission.params.items() if isinstance(value, Literal) else ()
+    changed_node = node_of(advice.child) if advice.child else entry.node
+    value = entry.node.values.get(advice.key) if isinstance(entry.node, InnerNode) else None
+    params = run.loaded.mission.params.items() if isinstance(value, Literal) else ()
     name = next((name for name, param in params if param.value.mark == getattr(value, "mark", None)), "")
-    return f"{advice.text} {f'with --set {name}=...' if name else f'at {case.locate(at)}'}"
+    return f"{advice.text} {f'with --set {name}=...' if name else f'at {run.format_place(changed_node)}'}"

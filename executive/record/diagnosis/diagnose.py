@@ -1,4 +1,4 @@
-"""Diagnosis of a run from its timeline, its mission and its end."""
+"""Creation of the diagnosis of a run from its timeline, its mission and its end."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from executive.events import RunEnded
 from executive.mission.model.nodes import Node, SkillNode
 from executive.mission.model.paths import name_of
 from executive.record.diagnosis.advice import give_advice
-from executive.record.diagnosis.case import FailedRun, verdict
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
+from executive.record.diagnosis.failed_run import FailedRun, describe_cause
 from executive.record.picture_recorder import find_picture
 from executive.record.result import FINAL_STATUSES
 from executive.record.run_directory import RunDirectory
@@ -30,11 +30,11 @@ DECIDING_INPUTS: Mapping[str, tuple[str, ...]] = {
     "tool": ("tool.holding", "tool.touching", "tool.bears"),
     "camera": ("camera.sees_table",),
 }
-"""Inputs from which a skill that `uses` a part concludes whether it has succeeded."""
+"""Inputs that show whether a skill succeeded, by the part of the cell that the skill `uses`."""
 
-_PLACE = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+), in (?P<function>\S+)')
-_SKILL = "executive/skill.py"
-_CAUSED = "\nThe above exception was the direct cause"
+_TRACEBACK_LINE = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+), in (?P<function>\S+)')
+_SKILL_MODULE = "executive/skill.py"
+_CAUSE_SEPARATOR = "\nThe above exception was the direct cause"
 
 
 def diagnose(
@@ -42,7 +42,7 @@ def diagnose(
     end: RunEnded,
     loaded: LoadedMission,
     skills: Mapping[str, type[Skill]],
-    run: Path,
+    run_folder: Path,
     is_at_rest: Callable[[], bool],
 ) -> Diagnosis | None:
     """Return the diagnosis of a run; None if its tree succeeded and no item was lost.
@@ -52,111 +52,113 @@ def diagnose(
         end: End of the run.
         loaded: The mission.
         skills: Installed skills by name.
-        run: The run directory with all its pictures.
-        is_at_rest: Function that reads the state of the arm; called only after a fault, because after any
-            other end the arm is at rest.
+        run_folder: The run directory, with all pictures of the run.
+        is_at_rest: Function that returns True if the arm is at rest; called only after a fault, because the
+            arm is at rest after any other end.
     """
     if end.status in ("SUCCESS", "INCOMPLETE"):
         return None
-    case = FailedRun(loaded, timeline, end)
-    arm = _state_of_arm(is_at_rest) if end.status == "FAULT" else "at rest"
-    reads = list(_deciding_reads(case, skills))
-    journal = RunDirectory(run).journal
+    run = FailedRun(loaded, timeline, end)
+    arm = _describe_arm(is_at_rest) if end.status == "FAULT" else "at rest"
+    reads = list(_list_deciding_readings(run, skills))
+    journal = RunDirectory(run_folder).journal
     has_begun = journal.exists() and journal.stat().st_size > 0
     unfinished = timeline.items.find_in_states("seen", "dropped", "held")
-    left = {name: item for name, item in unfinished.items() if name not in case.lost}
+    left = {name: item for name, item in unfinished.items() if name not in run.lost}
     return Diagnosis(
         status=end.status,
         reason=end.reason,
         clock=end.robot_time,
         mission=loaded.tree.mark.source.path,
-        verdict=verdict(case),
-        node=_deciding_node(case),
-        item=case.item,
+        verdict=describe_cause(run),
+        node=_make_deciding_node(run),
+        item=run.item,
         chain=[
-            PassedNode(link.node.path, link.name, _place(link.node), link.why)
-            for link in case.links
-            if link.why or link is case.links[-1]
+            PassedNode(entry.node.path, entry.name, _format_place(entry.node), entry.explanation)
+            for entry in run.failure_path
+            if entry.explanation or entry is run.failure_path[-1]
         ],
         reads=reads,
-        look=_last_look(case),
-        lost=[_lost_item(name, item) for name, item in case.lost.items()],
-        running=[case.name_skill(path) for path in case.running],
+        look=_find_last_look(run),
+        lost=[_make_lost_item(name, item) for name, item in run.lost.items()],
+        running=[run.name_skill(path) for path in run.halted_skills],
         left=[name for name, item in left.items() if item.last_change.label in loaded.routes],
         arm=arm,
         holds=end.holds,
-        raised_at=_place_of_exception(timeline.traceback),
-        recorded=not case.is_unrecorded,
-        resumes=end.status not in FINAL_STATUSES and (not case.is_unrecorded or has_begun),
-        picture=_picture(case, run),
-        next=list(give_advice(case, arm, reads)),
+        raised_at=_find_exception_place(timeline.traceback),
+        recorded=not run.is_unrecorded,
+        resumes=end.status not in FINAL_STATUSES and (not run.is_unrecorded or has_begun),
+        picture=_find_picture_file(run, run_folder),
+        next=list(give_advice(run, arm, reads)),
     )
 
 
-def _deciding_reads(case: FailedRun, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
+def _list_deciding_readings(run: FailedRun, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
     """Yield exceptions of the cell in the failed skill, or else its deciding inputs, the latest first."""
-    node, ran = case.node, case.decided
-    if ran is None or not isinstance(node, SkillNode):
+    node, last = run.deciding_node, run.deciding_activation
+    if last is None or not isinstance(node, SkillNode):
         return
-    raised = [reading for reading in ran.readings if reading.raised and reading.tick == ran.end_tick]
+    exceptions = [reading for reading in last.readings if reading.raised and reading.tick == last.end_tick]
     names = [name for part in skills[node.skill].uses for name in DECIDING_INPUTS.get(part, ())]
-    read = [reading for reading in ran.readings if reading.name in names and not reading.raised]
-    yield from reversed(raised or read)
+    values = [reading for reading in last.readings if reading.name in names and not reading.raised]
+    yield from reversed(exceptions or values)
 
 
-def _deciding_node(case: FailedRun) -> DecidingNode | None:
-    node = case.node
+def _make_deciding_node(run: FailedRun) -> DecidingNode | None:
+    node = run.deciding_node
     if node is None:
         return None
-    name = case.name_skill(node.path) if isinstance(node, SkillNode) else name_of(node)
-    return DecidingNode(node.path, name, _place(node))
+    name = run.name_skill(node.path) if isinstance(node, SkillNode) else name_of(node)
+    return DecidingNode(node.path, name, _format_place(node))
 
 
-def _place(node: Node) -> str:
+def _format_place(node: Node) -> str:
     return f"{node.mark.source.path}:{node.mark.line}"
 
 
-def _last_look(case: FailedRun) -> Sighting | Look | None:
-    item = case.timeline.items.by_name.get(case.item)
+def _find_last_look(run: FailedRun) -> Sighting | Look | None:
+    item = run.timeline.items.by_name.get(run.item)
     if item is None or item.sighting is None:
-        return case.timeline.items.look
+        return run.timeline.items.look
     return replace(item.sighting, attempts=item.last_change.attempts)
 
 
-def _lost_item(name: str, item: ItemTimeline) -> LostItem:
+def _make_lost_item(name: str, item: ItemTimeline) -> LostItem:
     failure, failed = item.failure, None
     if failure is not None:
         failed = ItemFailure(f"{to_skill_name(failure.node)}.{failure.reason}", failure.message, failure.end)
     return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failed)
 
 
-def _picture(case: FailedRun, run: Path) -> str:
-    """Return the file of the picture of the failure, or else of the last selection of the item."""
-    reason = case.end.reason.rpartition(".")[2] if case.end.status == "FAILURE" else ""
-    item = case.timeline.items.by_name.get(case.item)
-    if case.lost and item is not None and item.failure is not None:
+def _find_picture_file(run: FailedRun, run_folder: Path) -> str:
+    """Return the path of the picture of the failure, or else of the last selection of the item, or ""."""
+    reason = run.end.reason.rpartition(".")[2] if run.end.status == "FAILURE" else ""
+    item = run.timeline.items.by_name.get(run.item)
+    if run.lost and item is not None and item.failure is not None:
         reason = item.failure.reason
     for picture_reason in dict.fromkeys([reason, ""]):
-        file = find_picture(run / "frames", case.item, picture_reason)
+        file = find_picture(run_folder / "frames", run.item, picture_reason)
         if file is not None:
-            return file.relative_to(run).as_posix()
+            return file.relative_to(run_folder).as_posix()
     return ""
 
 
-def _state_of_arm(is_at_rest: Callable[[], bool]) -> str:
+def _describe_arm(is_at_rest: Callable[[], bool]) -> str:
     try:
-        return "at rest" if is_at_rest() else "it was commanded to brake and is not at rest"
+        return "at rest" if is_at_rest() else "it is not at rest after the command to brake"
     except Exception as error:
         # A broken arm may raise an exception.
-        return f"it does not say whether it is at rest ({type(error).__name__}: {error})"
+        return f"the state of the arm cannot be read ({type(error).__name__}: {error})"
 
 
-def _place_of_exception(traceback: str) -> str:
-    """Return the place at which the first exception was raised: `skills/grasp.py:45, in run`; "" if none."""
-    cause, _, last_part = traceback.rpartition(_CAUSED)
-    places = [place.group("file", "line", "function") for place in _PLACE.finditer(cause or last_part)]
-    if len(places) > 1 and places[-1][0].endswith(_SKILL) and places[-1][2] == Skill.failure.__name__:
-        places.pop()  # The caller in the skill is more informative.
+def _find_exception_place(traceback: str) -> str:
+    """Return the place where the first exception was raised: `skills/grasp.py:45, in run`; "" if unknown."""
+    cause, _, last_part = traceback.rpartition(_CAUSE_SEPARATOR)
+    places = [
+        place.group("file", "line", "function") for place in _TRACEBACK_LINE.finditer(cause or last_part)
+    ]
+    if len(places) > 1 and places[-1][0].endswith(_SKILL_MODULE) and places[-1][2] == Skill.failure.__name__:
+        places.pop()  # The caller of `Skill.failure` is more informative.
     if not places:
         return ""
     file, line, function = places[-1]

@@ -1,4 +1,4 @@
-"""Diagnosis of a run that did not succeed: causes with numbers, and advice."""
+"""Diagnosis of a run that did not succeed: causes with measured values, and advice."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from executive.record.timeline.items import Look, Sighting
 
 @dataclass(frozen=True)
 class DecidingNode:
-    """Node that decided the end of a run.
+    """Node that determined the status of a run.
 
     Attributes:
-        path: Path of the node.
-        name: Name of the node for a person: `Grasp of cube-1`, `look: retry`.
-        place: File and line in the mission.
+        path: Path of the node in the tree.
+        name: Name of the node with its item or subtree: `Grasp of cube-1`, `look: retry`.
+        place: File and line of the node.
     """
 
     path: str
@@ -44,7 +44,7 @@ class ItemFailure:
     """Last failure of a skill that worked on an item.
 
     Attributes:
-        what: Skill and reason: `Transit.dropped`.
+        what: Name of the failure, which consists of skill and reason: `Transit.dropped`.
         message: Message of the failure.
         clock: Time of the failure [s].
     """
@@ -60,9 +60,9 @@ class LostItem:
 
     Attributes:
         item: Name of the item.
-        look: Last look that showed the item, or None.
+        look: Last look (image with its detections) in which the item was detected, or None.
         unseen: Number of looks after `look`.
-        held, dropped: Last times at which the tool picked and lost the item [s], or None.
+        held, dropped: Last times at which the tool picked and dropped the item [s], or None.
         failed: Last failure of a skill that worked on the item, or None.
     """
 
@@ -80,22 +80,22 @@ class Diagnosis:
 
     Attributes:
         status: `FAILURE`, `FAULT` or `HALTED`.
-        reason: Reason of the failure.
-        clock: Time of the end [s].
+        reason: Name of the failure.
+        clock: Time of the end of the run [s].
         mission: The mission file.
         verdict: The cause in one sentence.
         node: Node that determined the status, or None.
         item: Item that this node worked on, or "".
-        chain: The nodes that did not handle the failure, from the root, and its origin.
-        reads: Answers of the cell to the failed skill, the latest first.
-        look: Last look that showed the item, or else the last look; None if there was no look.
+        chain: Nodes that did not handle the failure, from the root on, and the origin of the failure.
+        reads: Inputs that the failed skill read from the cell, the latest first.
+        look: Last look in which the item was detected, or else the last look; None without a look.
         lost: Lost items.
-        running: Skills that were halted, in words.
-        left: Names of the items that are not sorted.
-        arm: `at rest`, or a sentence about the arm.
-        holds: Content of the tool, or "".
+        running: Names of the skills that were halted, with their items.
+        left: Names of the items that the mission had to sort and did not sort.
+        arm: `at rest`, or a text about the state of the arm.
+        holds: Item that the tool holds, `something` for an unknown object, or "".
         raised_at: File, line and function in which the exception of a fault was raised, or "".
-        recorded: True if the journal is complete.
+        recorded: True if the journal contains the whole run.
         resumes: True if the run can be resumed.
         picture: File of the picture of the failure, relative to the run directory, or "".
         next: Advice in sentences, the most urgent first.

@@ -1,4 +1,4 @@
-"""Text of a diagnosis for a terminal and for a report."""
+"""Text of a diagnosis for the terminal and the report."""
 
 from __future__ import annotations
 
@@ -11,49 +11,49 @@ from executive.record.diagnosis.diagnosis import Diagnosis, LostItem
 from executive.record.timeline.activation import Reading
 from executive.record.timeline.items import Look, Sighting
 
-WIDTH = 110
-"""Maximum length of a line [columns]."""
+MAX_LINE_WIDTH = 110
+"""Maximum length of a line [characters]."""
 
-MAX_NODES = 5
-"""Maximum number of control nodes in the text; nodes next to the root are omitted first."""
+MAX_SHOWN_NODES = 5
+"""Maximum number of control nodes in the text; the nodes nearest to the root are omitted."""
 
 _MAX_READINGS = 3
 _MAX_LOST = 3
 _LABEL_WIDTH = 12
-_UNIT = re.compile(r"(?<=[0-9)]) (?=(?:s|m)\b)")
-_JOINED = "\N{NO-BREAK SPACE}"
+_SPACE_BEFORE_UNIT = re.compile(r"(?<=[0-9)]) (?=(?:s|m)\b)")
+_NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
 
 
-def resume_command(run: str) -> str:
-    """Return the command line that resumes the run in a directory."""
+def make_resume_command(run: str) -> str:
+    """Return the command that resumes the run in the directory `run`."""
     return shlex.join(["executive", "run", "--resume", run])
 
 
-def diagnosis_lines(diagnosis: Diagnosis, run: str, repeat: str, report: str = "") -> list[str]:
-    """Return the lines of a diagnosis, in the order of importance; commands are not wrapped.
+def format_diagnosis(diagnosis: Diagnosis, run: str, repeat: str, report: str = "") -> list[str]:
+    """Return the lines of a diagnosis, the most important first; commands are not wrapped.
 
     Args:
         diagnosis: The diagnosis.
-        run: The run directory.
-        repeat: The command that repeats the run.
-        report: File of the report of the run, or "".
+        run: Path of the run directory.
+        repeat: Command that repeats the run.
+        report: Path of the report of the run, or "".
     """
     lines = wrap_lines(
         f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}", "", "  ", max_lines=3
     )
-    lines += _passed_nodes(diagnosis)
-    for label, text in facts(diagnosis):
+    lines += _format_passed_nodes(diagnosis)
+    for label, text in list_facts(diagnosis):
         lines += wrap_lines(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, max_lines=3)
     commands = {"record": run, "report": report, "repeat": repeat}
     if diagnosis.resumes:
-        commands["go on"] = resume_command(run)
+        commands["resume"] = make_resume_command(run)
     return lines + [f"{label:{_LABEL_WIDTH}}{command}" for label, command in commands.items() if command]
 
 
-def facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
-    """Yield a label and a sentence for each fact other than the verdict and the passed nodes."""
+def list_facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
+    """Yield label and sentence of each fact, except the verdict and the nodes that the failure passed."""
     node = diagnosis.node
-    if node is not None and not any(link.why for link in diagnosis.chain):
+    if node is not None and not any(passed.why for passed in diagnosis.chain):
         yield "where", f"{node.path} ({node.place})"
     if diagnosis.raised_at:
         hint = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.recorded else ""
@@ -63,12 +63,12 @@ def facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "the cell", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in reads)
     for lost in diagnosis.lost[:_MAX_LOST]:
         yield "lost", _format_lost_item(lost)
-    # The fact about a lost item contains its last look.
+    # The sentence about a lost item contains its last look.
     if not diagnosis.lost:
         yield "last look", _format_look(diagnosis.look)
     if diagnosis.picture:
         yield "picture", diagnosis.picture
-    holds = {"": "is empty", "something": "holds something that nobody knows"}
+    holds = {"": "is empty", "something": "holds an unknown object"}
     arm = "the arm is at rest" if diagnosis.arm == "at rest" else f"the arm: {diagnosis.arm}"
     yield "now", f"{arm}, the tool {holds.get(diagnosis.holds, 'holds ' + diagnosis.holds)}"
     if diagnosis.left:
@@ -77,50 +77,51 @@ def facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "next", sentence
 
 
-def _passed_nodes(diagnosis: Diagnosis) -> list[str]:
+def _format_passed_nodes(diagnosis: Diagnosis) -> list[str]:
     """Return a line for each node that did not handle the failure, and for the origin of the failure."""
-    here = f"{diagnosis.mission}:"
-    passed = [(link.name, link.why, link.place) for link in diagnosis.chain if link.why]
+    mission_prefix = f"{diagnosis.mission}:"
+    passed = [(each.name, each.why, each.place) for each in diagnosis.chain if each.why]
     node = diagnosis.node
     if not passed or node is None:
         return []
-    above = f", {len(passed) - MAX_NODES} nodes above left out" if len(passed) > MAX_NODES else ""
-    shown = [*passed[-MAX_NODES:], (node.name, node.path, node.place)]
+    omitted = f", {len(passed) - MAX_SHOWN_NODES} nodes omitted" if len(passed) > MAX_SHOWN_NODES else ""
+    shown = [*passed[-MAX_SHOWN_NODES:], (node.name, node.path, node.place)]
     width = max(len(name) for name, _, _ in shown)
-    lines = [f"why nothing in {diagnosis.mission} stopped it, from the root down{above}:"]
+    lines = [f"why no node in {diagnosis.mission} handled it, from the root down{omitted}:"]
     for name, why, place in shown:
-        line = f"line {place.removeprefix(here)}" if place.startswith(here) else place
+        line = f"line {place.removeprefix(mission_prefix)}" if place.startswith(mission_prefix) else place
         lines += wrap_lines(f"{why} ({line})", f"  {name:{width}}  ", " " * (width + 4))
     return lines
 
 
-def wrap_lines(text: str, first: str, others: str, *, max_lines: int = 2) -> list[str]:
-    """Return a text in at most `max_lines` lines; a number and its unit stay on one line."""
+def wrap_lines(text: str, first_indent: str, other_indent: str, *, max_lines: int = 2) -> list[str]:
+    """Return a text as at most `max_lines` indented lines; a number and its unit stay on one line."""
     lines = textwrap.wrap(
-        _UNIT.sub(_JOINED, text), WIDTH, initial_indent=first, subsequent_indent=others, max_lines=max_lines,
+        _SPACE_BEFORE_UNIT.sub(_NO_BREAK_SPACE, text), MAX_LINE_WIDTH, max_lines=max_lines,
+        initial_indent=first_indent, subsequent_indent=other_indent,
         placeholder=" ...", break_on_hyphens=False,
     )  # fmt: skip
-    return [line.replace(_JOINED, " ") for line in lines]
+    return [line.replace(_NO_BREAK_SPACE, " ") for line in lines]
 
 
 def _format_reading(reading: Reading, verdict: str) -> str:
-    """Return an answer of the cell as text, without a message that the verdict contains."""
-    name, value, when = reading.name, reading.value, f"({reading.clock:.2f} s)"
+    """Return an input of the run as text, without a message that the verdict contains."""
+    name, value, time_text = reading.name, reading.value, f"({reading.clock:.2f} s)"
     if reading.raised:
         text = "" if str(value) in verdict else f": {value}"
-        return f"{name} raised {reading.raised} {when}{text}"
-    return f"{name} = {value:g} {when}" if isinstance(value, float) else f"{name} = {value} {when}"
+        return f"{name} raised {reading.raised} {time_text}{text}"
+    return f"{name} = {value:g} {time_text}" if isinstance(value, float) else f"{name} = {value} {time_text}"
 
 
 def _format_look(look: Sighting | Look | None) -> str:
     if look is None:
         return "none so far"
-    where = f"frame {look.frame}, camera {look.camera}, by {look.detector}, at {look.clock:.2f} s"
+    image = f"frame {look.frame}, camera {look.camera}, by {look.detector}, at {look.clock:.2f} s"
     if isinstance(look, Look):
-        return f"{where}: {_format_count(look.found, 'box', 'boxes')}"
-    seen = "" if look.confidence is None else f" as {look.label} {look.confidence:.2f}"
-    known = f"{_format_count(look.looks, 'look')}, {_format_count(look.attempts, 'failed attempt')} in all"
-    return f"{look.item}{seen}{_format_position(look.position)}: {where}; {known}"
+        return f"{image}: {_format_count(look.found, 'box', 'boxes')}"
+    detection = "" if look.confidence is None else f" as {look.label} {look.confidence:.2f}"
+    counts = f"{_format_count(look.looks, 'look')}, {_format_count(look.attempts, 'failed attempt')} in all"
+    return f"{look.item}{detection}{_format_position(look.position)}: {image}; {counts}"
 
 
 def _format_lost_item(lost: LostItem) -> str:

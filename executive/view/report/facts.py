@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 
 from executive.mission.text.files import shipped_folder
-from executive.record.diagnosis.text import resume_command
+from executive.record.diagnosis.text import make_resume_command
 from executive.record.journal import find_end, find_start, read_journal
 from executive.record.recorded_mission import read_tree
 from executive.record.result import FINAL_STATUSES, list_requests, read_result
@@ -65,5 +65,5 @@ class ReportFacts:
         mission = file.stem if file.parent == shipped_folder() else str(file)
         options = mission, self.start.seed, self.start.overrides
         self.repeat_command = format_repeat_command(*options, self.requests, directory.scene)
-        self.resume_command = "" if self.status in FINAL_STATUSES else resume_command(str(path))
+        self.resume_command = "" if self.status in FINAL_STATUSES else make_resume_command(str(path))
         self.replay_command = shlex.join(["executive", "replay", str(path)])

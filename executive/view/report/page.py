@@ -75,7 +75,7 @@ def render_report(facts: ReportFacts) -> str:
         audit=asdict(result.audit) if result is not None and result.audit is not None else {},
         unknown=describe_unknown({} if result is None else result.unknown),
         story=story,
-        story_facts=[] if story is None else list(text.facts(story)),
+        story_facts=[] if story is None else list(text.list_facts(story)),
         last_picture=next((one for one in facts.pictures if story and one.file == story.picture), None),
         titles={node.path: node.title for node in facts.nodes},
         describe_place=describe_place_on_table,

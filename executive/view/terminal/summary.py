@@ -9,7 +9,7 @@ from pathlib import Path
 
 from executive.events import ItemChanged
 from executive.perception.evidence import describe_unknown
-from executive.record.diagnosis.text import diagnosis_lines, resume_command, wrap_lines
+from executive.record.diagnosis.text import format_diagnosis, make_resume_command, wrap_lines
 from executive.record.result import Result, describe_disagreement
 
 
@@ -68,13 +68,13 @@ def format_summary(
     ends += [f"  assumed error rates: {doubt}" for doubt in result.doubts]
     warning = wrap_lines(describe_disagreement(result), "", "  ", max_lines=3)
     if result.story is not None:
-        lines = [times, *ends, "", *diagnosis_lines(result.story, result.run, repeat_command, report)]
+        lines = [times, *ends, "", *format_diagnosis(result.story, result.run, repeat_command, report)]
     else:
         end = describe_end(result.status, result.reason, result.node, result.message)
         lines = [end, times, f"{result.run}  (repeat: {repeat_command})", *ends]
         lines += [f"report: {report}"] if report else []
         if result.status == "INCOMPLETE":
-            lines.append(f"after you have moved the remaining objects: {resume_command(result.run)}")
+            lines.append(f"after you have moved the remaining objects: {make_resume_command(result.run)}")
     return "\n".join([*warning, *lines]) + "\n"
 
 

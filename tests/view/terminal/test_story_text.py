@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, PassedNode
-from executive.record.diagnosis.text import WIDTH, diagnosis_lines
+from executive.record.diagnosis.text import MAX_LINE_WIDTH, format_diagnosis
 from executive.record.timeline.items import Sighting
 from tests.record.failed_runs import PICK, FailedRun
 
@@ -29,12 +29,12 @@ def at_home(missions, monkeypatch):
 
 
 TAIL = "record      runs/latest\nrepeat      executive run trial\n"
-GO_ON = "go on       executive run --resume runs/latest\n"
+GO_ON = "resume      executive run --resume runs/latest\n"
 
 
 def text(run: FailedRun, *, numbered: bool = True, tail: str = TAIL) -> str:
     """Execute a run; return its story up to its tail, lines of code and shipped missions unnumbered."""
-    text = "\n".join(diagnosis_lines(run.tell(), "runs/latest", "executive run trial")) + "\n"
+    text = "\n".join(format_diagnosis(run.tell(), "runs/latest", "executive run trial")) + "\n"
     assert text.endswith(tail)
     text = re.sub(r"py:\d+", "py:N", text.removesuffix(tail))
     return text if numbered else unnumbered(text)
@@ -54,7 +54,7 @@ def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
         == """\
 FAILURE after 1.92 s: Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal on cube-1 broke
   on the way to red_bin, near (0.50, 0.10, 0.12) m
-why nothing in trial.yaml stopped it, from the root down:
+why no node in trial.yaml handled it, from the root down:
   retry              all 3 attempts failed: 1 x Grasp.missed, 2 x Transit.dropped (line 11)
   Transit of cube-1  tree/5:retry/do/Transit (line 15)
 the cell    tool.holding = False (1.92 s), tool.touching = True (1.75 s), tool.bears = 7.9 (1.28 s)
@@ -62,8 +62,8 @@ last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera over
             3 looks, 3 failed attempts in all
 now         the arm is at rest, the tool is empty
 left to do  1: cube-1
-next        to let the mission go on after Transit.dropped: put a try with a catch for it around line 15, or
-            allow more than 3 attempts with --set attempts=...
+next        to let the mission continue after Transit.dropped: put a try with a catch for it around line 15,
+            or allow more than 3 attempts with --set attempts=...
 """
     )
 
@@ -75,8 +75,8 @@ def test_a_time_that_is_over(abroad) -> None:
     assert story.verdict == "timeout: the body was not done after 1 s during Transit of cube-1"
     assert (story.node.path, story.node.place) == ("tree/timeout", "trial.yaml:7")
     assert story.next == [
-        "take cube-1 out of the tool before another run",
-        "to let the mission go on after timeout.timeout: put a try with a catch for it around line 7, or "
+        "take cube-1 out of the tool before a new run",
+        "to let the mission continue after timeout.timeout: put a try with a catch for it around line 7, or "
         "allow more than 1 s with --set patience=...",
     ]
 
@@ -113,7 +113,7 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
     assert chain[0::2] == ["catches only Detect.unsure", "all 10 attempts failed: 10 x Detect.unavailable"]
     assert [unnumbered(each) for each in story.next] == [
         "make sure that detector.embedded answers again",
-        "to let the mission go on after Detect.unavailable: catch it in the try at "
+        "to let the mission continue after Detect.unavailable: catch it in the try at "
         "missions/library/sorting.yaml:N, or allow more than 10 attempts at missions/library/sorting.yaml:N",
     ]
 
@@ -133,7 +133,7 @@ def test_a_halt_while_something_hangs_on_the_tool(at_home) -> None:
     assert (story.holds, story.left, story.resumes) == ("cube-1", ["cube-1", "duck-1"], True)
     assert story.verdict == "halted by the user during Transit of cube-1 and Wait"
     assert story.next == [
-        "to go on with this run leave cube-1 in the tool; take cube-1 out of the tool before another run"
+        "to resume this run, leave cube-1 in the tool; take cube-1 out of the tool before a new run"
     ]
 
 
@@ -147,7 +147,7 @@ FAILURE after 1.53 s: 1 object was lost: cube-1
 lost        cube-1 seen last at (0.500, 0.100, 0.025) m at 0.05 s, not in the 3 looks since; Transit.dropped
             at 0.80 s: the seal on cube-1 broke on the way to red_bin, near (0.50, 0.10, 0.12) m
 now         the arm is at rest, the tool is empty
-next        look for cube-1 by hand, below where it was dropped
+next        look for cube-1 by hand, below the place where it was dropped
 """
     )
 
@@ -163,7 +163,7 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
         text(run, numbered=False)
         == """\
 FAILURE after 2.11 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
-why nothing in missions/sort_overhead.yaml stopped it, from the root down:
+why no node in missions/sort_overhead.yaml handled it, from the root down:
   repeat                succeeds only with choice.no_candidate (line N)
   carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but the handler failed
                         (missions/library/sorting.yaml:N)
@@ -175,9 +175,9 @@ last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera over
             1 look, 0 failed attempts in all
 now         the arm is at rest, the tool holds cube-1
 left to do  1: cube-1
-next        take cube-1 out of the tool before another run
+next        take cube-1 out of the tool before a new run
 next        find what the arm collided with: link 5 met a wrench
-next        to let the mission go on after PutDown.blocked: catch it in the try at
+next        to let the mission continue after PutDown.blocked: catch it in the try at
             missions/library/sorting.yaml:N
 """
     )
@@ -204,11 +204,11 @@ def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
         picture="frames/000001_cube-1_missed.jpg",
     )
     repeat = "executive run trial" + " --set a=b" * 30
-    lines = diagnosis_lines(story, "runs/latest", repeat, "report.html")
+    lines = format_diagnosis(story, "runs/latest", repeat, "report.html")
     assert lines[-2] == "report      report.html"
     assert lines[-1] == f"repeat      {repeat}"
-    assert max(map(len, lines[:-1])) <= WIDTH
-    assert lines[3] == "why nothing in trial.yaml stopped it, from the root down, 4 nodes above left out:"
+    assert max(map(len, lines[:-1])) <= MAX_LINE_WIDTH
+    assert lines[3] == "why no node in trial.yaml handled it, from the root down, 4 nodes omitted:"
     assert lines[4].startswith("  some_subtree_4: retry  w why")
     assert "picture     frames/000001_cube-1_missed.jpg" in lines
 
@@ -218,10 +218,10 @@ def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
     [
         ("at rest", "", "is at rest, the tool is empty"),
         ("at rest", "cube-1", "is at rest, the tool holds cube-1"),
-        ("at rest", "something", "is at rest, the tool holds something that nobody knows"),
+        ("at rest", "something", "is at rest, the tool holds an unknown object"),
         ("it was told to brake", "", ": it was told to brake, the tool is empty"),
     ],
 )
 def test_what_is_known_of_arm_and_tool_is_said_in_words(arm, holds, said) -> None:
-    lines = diagnosis_lines(replace(STORY, arm=arm, holds=holds), "runs/latest", "executive run trial")
+    lines = format_diagnosis(replace(STORY, arm=arm, holds=holds), "runs/latest", "executive run trial")
     assert any(re.fullmatch(f"now         the arm ?{said}", line) for line in lines)

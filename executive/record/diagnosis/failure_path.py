@@ -1,4 +1,4 @@
-"""Path of a failure through the tree, from the root to its origin, with explanations of the control nodes."""
+"""Nodes that a failure passed, with the explanations why control nodes did not handle the failure."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _NEVER = Activation("", 0, "", "", "INVALID", 0, 0.0, 0, 0.0)
 
 
 @dataclass(frozen=True)
-class Link:
-    """Node that a failure passed.
+class FailurePathNode:
+    """Node that a failure passed on its way from the origin to the root of the tree.
 
     Attributes:
         node: The node of the mission.
         subtree: Name of the subtree that contains the node, or "".
-        model: Control node that explains failures; None for other nodes.
-        failure: The failure as input of the node.
+        model: Instance of the control node for explanations; None for other nodes.
+        failure: The failure that the node got from its child.
     """
 
     node: Node
@@ -36,65 +36,66 @@ class Link:
 
     @property
     def name(self) -> str:
-        """Name of the node in a report: `look: retry`."""
+        """Name of the node with its subtree: `look: retry`."""
         name = name_of(self.node)
         return f"{self.subtree}: {name}" if self.subtree else name
 
     @property
-    def why(self) -> str:
-        """Reason why a control node did not handle the failure; "" for other nodes."""
+    def explanation(self) -> str:
+        """Reason why the control node did not handle the failure; "" for other nodes."""
         return self.model.explain(self.failure) if self.model and self.failure.child else ""
 
     @property
     def attempt(self) -> tuple[int, int] | None:
-        """Number of the failed attempt and number of allowed attempts; None if the node counts none."""
+        """Number of the failed attempt and maximum number of attempts; None if the node has no attempts."""
         return self.model.count_attempts(self.failure) if self.model else None
 
 
-def trace_failure(tree: Node, timeline: Timeline, origin: str, failure: str) -> tuple[Link, ...]:
+def trace_failure(tree: Node, timeline: Timeline, origin: str, failure: str) -> tuple[FailurePathNode, ...]:
     """Return the nodes that a failure passed, from the root to the origin.
 
     Args:
-        tree: The mission's tree.
+        tree: Root node of the mission.
         timeline: Timeline of the run.
         origin: Path of the node in which the failure began.
         failure: Name of the failure: `Grasp.missed`.
     """
-    passed = find_nodes_on_path(tree, origin)
+    nodes = find_nodes_on_path(tree, origin)
     source, _, reason = failure.rpartition(".")
     names = {source}
-    links: list[Link] = []
-    for index in reversed(range(len(passed))):
-        node = passed[index]
-        below = passed[index + 1] if index + 1 < len(passed) else None
-        subtree = next((above.name for above in reversed(passed[:index]) if isinstance(above, UseNode)), "")
+    failure_path: list[FailurePathNode] = []
+    for index in reversed(range(len(nodes))):
+        node = nodes[index]
+        child = nodes[index + 1] if index + 1 < len(nodes) else None
+        subtree = next((use.name for use in reversed(nodes[:index]) if isinstance(use, UseNode)), "")
         model = inspection_instance(node) if isinstance(node, InnerNode) else None
         reasons = frozenset(Reason(name, reason) for name in names)
-        links.append(Link(node, subtree, model, _make_passed_failure(timeline, node, model, below, reasons)))
+        propagated = _make_propagated_failure(timeline, node, model, child, reasons)
+        failure_path.append(FailurePathNode(node, subtree, model, propagated))
         names |= {node.label} if node.label else set()
-    return tuple(reversed(links))
+    return tuple(reversed(failure_path))
 
 
-def _make_passed_failure(
-    timeline: Timeline, node: Node, model: ControlNode | None, below: Node | None, reasons: frozenset[Reason]
+def _make_propagated_failure(
+    timeline: Timeline, node: Node, model: ControlNode | None, child: Node | None, reasons: frozenset[Reason]
 ) -> PropagatedFailure:
-    """Return the failure as input of a node; `below` is the child that failed, or None at the origin."""
-    ran = timeline.nodes.get(node.path) or _NEVER
+    """Return the failure that `node` got from its child `child`; `child` is None at the origin."""
+    activation = timeline.nodes.get(node.path) or _NEVER
     children = [child for key in model.keys for child in model.list_children(key)] if model else []
 
     def has_failed(child: Child) -> bool:
         last = timeline.nodes.get(node_of(child).path)
-        return last is not None and last.number > ran.number and last.status == "FAILURE"
+        return last is not None and last.number > activation.number and last.status == "FAILURE"
 
     return PropagatedFailure(
-        next((child for child in children if node_of(child) is below), None),
-        ran.reason, reasons, ran.handled_counts, ran.message_by_reason, ran.last_handled, ran.choice,
-        ran.end - ran.start, has_failed,
+        next((each for each in children if node_of(each) is child), None),
+        activation.reason, reasons, activation.handled_counts, activation.message_by_reason,
+        activation.last_handled, activation.choice, activation.end - activation.start, has_failed,
     )  # fmt: skip
 
 
 def find_nodes_on_path(tree: Node, path: str) -> list[Node]:
-    """Return the nodes from the root to the innermost node at a path; empty if there is no such node."""
+    """Return the nodes from the root to the innermost node at `path`, or [] if no node has this path."""
     for child in tree.children:
         if nodes := find_nodes_on_path(child, path):
             return [tree, *nodes]
