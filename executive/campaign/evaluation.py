@@ -85,7 +85,7 @@ class DetectorUnderTest:
     name: str
     base: Path
 
-    def name_measurement(self, dataset: Path | None) -> str:
+    def make_measurement_name(self, dataset: Path | None) -> str:
         """Return the name of a measurement on a data set, or on scenes of the cell if `dataset` is None."""
         if dataset is None:
             assert self.cell is not None

@@ -84,18 +84,18 @@ def summarize_results(results: Sequence[Result], requested_count: int) -> dict[s
     """
     results = [result for result in results if result.status != "HALTED"]
     audits = [result.audit for result in results if result.audit is not None]
-    right = sum(audit.right for audit in audits)
-    total = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
-    low, high = wilson_interval(right, total)
+    right_count = sum(audit.right for audit in audits)
+    total_count = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
+    low, high = compute_wilson_interval(right_count, total_count)
     return {
         "asked": requested_count,
         "cut_off": len(results) < requested_count,
         "runs": len(results),
         "succeeded": sum(result.status == "SUCCESS" for result in results),
         "objects": {
-            "right": right,
-            "total": total,
-            "share": round(right / total, 6) if total else 0.0,
+            "right": right_count,
+            "total": total_count,
+            "share": round(right_count / total_count, 6) if total_count else 0.0,
             "interval_95": [round(low, 6), round(high, 6)],
         },
         "disagreements": [
@@ -105,7 +105,7 @@ def summarize_results(results: Sequence[Result], requested_count: int) -> dict[s
         ],
         "robot_time_s": summarize_values([result.robot_time_s for result in results]),
         "robot_time_per_object_s": (
-            round(sum(result.robot_time_s for result in results) / right, 3) if right else None
+            round(sum(result.robot_time_s for result in results) / right_count, 3) if right_count else None
         ),
         "planning": {
             key: round(sum(getattr(result.planning, key) for result in results), 3)
@@ -120,7 +120,7 @@ def summarize_results(results: Sequence[Result], requested_count: int) -> dict[s
     }
 
 
-def wilson_interval(successes: int, total: int) -> tuple[float, float]:
+def compute_wilson_interval(successes: int, total: int) -> tuple[float, float]:
     """Return the 95 % Wilson score interval of the proportion successes / total; (0, 1) if total is 0."""
     if total == 0:
         return 0.0, 1.0

@@ -102,7 +102,7 @@ def command(
         for tested in tested_detectors:
             evaluation.check_detector(tested, renders_scenes=dataset is None, scene=scene)
         for tested in tested_detectors:
-            measurement, start = tested.name_measurement(dataset), time.monotonic()
+            measurement, start = tested.make_measurement_name(dataset), time.monotonic()
             result = evaluation.measure_detector(
                 tested, dataset, scenes, threshold=threshold, worst_misses=worst, progress=bar
             )

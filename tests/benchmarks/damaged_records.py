@@ -16,8 +16,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import click
-from executive.campaign.subject import MissionUnderTest
 
+from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.sim.command_log import is_command_log
 from executive.cli.options import runs_option
 from executive.errors import ExecutiveError, InputError

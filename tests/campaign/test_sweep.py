@@ -13,11 +13,11 @@ import pytest
 
 from executive.campaign.sweep import (
     Job,
+    compute_wilson_interval,
     run_job,
     run_sweep,
     summarize_results,
     summarize_values,
-    wilson_interval,
 )
 from executive.errors import InputError
 from executive.record.result import Audit, ItemCounts, Result
@@ -155,7 +155,7 @@ def test_runs_that_were_halted_or_never_began_make_it_cut_off_and_count_in_nothi
     [(81, 263, 0.2553, 0.3662), (0, 20, 0.0, 0.1611), (0, 0, 0.0, 1.0)],
 )
 def test_the_interval_is_the_published_one(successes, total, low, high):
-    assert wilson_interval(successes, total) == pytest.approx((low, high), abs=5e-5)
+    assert compute_wilson_interval(successes, total) == pytest.approx((low, high), abs=5e-5)
 
 
 def test_the_spread_of_nothing_is_zero():

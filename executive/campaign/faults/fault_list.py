@@ -22,7 +22,7 @@ DURATIONS = (0.5, 5.0)
 QUARTER_FRACTIONS: tuple[tuple[Occasion, float], ...] = (("first", 0.25), ("middle", 0.5), ("late", 0.75))
 """Fractions of the nominal run, or of a motion, after which faults of objects occur, by occasion."""
 LASTING_STARTS = tuple(range(1, 21))
-"""Numbers of the activations with a lasting fault, if real causes of the fault would not last longer."""
+"""Numbers of the activations with a lasting fault, for faults that would not last until the end."""
 TRANSPORT_FRACTIONS: tuple[tuple[Occasion, float], ...] = (
     ("first", 0.1), ("first", 0.3), ("middle", 0.5), ("late", 0.7), ("late", 0.9),
 )  # fmt: skip
@@ -140,13 +140,10 @@ class _FaultLister:
 
     def list_detector_faults(self) -> Iterator[PlannedFault]:
         """Yield slow, hanging, unsure and dead detectors, from the start and from the middle of the run."""
-        half = self._nominal_run.robot_time / 2
-        starts: tuple[tuple[Occasion, float], ...] = (("first", 0.0), ("middle", half))
+        starts: dict[Occasion, float] = {"first": 0.0, "middle": self._nominal_run.robot_time / 2}
         dead, unsure = effects.detector_dead(), effects.detector_unsure()
-        for occasion, start in starts:
-            faults = []
-            for duration in DURATIONS:
-                faults.append((f"slow by {duration:g} s", after(start, effects.detector_slow(duration))))
+        for occasion, start in starts.items():
+            faults = [(f"slow by {lag:g} s", after(start, effects.detector_slow(lag))) for lag in DURATIONS]
             for duration in DURATIONS:
                 for kind, effect in (("hangs", effects.detector_hangs()), ("unsure", unsure), ("dead", dead)):
                     faults.append((f"{kind} for {duration:g} s", between(start, start + duration, effect)))
@@ -173,8 +170,8 @@ class _FaultLister:
                 removed = effects.object_removed("node", fraction)
                 bumped = effects.object_bumped(x, y, "node", fraction)
                 for kind, effect in (("target removed", removed), ("target bumped", bumped)):
-                    cell_faults, cause = (during(node.path, effect, nth=nth),), f"at {fraction:g}"
-                    yield self._make_fault(node, kind, occasion, cause=cause, cell_faults=cell_faults)
+                    cell_fault, cause = during(node.path, effect, nth=nth), f"at {fraction:g}"
+                    yield self._make_fault(node, kind, occasion, cause=cause, cell_faults=(cell_fault,))
 
     def list_tool_faults(self) -> Iterator[PlannedFault]:
         """Yield seals that break during a transport, and grasps that cannot seal."""
@@ -183,12 +180,12 @@ class _FaultLister:
             if not (skill.moves and skill.tool_state[0] is HOLDING and self._has_run(node)):
                 continue
             for occasion, fraction in TRANSPORT_FRACTIONS:
-                cell_faults = (during(node.path, effects.seal_breaks(fraction), nth=1),)
-                cause = f"at {fraction:g}"
-                yield self._make_fault(node, "seal breaks", occasion, cause=cause, cell_faults=cell_faults)
-            kind = "seal breaks over a wrong bin"
-            cell_faults = (during(node.path, effects.seal_breaks_over_wrong_bin()),)
-            yield self._make_fault(node, kind, "lasting", cause="every time", cell_faults=cell_faults)
+                cause, effect = f"at {fraction:g}", effects.seal_breaks(fraction)
+                cell_fault = during(node.path, effect, nth=1)
+                yield self._make_fault(node, "seal breaks", occasion, cause=cause, cell_faults=(cell_fault,))
+            effect, kind = effects.seal_breaks_over_wrong_bin(), "seal breaks over a wrong bin"
+            cell_fault = during(node.path, effect)
+            yield self._make_fault(node, kind, "lasting", cause="every time", cell_faults=(cell_fault,))
         half = self._nominal_run.robot_time / 2
         for duration in DURATIONS:
             cell_fault = between(half, half + duration, effects.seal_fails())

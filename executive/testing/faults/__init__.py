@@ -18,12 +18,7 @@ from executive.testing.faults.detector import (
     detector_unsure,
 )
 from executive.testing.faults.faulty_cell import FaultyCell, with_faults
-from executive.testing.faults.objects import (
-    object_bumped,
-    object_moved,
-    object_removed,
-    object_unsealable,
-)
+from executive.testing.faults.objects import object_bumped, object_moved, object_removed, object_unsealable
 from executive.testing.faults.robot import (
     arm_collides,
     no_depth,

@@ -110,7 +110,7 @@ class FaultyCell(CellWrapper):
             raise Fault(f"the mission has not ended after {timeout:g} s on its clock")
 
     def _update_occurrences(self) -> None:
-        """Begin and end the faults with a time interval, and run the actions of the active faults."""
+        """Begin and end the faults with a time span, and run the actions of the active faults."""
         now = self._scene.now + TIME_TOLERANCE
         due = [(effect, time) for effect, time in self._time_faults if time.start <= now]
         self._time_faults = [(effect, time) for effect, time in self._time_faults if time.start > now]

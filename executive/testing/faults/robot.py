@@ -68,11 +68,8 @@ def no_path(*, is_blocked: bool = False) -> Effect:
 
 def workspace_occluded() -> Effect:
     """Return an effect: the arm occludes the table, and `Detect` fails with `hidden`, or detects nothing."""
-    return Effect(
-        "workspace_occluded",
-        interceptors={"sees_table": _return_constant, "capture": _occlude_frame},
-        arguments=(False,),
-    )
+    interceptors = {"sees_table": _return_constant, "capture": _occlude_frame}
+    return Effect("workspace_occluded", interceptors=interceptors, arguments=(False,))
 
 
 def no_depth() -> Effect:
