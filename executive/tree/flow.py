@@ -49,7 +49,7 @@ class FlowState:
     tools: ToolStates
 
     def join(self, other: FlowState) -> FlowState:
-        """Return the facts that hold in both states."""
+        """Return the facts that hold in both states: the common variables, and all possible tool states."""
         if self == other:
             return self
         written = self.written if other.written is None else other.written
@@ -166,12 +166,8 @@ def find_fixed_point(
 ) -> tuple[Flow, FlowState]:
     """Return the possible ends of a child that is entered repeatedly, and the facts that hold at every entry.
 
-    Args:
-        flow_of: Returns the possible ends of a child.
-        child: The child.
-        state: State at the first entry.
-        get_next_entry: Returns the state at the next entry, given the possible ends of the child; None if
-            the child is not entered again.
+    `get_next_entry` returns the state at the next entry, given the possible ends of the child; None if the
+    child is not entered again.
     """
     entry = state
     while True:
@@ -206,10 +202,7 @@ def apply_precondition(tools: ToolStates, required: ToolState, path: str) -> Too
 
 
 def get_tools_after_success(tools: ToolStates, after: ToolState, path: str) -> ToolStates:
-    """Return the possible states of the tool after the success of a skill.
-
-    `after` is the declared state; ANY leaves the states unchanged.
-    """
+    """Return the possible states of the tool after success; `after` is the declared state, ANY: no change."""
     if after is ANY or (tools is not None and all(possible.tool is after for possible in tools)):
         return tools
     return frozenset({PossibleToolState(after, path)})

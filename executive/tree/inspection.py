@@ -66,10 +66,10 @@ class NodeFacts(Protocol):
 
 @dataclass(frozen=True)
 class PropagatedFailure:
-    """A failure that ended a run, as seen by a control node that passed it on or raised it.
+    """A failure that ended a run, as seen by a control node that passed it on or caused it.
 
     Attributes:
-        child: The child that passed the failure on; None if the node itself raised the failure.
+        child: The child that passed the failure on; None if the node itself caused the failure.
         reason: Name of the failure: `Grasp.missed`.
         names: All names of the failure at this node: `Skill.reason`, and one `label.reason` per label.
         handled_counts: Number of failures that the node handled before, by name.

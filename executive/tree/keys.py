@@ -163,10 +163,7 @@ class KeySection(KeyOwner):
 
 
 def _complete_declaration(declaration: Key, attribute: str, annotation: object) -> Key:
-    """Return the declaration with the name, attribute, kind and type of the key.
-
-    `attribute` is the name of the attribute, and `annotation` its type annotation.
-    """
+    """Return the declaration with the name, kind and type that its attribute and annotation determine."""
     if get_origin(annotation) in (Union, types.UnionType) and types.NoneType in get_args(annotation):
         parts = tuple(part for part in get_args(annotation) if part is not types.NoneType)
         annotation = Union[parts]  # noqa: UP007

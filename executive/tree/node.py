@@ -49,8 +49,8 @@ class ControlNode(KeyOwner, Behaviour):
     """Base class of control nodes.
 
     Attributes:
-        keyword: Name of the node in missions, and source of the failures that the node itself raises.
-        reasons: Declared reasons of the failures that the node itself raises.
+        keyword: Name of the node in missions, and source of the failures that the node itself causes.
+        reasons: Declared reasons of the failures that the node itself causes.
         symbol: Character before the name of the node in drawings.
         shape: Shape of the node in Graphviz drawings.
         remedy: Advice to the mission author: how this node, around a failing node, handles the failure; "" if
@@ -202,7 +202,7 @@ class ControlNode(KeyOwner, Behaviour):
         return Status.FAILURE
 
     def fail_with_reason(self, reason: str, message: str) -> Status:
-        """Raise a failure of this node itself: set `failure`, and return FAILURE."""
+        """Fail with a reason of this node itself: set `failure`, and return FAILURE."""
         return self.fail(Failure(reason, message, self.keyword, self.path))
 
     def report_choice(self, choice: str, cause: Failure | None = None) -> None:

@@ -70,8 +70,7 @@ class Parallel(ControlNode):
         """The number of children that must succeed, and whether a failure halts the others."""
         if self._has_lead:
             return "wait for the lead"
-        count = len(self.do)
-        required = self._required_count
+        count, required = len(self.do), self._required_count
         wait = "wait for all" if required == count else f"wait for {required} of {count}"
         return f"{wait}, halt" if self.halt else wait
 
@@ -109,7 +108,7 @@ class Parallel(ControlNode):
         return self._decide() if has_child_ended else Status.RUNNING
 
     def _decide(self) -> Status:
-        """Count the children that ended in this tick, and end the node if their number suffices."""
+        """Count the children that ended in this tick, and return the resulting status of the node."""
         ticked = self._running
         self._running = [child for child in ticked if child.status is Status.RUNNING]
         self._missing_count -= sum(child.status is Status.SUCCESS for child in ticked)
@@ -146,11 +145,8 @@ class Parallel(ControlNode):
             for failure, after in flows[0].failures.items():
                 failures[failure] = after.with_tools(combine_tools(state.tools, [after.tools, *others]))
             end = flows[0].success
-            return Flow(
-                end and end.with_tools(combine_tools(state.tools, [end.tools, *others])),
-                failures,
-                halted,
-            )
+            success = end and end.with_tools(combine_tools(state.tools, [end.tools, *others]))
+            return Flow(success, failures, halted)
         required = self._required_count
         ends = [find_tools_at_end(flow, state, self.halt or required < len(flows)) for flow in flows]
         if sum(bool(flow.failures) for flow in flows) > len(flows) - required:

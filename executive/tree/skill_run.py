@@ -50,10 +50,8 @@ class SkillRun:
         if yielded is None:
             return False
         if yielded is not self:
-            type_name = type(yielded).__name__
-            raise Fault(
-                f'it yielded a {type_name}; to run the steps of another generator, write "yield from"'
-            )
+            name = type(yielded).__name__
+            raise Fault(f'it yielded a {name}; to run the steps of another generator, write "yield from"')
         if unset := [name for name in self._output_names if not hasattr(self.skill, name)]:
             raise Fault(f"it succeeded without setting its output {', '.join(unset)}")
         return True

@@ -22,10 +22,8 @@ PALETTE_SIZE = 255
 """Number of colours in the palette of a GIF; colour 256 marks pixels that equal those of the last frame."""
 PALETTE_FRAME_COUNT = 8
 """Number of frames, from the first on, from which the palette of a GIF is computed."""
-_DROPPED_BITS = 3
-"""Number of lower bits of a colour channel that are ignored when similar colours are counted."""
-_STATUS_WEIGHT = 60
-"""Number of samples of each status colour for the palette."""
+_DROPPED_BITS, _STATUS_WEIGHT = 3, 60
+"""Number of low bits of a channel that are ignored when colours are counted; samples per status colour."""
 
 
 def write_mp4(path: Path, frames: Iterable[Image.Image], frame_rate: float) -> None:

@@ -13,21 +13,10 @@ from PIL import Image, ImageDraw
 from executive.events import RunEnded
 from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT
 from executive.record.result import Result
-from executive.view.film import panel
+from executive.view.film import panel, style
 from executive.view.film.run_state import FilmRunState
 from executive.view.film.source import FilmSource
-from executive.view.film.style import (
-    BACKGROUND,
-    FAILURE,
-    LINE,
-    MINOR_TEXT,
-    RUNNING,
-    SUCCESS,
-    TEXT,
-    load_font,
-    truncate,
-    wrap,
-)
+from executive.view.film.style import BACKGROUND, FAILURE, LINE, MINOR_TEXT, RUNNING, SUCCESS, TEXT
 
 WIDTH, HEIGHT = 1280, 720
 """Size of a frame [pixel]."""
@@ -64,7 +53,7 @@ def draw_page(
     _draw_camera(page, state.picture_file)
     if has_caption and (state.failure_text or state.action_text):
         text, max_lines = (state.failure_text, 2) if state.failure_text else (state.action_text, 1)
-        lines = wrap(text, _TEXT_SIZE, MAX_CAPTION_WIDTH, max_lines)
+        lines = style.wrap(text, _TEXT_SIZE, MAX_CAPTION_WIDTH, max_lines)
         _draw_caption(page, lines, FAILURE if state.failure_text else RUNNING)
     _draw_header(page, source.start.mission, subtitle, state.time, duration)
     top = HEIGHT - _BOTTOM_MARGIN - panel.compute_height(source.item_count)
@@ -77,11 +66,11 @@ def draw_page(
 def draw_result(page: Image.Image, result: Result | RunEnded | None) -> Image.Image:
     """Return a copy of a frame, with the result of the run in a box over the image of the cell."""
     status, message, counts = describe_result(result)
-    message_lines = wrap(message, _RESULT_SIZE, MAX_RESULT_WIDTH - 2 * _RESULT_PADDING, 4)
-    lines = [*message_lines, *wrap(counts, _RESULT_SIZE, MAX_RESULT_WIDTH - 2 * _RESULT_PADDING, 2)]
+    message_lines = style.wrap(message, _RESULT_SIZE, MAX_RESULT_WIDTH - 2 * _RESULT_PADDING, 4)
+    lines = [*message_lines, *style.wrap(counts, _RESULT_SIZE, MAX_RESULT_WIDTH - 2 * _RESULT_PADDING, 2)]
     height = 2 * _RESULT_PADDING + _STATUS_SIZE + _RESULT_LINE * len(lines) + (10 if lines else 0)
-    longest = max((load_font(_RESULT_SIZE).getlength(line) for line in lines), default=0)
-    width = max(longest, load_font(_STATUS_SIZE).getlength(status)) + 2 * _RESULT_PADDING
+    longest = max((style.load_font(_RESULT_SIZE).getlength(line) for line in lines), default=0)
+    width = max(longest, style.load_font(_STATUS_SIZE).getlength(status)) + 2 * _RESULT_PADDING
     left, top = SCENE_SIZE[0] - width - _MARGIN, SCENE_SIZE[1] - height - _MARGIN
     text_left = left + _RESULT_PADDING
     colour = _STATUS_COLOURS.get(status, RUNNING)
@@ -90,11 +79,11 @@ def draw_result(page: Image.Image, result: Result | RunEnded | None) -> Image.Im
     draw.rounded_rectangle((left, top, left + width, top + height), 10, BACKGROUND)
     draw.rounded_rectangle((left, top, left + 8, top + height), 4, colour)
     y = top + _RESULT_PADDING + _STATUS_SIZE / 2
-    draw.text((text_left, y), status, colour, load_font(_STATUS_SIZE), "lm")
+    draw.text((text_left, y), status, colour, style.load_font(_STATUS_SIZE), "lm")
     y = top + _RESULT_PADDING + _STATUS_SIZE + 10 + _RESULT_LINE / 2
     for number, line in enumerate(lines):
         colour = TEXT if number < len(message_lines) else MINOR_TEXT
-        draw.text((text_left, y + _RESULT_LINE * number), line, colour, load_font(_RESULT_SIZE), "lm")
+        draw.text((text_left, y + _RESULT_LINE * number), line, colour, style.load_font(_RESULT_SIZE), "lm")
     return frame
 
 
@@ -112,12 +101,12 @@ def describe_result(result: Result | RunEnded | None) -> tuple[str, str, str]:
 def _draw_header(page: Image.Image, title: str, subtitle: str, time: float, duration: float) -> None:
     """Draw the title, the time [s], and a bar with the progress of the run."""
     draw = ImageDraw.Draw(page)
-    title_font = load_font(_TITLE_SIZE)
+    title_font = style.load_font(_TITLE_SIZE)
     max_width = RIGHT - LEFT - title_font.getlength(f"{duration:.1f} s") - 24
-    draw.text((LEFT, 50), truncate(title, _TITLE_SIZE, max_width), TEXT, title_font, "ls")
+    draw.text((LEFT, 50), style.truncate(title, _TITLE_SIZE, max_width), TEXT, title_font, "ls")
     draw.text((RIGHT, 50), f"{time:.1f} s", TEXT, title_font, "rs")
-    subtitle = truncate(subtitle, _SUBTITLE_SIZE, RIGHT - LEFT)
-    draw.text((LEFT, 76), subtitle, MINOR_TEXT, load_font(_SUBTITLE_SIZE), "ls")
+    subtitle = style.truncate(subtitle, _SUBTITLE_SIZE, RIGHT - LEFT)
+    draw.text((LEFT, 76), subtitle, MINOR_TEXT, style.load_font(_SUBTITLE_SIZE), "ls")
     progress = time / duration if duration else 1.0
     draw.rectangle((LEFT, 94, RIGHT, 96), LINE)
     draw.rectangle((LEFT, 94, LEFT + round(progress * (RIGHT - LEFT)), 96), RUNNING)
@@ -125,7 +114,7 @@ def _draw_header(page: Image.Image, title: str, subtitle: str, time: float, dura
 
 def _draw_caption(page: Image.Image, lines: list[str], colour: str) -> None:
     """Write lines at the bottom of the image of the cell, beside a bar with the colour `colour`."""
-    width = max(load_font(_TEXT_SIZE).getlength(line) for line in lines) + 2 * _PADDING + 8
+    width = max(style.load_font(_TEXT_SIZE).getlength(line) for line in lines) + 2 * _PADDING + 8
     height = _LINE_HEIGHT * len(lines) + 14
     left, top = _MARGIN, SCENE_SIZE[1] - _MARGIN - height
     draw = ImageDraw.Draw(page)
@@ -133,7 +122,7 @@ def _draw_caption(page: Image.Image, lines: list[str], colour: str) -> None:
     draw.rounded_rectangle((left + 6, top + 7, left + 9, top + height - 7), 2, colour)
     for number, line in enumerate(lines):
         middle = top + 7 + _LINE_HEIGHT * (number + 0.5)
-        draw.text((left + _PADDING + 8, middle), line, TEXT, load_font(_TEXT_SIZE), "lm")
+        draw.text((left + _PADDING + 8, middle), line, TEXT, style.load_font(_TEXT_SIZE), "lm")
 
 
 def _draw_camera(page: Image.Image, picture: Path | None) -> None:
@@ -145,9 +134,10 @@ def _draw_camera(page: Image.Image, picture: Path | None) -> None:
     draw = ImageDraw.Draw(page)
     draw.rounded_rectangle((_MARGIN, _MARGIN, _MARGIN + width + 7, _MARGIN + height + 31), 6, BACKGROUND)
     page.paste(inset, (_MARGIN + 4, _MARGIN + 4))
-    title = truncate("camera:  " + picture.stem.partition("_")[2].replace("_", " "), _LABEL_SIZE, width - 8)
+    title = "camera:  " + picture.stem.partition("_")[2].replace("_", " ")
     place = (_MARGIN + 10, _MARGIN + height + 17)
-    draw.text(place, title, MINOR_TEXT, load_font(_LABEL_SIZE), "lm")
+    title = style.truncate(title, _LABEL_SIZE, width - 8)
+    draw.text(place, title, MINOR_TEXT, style.load_font(_LABEL_SIZE), "lm")
 
 
 @lru_cache(maxsize=2)

@@ -9,20 +9,9 @@ from PIL import Image, ImageDraw
 from executive.cell.frame import Box
 from executive.events import ItemChanged
 from executive.mission.outline import OutlineNode
+from executive.view.film import style
 from executive.view.film.run_state import FilmRunState
-from executive.view.film.style import (
-    FAILURE,
-    INACTIVE,
-    LINE,
-    MINOR_TEXT,
-    RUNNING,
-    STATUS_COLOURS,
-    SUCCESS,
-    TEXT,
-    draw_mark,
-    load_font,
-    truncate,
-)
+from executive.view.film.style import FAILURE, INACTIVE, LINE, MINOR_TEXT, RUNNING, SUCCESS, TEXT
 from executive.view.tree.outline import draw_line_prefixes, select_running
 
 TEXT_SIZE, HEADING_SIZE, MARK_SIZE = 14, 12, 11
@@ -52,22 +41,22 @@ def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state:
     """
     left, top, right, bottom = box
     shown = select_nodes(nodes, state, int((bottom - top) // NODE_ROW))
-    draw, font = ImageDraw.Draw(image), load_font(TEXT_SIZE)
+    draw, font = ImageDraw.Draw(image), style.load_font(TEXT_SIZE)
     for row, (node, prefix) in enumerate(zip(shown, draw_line_prefixes(shown), strict=True)):
         middle = top + NODE_ROW * (row + 0.5)
         _draw_lines(draw, prefix, left, middle)
         last = state.timeline.find_current(node.path)
         status = last.status if last else ""
         x = left + INDENT * (len(prefix) // _CHARACTERS_PER_LEVEL)
-        draw_mark(image, status, (x + MARK_SIZE / 2, middle), MARK_SIZE)
+        style.draw_mark(image, status, (x + MARK_SIZE / 2, middle), MARK_SIZE)
         x += MARK_SIZE + 8
         colour = MINOR_TEXT if status in ("SUCCESS", "FAILURE") else INACTIVE
         if status == "RUNNING":
             colour = RUNNING if node.skill else TEXT
-        name = truncate(node.name, TEXT_SIZE, right - x)
+        name = style.truncate(node.name, TEXT_SIZE, right - x)
         draw.text((x, middle), name, colour, font, "lm")
         x += font.getlength(name) + 10
-        note = truncate(last.note if last else "", TEXT_SIZE, right - x)
+        note = style.truncate(last.note if last else "", TEXT_SIZE, right - x)
         draw.text((x, middle), note, FAILURE if status == "FAILURE" else MINOR_TEXT, font, "lm")
 
 
@@ -82,7 +71,7 @@ def select_nodes(nodes: Sequence[OutlineNode], state: FilmRunState, max_count: i
     def rank(index: int) -> tuple[bool, bool, int]:
         path = shown[index].path
         last = state.timeline.find_current(path)
-        return path in active_paths, last is not None and last.status in STATUS_COLOURS, -index
+        return path in active_paths, last is not None and last.status in style.STATUS_COLOURS, -index
 
     kept_indices = sorted(sorted(range(len(shown)), key=rank, reverse=True)[:max_count])
     return [shown[index] for index in kept_indices]
@@ -109,7 +98,7 @@ def draw_items(
     starts = [left + fraction * (right - left) for fraction in _COLUMNS.values()]
     ends = [start - 8 for start in starts[1:]] + [right]
     for title, start in zip(_COLUMNS, starts, strict=True):
-        draw.text((start, top + ITEM_ROW / 2), title, INACTIVE, load_font(HEADING_SIZE), "lm")
+        draw.text((start, top + ITEM_ROW / 2), title, INACTIVE, style.load_font(HEADING_SIZE), "lm")
     for number, item in enumerate(select_items(items), start=1):
         middle = top + ITEM_ROW * (number + 0.5)
         cells = (item.item, item.label, item.state, item.bin)
@@ -117,8 +106,8 @@ def draw_items(
         colours = (name_colour, MINOR_TEXT, _COLOURS.get(item.state, MINOR_TEXT), MINOR_TEXT)
         offsets = (0, 0, 0, _SWATCH_SIZE + 6)
         for cell, colour, offset, start, end in zip(cells, colours, offsets, starts, ends, strict=True):
-            text = truncate(cell, TEXT_SIZE, end - start - offset)
-            draw.text((start + offset, middle), text, colour, load_font(TEXT_SIZE), "lm")
+            text = style.truncate(cell, TEXT_SIZE, end - start - offset)
+            draw.text((start + offset, middle), text, colour, style.load_font(TEXT_SIZE), "lm")
         if item.bin:
             x, y = starts[-1], round(middle) - _SWATCH_SIZE // 2
             box = (x, y, x + _SWATCH_SIZE - 1, y + _SWATCH_SIZE - 1)

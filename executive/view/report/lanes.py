@@ -92,16 +92,13 @@ def _group_by_bar(
     """Return the activations of each bar by path, in at most `MAX_BARS` bars plus one per lane."""
     divisor = 1
     while True:
-        groups = {
-            path: _group_indistinguishable(activations, scale / divisor)
-            for path, activations in activations_by_path.items()
-        }
+        groups = {path: _merge_close(one, scale / divisor) for path, one in activations_by_path.items()}
         if sum(map(len, groups.values())) <= MAX_BARS + len(groups):
             return groups
         divisor *= 2
 
 
-def _group_indistinguishable(activations: Sequence[Activation], scale: float) -> list[list[Activation]]:
+def _merge_close(activations: Sequence[Activation], scale: float) -> list[list[Activation]]:
     """Return the activations of a node in groups that cannot be distinguished at a scale [pixel/s]."""
     groups: list[list[Activation]] = []
     for activation in activations:

@@ -95,16 +95,12 @@ def compute_layout(depths: Sequence[int], children: ChildLists, sizes: Sequence[
         for depth, top, middle, size in zip(depths, tops, middles, sizes, strict=True)
     )
     right_ends = _find_right_ends(children, sizes, boxes)
-    frames = {
-        index: Rectangle(
-            box.x - FRAME_PADDING,
-            tops[index] + NODE_GAP / 2,
-            right_ends[index] - box.x + FRAME_PADDING,
-            bands[index] - NODE_GAP,
-        )
-        for index, box in enumerate(boxes)
-        if sizes[index].name_width
-    }
+    frames = {}
+    for index, box in enumerate(boxes):
+        if sizes[index].name_width:
+            x, y = box.x - FRAME_PADDING, tops[index] + NODE_GAP / 2
+            width = right_ends[index] - box.x + FRAME_PADDING
+            frames[index] = Rectangle(x, y, width, bands[index] - NODE_GAP)
     return Layout(boxes, trunks, frames, max(right_ends) + MARGIN, tops[0] + bands[0] + MARGIN - NODE_GAP / 2)
 
 
@@ -117,9 +113,8 @@ def _place_columns(depths: Sequence[int], sizes: Sequence[NodeSize]) -> tuple[li
         column = [size for size, node_depth in zip(sizes, depths, strict=True) if node_depth == depth]
         frame = FRAME_PADDING if any(size.name_width for size in column) else 0.0
         trunks.append(right + EDGE_STEM if depth else MARGIN)
-        columns.append(
-            trunks[-1] + (EDGE_STEM + max(size.label_width for size in column) if depth else 0.0) + frame
-        )
+        edge_length = EDGE_STEM + max(size.label_width for size in column) if depth else 0.0
+        columns.append(trunks[-1] + edge_length + frame)
         right = columns[-1] + max(size.width for size in column)
     return columns, tuple(trunks)
 
