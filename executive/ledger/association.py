@@ -1,8 +1,8 @@
 """Association of observations with items: by position first, then by class.
 
-The association has three steps: `associate` matches each observation to a nearby item, `find_moved_item`
-matches a new item to an item that may have been moved to its position, and `find_duplicate` matches two items
-at one position.
+The association has three steps: `associate` matches each observation to a nearby item,
+`find_moved_item` matches a new item to an item that may have been moved to its position, and `find_duplicate`
+matches two items at one position.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from executive.cell.config import LedgerConfig
 from executive.cell.detection import Observation
-from executive.ledger.item import LYING, REASON_NOT_FOUND, Record, State
+from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, Record, State
 from executive.ledger.staleness import Staleness
 
 MAX_STANDARD_DEVIATIONS = 3.5
@@ -120,7 +120,7 @@ def _may_be_same_object(old: Record, new: Record, staleness: Staleness, config: 
     )
     is_phantom = old.state is State.PHANTOM and old.reason == REASON_NOT_FOUND and old.attempt_count > 0
     is_missing = (
-        (old.state in LYING or is_phantom)
+        (old.state in ON_TABLE or is_phantom)
         and old.belief.miss_probability <= MAX_MISS_PROBABILITY_OF_MOVED
         and old.belief.probability_at_last_detection >= 0.5
     )

@@ -127,18 +127,17 @@ class Belief:
             viewpoint: Viewpoint of the look (`make_viewpoint_key`).
             is_ambiguous: True if the detection may show another item; then it is no evidence of existence.
         """
-        repeated = rates.repeated if self.last_label_by_viewpoint.get(viewpoint) == label else 0.0
-        self.repeat_count += repeated > 0.0
+        copied = rates.repeated if self.last_label_by_viewpoint.get(viewpoint) == label else 0.0
+        self.repeat_count += copied > 0.0
         self.last_label_by_viewpoint[viewpoint] = label
-        self.log_likelihoods[label] += _compute_log_ratio(
-            1.0 - rates.confusion_rate, rates.confusion_rate, repeated
-        )
-        self.max_confusion_rate = max(self.max_confusion_rate, rates.confusion_rate)
+        confusion_rate = rates.confusion_rate
+        self.log_likelihoods[label] += _compute_log_ratio(1.0 - confusion_rate, confusion_rate, copied)
+        self.max_confusion_rate = max(self.max_confusion_rate, confusion_rate)
         if is_ambiguous and not self.look_count:
             self.log_odds = min(self.log_odds, MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM)
         elif not is_ambiguous and (self.look_count or self.uncertain_look_count):
             false_positive_rate = min(rates.false_detections * ITEM_AREA_FRACTION, 1.0)
-            self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, repeated)
+            self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, copied)
         self.label_counts[label] += 1
         self.uncertain_look_count = 0
         self.is_proved = self.is_proved or self.log_odds >= LOG_ODDS_OF_PROOF

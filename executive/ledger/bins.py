@@ -29,8 +29,8 @@ FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 
 
 
 @dataclass(frozen=True, eq=False)
-class Bins:
-    """Bins of the cell, and the permitted bins of each class.
+class BinContents:
+    """Bins of the cell, the permitted bins of each class, and rules for the items in the bins.
 
     Attributes:
         config: Thresholds of the ledger, from the cell file.

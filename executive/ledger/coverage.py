@@ -12,7 +12,7 @@ from executive.cell.detection import Detections
 from executive.geometry import Array
 from executive.ledger.belief import compute_repeat_probability, make_viewpoint_key
 
-PITCH = 0.02
+GRID_PITCH = 0.02
 """Distance between neighbouring grid points [m]; smaller than the smallest object."""
 GRID_MARGIN = 0.4
 """Width of the part of the grid outside the workspace [m]; dropped or pushed objects stay on the grid."""
@@ -51,8 +51,8 @@ class Coverage:
 
     def __init__(self, table: TableConfig) -> None:
         (left, right), (low, high) = table.x, table.y
-        xs = np.arange(left - GRID_MARGIN, right + GRID_MARGIN + PITCH / 2, PITCH)
-        ys = np.arange(low - GRID_MARGIN, high + GRID_MARGIN + PITCH / 2, PITCH)
+        xs = np.arange(left - GRID_MARGIN, right + GRID_MARGIN + GRID_PITCH / 2, GRID_PITCH)
+        ys = np.arange(low - GRID_MARGIN, high + GRID_MARGIN + GRID_PITCH / 2, GRID_PITCH)
         self._points = np.array([(x, y, POINT_HEIGHT) for x in xs for y in ys])
         self._low, self._high = np.array([left, low]), np.array([right, high])
         self._workspace_mask = self._find_points_inside(self._points, 0.0)
@@ -73,7 +73,7 @@ class Coverage:
         """
         searched = look.is_searched(self._points)
         for position in uncertain_positions:
-            searched &= self._find_distances(position) > PITCH
+            searched &= self._find_distances(position) > GRID_PITCH
         unchanged = searched & (self._last_changes <= look.frame.epoch)
         # A detector gets another image in another view: of 31 objects that the detector of the cell fasteners
         # missed in the view `table`, the detector missed 4 in the view `full` of the same pose.
@@ -105,7 +105,7 @@ class Coverage:
         """Return the probability that looks have missed an object at `position` `(3,)` [m]."""
         distances = self._find_distances(position)
         nearest = int(np.argmin(distances))
-        return float(self._miss_probabilities[nearest]) if distances[nearest] <= PITCH else PRIOR_OUTSIDE
+        return float(self._miss_probabilities[nearest]) if distances[nearest] <= GRID_PITCH else PRIOR_OUTSIDE
 
     def is_in_workspace(self, position: Array) -> bool:
         """Return True if `position` `(3,)` [m] is at most `WORKSPACE_TOLERANCE` outside the workspace."""
@@ -126,7 +126,7 @@ class Coverage:
 
         At the edge of the area that the arm occludes, a point may be visible although its neighbour never is.
         """
-        near = self._find_distances(position) <= PITCH
+        near = self._find_distances(position) <= GRID_PITCH
         return bool(near.any() and self._visible_mask[near].all())
 
     @property

@@ -49,7 +49,7 @@ class State(Enum):
     """The item does not exist, or is the same object as another item of the ledger."""
 
 
-LYING = (State.SEEN, State.REJECTED)
+ON_TABLE = (State.SEEN, State.REJECTED)
 """States of an item that lies on the table at the position of its last detection."""
 
 

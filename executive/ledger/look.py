@@ -16,7 +16,7 @@ from executive.events import DetectedObject, FrameSearched
 from executive.ledger.association import associate, find_duplicate, find_moved_item, may_show
 from executive.ledger.belief import ITEM_AREA_FRACTION, Belief, make_viewpoint_key
 from executive.ledger.coverage import Coverage
-from executive.ledger.item import LYING, REASON_NOT_FOUND, REASON_UNCERTAIN, Record, State
+from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, Record, State
 from executive.ledger.records import Records
 from executive.ledger.staleness import Staleness
 
@@ -69,7 +69,7 @@ class LookUpdate:
         """
         change_count = self.look.frame.epoch
         current = [new for new in observations if self.staleness.is_unchanged(new.position, change_count)]
-        known = [record for record in self.records if record.state in LYING]
+        known = [record for record in self.records if record.state in ON_TABLE]
         detected = self._update_detected(known, [new for new in current if new.confident])
         uncertain = self._update_uncertain(detected, [new for new in current if not new.confident])
         undetected = [record for record in known if record not in (*detected, *uncertain)]
@@ -122,7 +122,7 @@ class LookUpdate:
             near = [
                 record
                 for record in self.records
-                if record.state in LYING
+                if record.state in ON_TABLE
                 and record.belief.miss_probability > self.config.max_miss_probability
                 and may_show(observation, record, self.config.gate)
             ]

@@ -6,7 +6,14 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 
 from executive.ledger.certainty import Certainty
-from executive.ledger.item import LYING, REASON_NOT_FOUND, REASON_UNCERTAIN, REASON_UNTRACKED, Record, State
+from executive.ledger.item import (
+    ON_TABLE,
+    REASON_NOT_FOUND,
+    REASON_UNCERTAIN,
+    REASON_UNTRACKED,
+    Record,
+    State,
+)
 
 MIN_EMPTY_PROBES = 3
 """Minimum number of descents that touch only the table at an item's position before it is a phantom."""
@@ -43,7 +50,7 @@ def find_final_state(
     belief = record.belief
     if record.state is State.HELD:
         return State.REJECTED, "still in the tool when the run ended"
-    if record.state not in (*LYING, State.DROPPED):
+    if record.state not in (*ON_TABLE, State.DROPPED):
         return None
     if record.state is State.SEEN and not belief.look_count and belief.miss_probability == 1.0:
         return State.REJECTED, REASON_UNCERTAIN

@@ -8,7 +8,7 @@ from statistics import median_low
 
 from executive.cell.detection import Detections, Observation
 from executive.ledger.belief import LOG_ODDS_OF_PROOF, Belief
-from executive.ledger.bins import Bins
+from executive.ledger.bins import BinContents
 from executive.ledger.item import Record, State
 from executive.ledger.records import Records
 
@@ -18,10 +18,10 @@ class Recovery:
 
     Args:
         records: All items.
-        bins: Bins of the cell.
+        bins: Contents of the bins.
     """
 
-    def __init__(self, records: Records, bins: Bins) -> None:
+    def __init__(self, records: Records, bins: BinContents) -> None:
         self._records, self._bins = records, bins
         self._label_counts_by_bin: dict[str, list[Counter[str]]] = defaultdict(list)
         """Number of visible objects of each class, by bin, in each look that shows the whole bin."""

@@ -17,10 +17,10 @@ from executive.cell.protocols import Routes
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
-from executive.ledger.bins import Bins, find_probable_bin
+from executive.ledger.bins import BinContents, find_probable_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
-from executive.ledger.item import LYING, Record, State
+from executive.ledger.item import ON_TABLE, Record, State
 from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.outcomes import (
     count_states,
@@ -64,7 +64,7 @@ class Tracker:
         self._config, self._routes, self._emit = config, routes, emit
         self._records = Records(emit)
         self._certainty = Certainty(config, labels_with_unique_height)
-        self._bins = Bins(config, bins, routes)
+        self._bins = BinContents(config, bins, routes)
         self._coverage, self._staleness = Coverage(table), Staleness()
         self._recovery: Recovery | None = None
         """Search for untracked items, from `lose_track` to `record_bin_contents`, or None."""
@@ -110,7 +110,7 @@ class Tracker:
         return [
             record.target
             for record in self.records
-            if record.state in LYING
+            if record.state in ON_TABLE
             and record.belief.existence_probability >= 0.5
             and not self._certainty.is_position_empty(record)
         ]

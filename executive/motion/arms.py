@@ -21,7 +21,7 @@ ARMS_BY_URDF: Mapping[str, tuple[int, KinematicsFactory]] = {
 """Number of joints and kinematics of each supported arm, by the key `arm.urdf` of cell files."""
 
 
-def find_unsupported_arm(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+def find_arm_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield a key and a message if the arm of a cell file has no kinematics or another number of joints."""
     if config.arm.urdf not in ARMS_BY_URDF:
         yield (

@@ -157,12 +157,12 @@ class Iiwa14:
         n, up, side = _compute_elbow_frame(shoulder_to_wrist)
         cos4 = (distance**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
         q4 = math.acos(min(1.0, max(-1.0, cos4)))
-        cos_lift = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
-        lift = math.acos(min(1.0, max(-1.0, cos_lift)))
+        cos_upper_arm_angle = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
+        upper_arm_angle = math.acos(min(1.0, max(-1.0, cos_upper_arm_angle)))
 
         elbow_direction = np.outer(np.cos(angles), up) + np.outer(np.sin(angles), side)
         # Frame 3: z along the upper arm, y normal to the triangle of shoulder, elbow and wrist.
-        z3 = math.cos(lift) * n + math.sin(lift) * elbow_direction
+        z3 = math.cos(upper_arm_angle) * n + math.sin(upper_arm_angle) * elbow_direction
         y3 = np.cross(n, elbow_direction)
         x3 = np.asarray(np.cross(y3, z3), dtype=np.float64)
         x4 = math.cos(q4) * x3 + math.sin(q4) * z3

@@ -90,7 +90,6 @@ def compute_min_time(change: Array, limits: JointLimits) -> Array:
     d, v, a, j = np.abs(change), limits.velocity, limits.acceleration, limits.jerk
     jerk_time = a / j  # [s] from zero to the maximum acceleration
     ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))  # [s] to maximum velocity
-    time_below_max_velocity = np.where(
-        d >= 2 * a * jerk_time**2, jerk_time + np.sqrt(jerk_time**2 + 4 * d / a), 4 * np.cbrt(d / 2 / j)
-    )
-    return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)
+    trapezoid_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)  # [s] if acceleration reaches its maximum
+    short_time = np.where(d >= 2 * a * jerk_time**2, trapezoid_time, 4 * np.cbrt(d / 2 / j))
+    return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, short_time), axis=-1)

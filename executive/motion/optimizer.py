@@ -78,10 +78,8 @@ class OptimizationProblem:
         count = qs.shape[1]
         displaced_qs = (qs[:, None] + _JOINT_DIFFERENCE * np.eye(count)).reshape(-1, count)
         displaced = self.kinematics.compute_tips_and_axes(displaced_qs)
-        displaced_tips, displaced_axes = (values.reshape(-1, count, 3) for values in displaced)
-        changes = self.clearance.compute_slack_changes(
-            tips, axes, self.discs, (displaced_tips, displaced_axes)
-        )
+        new_tips, new_axes = (values.reshape(-1, count, 3) for values in displaced)
+        changes = self.clearance.compute_slack_changes(tips, axes, self.discs, (new_tips, new_axes))
         gradients = changes / _JOINT_DIFFERENCE
         range_slack = self._compute_range_slack(qs)
         row, joint = np.arange(len(qs)), np.argmin(range_slack, axis=1)

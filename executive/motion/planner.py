@@ -26,7 +26,7 @@ from executive.motion.configurations import find_configuration_pairs
 from executive.motion.limits import JointLimits
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import NoProfile
-from executive.motion.search import Search
+from executive.motion.search import MotionSearch
 from executive.motion.trajectory import Trajectory, thin_out_path
 
 CollisionCheck = Callable[[Array, Task], None]
@@ -79,7 +79,9 @@ class Planner:
         find_configuration_pairs(self.kinematics, goal, length, np.zeros(self.limits.joint_count))
 
     def _plan(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
-        search = Search(self._config, self.kinematics, self.limits, start, end, _make_free_part_task(task))
+        search = MotionSearch(
+            self._config, self.kinematics, self.limits, start, end, _make_free_part_task(task)
+        )
         errors: list[str] = []
         for motion in search.list_motions():
             try:
@@ -93,7 +95,7 @@ class Planner:
         others = f"; all {len(errors)} motions that were tried are blocked" if len(errors) > 1 else ""
         raise Blocked(f"{errors[0]}{others}")
 
-    def _check_motion(self, motion: Trajectory, search: Search, task: Task) -> None:
+    def _check_motion(self, motion: Trajectory, search: MotionSearch, task: Task) -> None:
         """Check joint limits and collisions of a motion.
 
         Raises:

@@ -41,8 +41,8 @@ MIN_COSINE_DOWN = 0.99
 """Minimum cosine between the tool axis and straight down for a motion that begins with a rise."""
 
 
-class Search:
-    """Search for a motion between two joint configurations, or from one to a goal.
+class MotionSearch:
+    """Search for a motion between two joint configurations, or from a joint configuration to a goal.
 
     A motion consists of an optional straight departure upwards, a free part (joint motion), and an optional
     straight arrival downwards.
@@ -76,19 +76,13 @@ class Search:
             # Without a load, the tool may tilt: the arm must reach named poses from any configuration.
             self._discs = self._discs._replace(min_cosine=-1.0)
         self._payload = PayloadLimit(task.load, kinematics) if task.load else None
-        tips, axes = map(
-            np.concatenate,
-            zip(kinematics.compute_tips_and_axes(start[None]), self._find_free_end(), strict=True),
-        )
+        ends = kinematics.compute_tips_and_axes(start[None]), self._find_free_end()
+        tips, axes = map(np.concatenate, zip(*ends, strict=True))
         self._clearance = ClearanceModel(config, task.around, tips[:, :2])
         self._clearance.relax_end_margins(tips, axes, self._discs)
         self._rises: dict[tuple[float, bool], tuple[list[MotionPiece], JointState]] = {}
-        self._departure = self._plan_departure(start, float(tips[0, 2]))
-        self._start = (
-            self._departure.state_at(self._departure.duration)
-            if self._departure
-            else JointState.at_rest(start)
-        )
+        self._departure = departure = self._plan_departure(start, float(tips[0, 2]))
+        self._start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
 
     def list_motions(self) -> Iterator[Trajectory]:
         """Yield motions, the best first: direct and optimized motions, then motions that stop at corners."""
@@ -133,7 +127,7 @@ class Search:
         yield from (motion for _, motion in direct)
 
     def _sort_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterable[Trajectory]:
-        """Return the optimized motions to a candidate; with a load, in the order of their safe durations."""
+        """Return the optimized motions to a candidate; with a load, the fastest safe motion first."""
         motions, payload = self._list_optimized(candidate, optimizer), self._payload
         if payload is None:
             return motions
@@ -170,9 +164,8 @@ class Search:
                     continue
                 corners = self._connect_with_corners(candidate, EXTRA_HEIGHTS[0], is_straight=False)
                 duration = sum(piece.duration for piece in corners)
-                optimizer = Optimizer(
-                    problem, sample_pieces(corners, SAMPLE_FRACTIONS * duration).q, duration
-                )
+                qs = sample_pieces(corners, SAMPLE_FRACTIONS * duration).q
+                optimizer = Optimizer(problem, qs, duration)
                 optimizer.improve(INITIAL_STEP_COUNT)
                 optimizers.append((candidate, optimizer))
         direct.sort(key=lambda pair: pair[0])

@@ -45,9 +45,8 @@ class Trajectory:
         first, self._last = pieces[0].state_at(0.0), pieces[-1].state_at(pieces[-1].duration)
         self.start, self.end = first.q, self._last.q
         for number, (before, after) in enumerate(pairwise(pieces), start=1):
-            _require_equal(
-                before.state_at(before.duration), after.state_at(0.0), f"pieces {number} and {number + 1}"
-            )
+            states = before.state_at(before.duration), after.state_at(0.0)
+            _require_equal(*states, f"pieces {number} and {number + 1}")
         for state, end in ((first, "start"), (self._last, "end")):
             _require_equal(state, JointState.at_rest(state.q), f"rest and the {end} of a trajectory")
 
@@ -85,9 +84,8 @@ class Trajectory:
         # The samples are checked, because ruckig's `position_extrema` are too small if a joint turns back
         # (pantor/ruckig issue 215).
         _require_in_range(states.q, limits)
-        for name, peaks in zip(
-            ("velocity", "acceleration", "jerk"), compute_peak_fractions(states, limits), strict=True
-        ):
+        peak_fractions = compute_peak_fractions(states, limits)
+        for name, peaks in zip(("velocity", "acceleration", "jerk"), peak_fractions, strict=True):
             joint = int(np.argmax(peaks))
             if peaks[joint] > 1 + _ROUNDING_ERROR:
                 raise NoProfile(

@@ -26,7 +26,7 @@ from executive.events import Emit, discard_event
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.files import shipped_folder
-from executive.motion.arms import find_unsupported_arm
+from executive.motion.arms import find_arm_errors
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.localization import build_localizer
 
@@ -125,7 +125,7 @@ class FakeCell(CellWithoutHardware):
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
         """Return a finding for an unsupported arm, each place out of reach, and more objects than fit."""
         del base
-        if unsupported := tuple(find_unsupported_arm(config)):
+        if unsupported := tuple(find_arm_errors(config)):
             return unsupported
         problem = _describe_lack_of_room(config, config.table.objects[1])
         return (*find_places_out_of_reach(config), *([(("table", "objects"), problem)] if problem else []))

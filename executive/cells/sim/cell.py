@@ -28,7 +28,7 @@ from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.text.files import shipped_folder
-from executive.motion.arms import build_planner, find_unsupported_arm
+from executive.motion.arms import build_planner, find_arm_errors
 from executive.perception.detectors.registry import find_known_labels, find_problems
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.detectors.setting import ClosableDetector
@@ -118,7 +118,7 @@ class SimCell(CellWithoutHardware):
         Checked are the arm, the models, the detectors, the reach of the arm, the room for the objects, the
         clearance of the poses, and the view of the cameras.
         """
-        if unsupported := tuple(find_unsupported_arm(config)):
+        if unsupported := tuple(find_arm_errors(config)):
             return unsupported
         missing = tuple(find_missing_models(config))
         return (
