@@ -1,4 +1,4 @@
-"""Annotations of labelled images on disk, in COCO or YOLO format, checked before any image is read."""
+"""Reading of the annotations of labelled images, in COCO or YOLO format, without reading the images."""
 
 from __future__ import annotations
 
@@ -16,18 +16,23 @@ from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import MAX_QUOTED, InputError
 
 COCO_FILE_NAME = "_annotations.coco.json"
+"""Name of the file with the COCO annotations of a split."""
 YOLO_CLASS_FILES = ("data.yaml", "data.yml")
-"""Files that name the classes of a YOLO data set."""
+"""Permitted names of the file with the class names of a YOLO dataset."""
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp")
-"""Suffixes of images."""
-BOX_VALUES = 4
+"""Suffixes of the image files in a YOLO dataset."""
+BOX_VALUE_COUNT = 4
 """Number of values of a YOLO box: centre x, centre y, width and height."""
-MAX_OBJECTS = 1_000
-"""Largest number of labelled objects in an image; RF-DETR finds at most 300 (its number of queries)."""
-MAX_COCO_SIZE, MAX_LABEL_SIZE, MAX_CLASS_FILE_SIZE = 500_000_000, 10_000_000, 100_000
-"""Largest COCO file, YOLO label file and YOLO class file [byte]: the annotations of COCO 2017 have 470 MB."""
+MAX_OBJECT_COUNT = 1_000
+"""Maximum number of labelled objects in an image; RF-DETR detects at most 300 (its number of queries)."""
+MAX_COCO_FILE_SIZE = 500_000_000
+"""Maximum size of a COCO file [byte]; the largest annotation file of COCO 2017 has 470 MB."""
+MAX_LABEL_FILE_SIZE = 10_000_000
+"""Maximum size of the YOLO label file of an image [byte]."""
+MAX_CLASS_FILE_SIZE = 100_000
+"""Maximum size of a YOLO class file [byte]."""
 NORMALIZED_TOLERANCE = 1e-6
-"""Accepted amount by which a normalized coordinate may lie outside of 0 to 1, because of rounding."""
+"""Distance by which a normalized coordinate may lie outside of 0 to 1, because of rounding."""
 
 
 @dataclass
@@ -36,9 +41,9 @@ class ImageAnnotation:
 
     Attributes:
         labels: Class of each object.
-        boxes: Left, top, right and bottom of each object.
-        is_normalized: True if the boxes are in normalized coordinates (0 to 1); False if they are in pixels.
-        polygon_count: Number of boxes that were made from polygons.
+        boxes: Left, top, right and bottom of each object, [pixel] or normalized to 0 to 1.
+        is_normalized: True if the boxes are in normalized coordinates; False if they are in pixels.
+        polygon_count: Number of boxes that enclose an annotated polygon.
     """
 
     labels: list[str] = field(default_factory=list)
@@ -46,25 +51,25 @@ class ImageAnnotation:
     is_normalized: bool = False
     polygon_count: int = 0
 
-    def boxes_in_pixels(self, width: int, height: int) -> tuple[Box, ...]:
+    def to_pixel_boxes(self, width: int, height: int) -> tuple[Box, ...]:
         """Return the boxes in pixels for an image of `width` by `height` pixels."""
         x, y = (width, height) if self.is_normalized else (1, 1)
         return tuple((x0 * x, y0 * y, x1 * x, y1 * y) for x0, y0, x1, y1 in self.boxes)
 
-    def add(self, label: str, box: Box, place: str) -> None:
+    def add(self, label: str, box: Box, message_start: str) -> None:
         """Add an object.
 
         Raises:
-            InputError: The image has too many objects; the message begins with `place`.
+            InputError: The image has too many objects; the message begins with `message_start`.
         """
-        if len(self.labels) == MAX_OBJECTS:
-            raise InputError(f"{place} more than {MAX_OBJECTS} objects; divide the image")
+        if len(self.labels) == MAX_OBJECT_COUNT:
+            raise InputError(f"{message_start} more than {MAX_OBJECT_COUNT} objects; divide the image")
         self.labels.append(label)
         self.boxes.append(box)
 
 
 Annotations = Mapping[Path, ImageAnnotation]
-"""The annotations of a folder by image, sorted by path."""
+"""Annotations of a split by the path of the image, sorted by path."""
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
 ContentT = TypeVar("ContentT")
 
@@ -96,18 +101,18 @@ class _YoloClassFile(BaseModel):
 
 
 def is_split(folder: Path) -> bool:
-    """Return True if a folder holds labelled images."""
+    """Return True if a folder contains labelled images in COCO or YOLO format (one split of a dataset)."""
     return (folder / COCO_FILE_NAME).is_file() or (
         (folder / "images").is_dir() and (folder / "labels").is_dir()
     )
 
 
 def read_annotations(split: Path) -> Annotations:
-    """Return the annotations of a folder with one split of a data set.
+    """Return the annotations of one split of a dataset.
 
     Raises:
-        InputError: A file is damaged, or an image is missing or lies outside of the folder; the text names
-            the file and the line or the key.
+        InputError: A file is damaged, or an image is missing or lies outside of the folder; the message
+            names the file and the line or the key.
     """
     images = _read_coco(split) if (split / COCO_FILE_NAME).is_file() else _read_yolo(split)
     return dict(sorted(images, key=lambda image: str(image[0])))
@@ -115,38 +120,38 @@ def read_annotations(split: Path) -> Annotations:
 
 def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     file = split / COCO_FILE_NAME
-    content = parse_file(file, MAX_COCO_SIZE, lambda text: _CocoFile.model_validate_json(text))
+    content = parse_file(file, MAX_COCO_FILE_SIZE, _CocoFile.model_validate_json)
     names = {category.id: category.name for category in content.categories}
     objects = {image.id: ImageAnnotation() for image in content.images}
-    for what, values in (
+    for problem, values in (
         ("images have the same id", [image.id for image in content.images]),
         ("images have the same file_name", [split / image.file_name for image in content.images]),
         ("categories have the same id", [category.id for category in content.categories]),
     ):
         if len(set(values)) < len(values):
-            raise InputError(f"{file}: two {what}")
-    for number, one in enumerate(content.annotations):
-        if one.image_id not in objects:
-            raise InputError(f"{file}: annotations[{number}].image_id: there is no image {one.image_id}")
-        if one.category_id not in names:
-            raise InputError(
-                f"{file}: annotations[{number}].category_id: there is no category {one.category_id}; "
-                f"there are {', '.join(map(str, names))[:MAX_QUOTED] or 'none'}"
-            )
-        left, top, width, height = one.bbox
-        box, place = (left, top, left + width, top + height), f"{file}: annotations[{number}].image_id"
-        objects[one.image_id].add(names[one.category_id], box, f"{place}: image {one.image_id} has")
-    for number, image in enumerate(content.images):
-        path = _find_image(split, image.file_name, f"{file}: images[{number}].file_name")
+            raise InputError(f"{file}: two {problem}")
+    for index, entry in enumerate(content.annotations):
+        key, image_id, category = f"{file}: annotations[{index}]", entry.image_id, entry.category_id
+        if image_id not in objects:
+            raise InputError(f"{key}.image_id: there is no image {image_id}")
+        if category not in names:
+            known_ids = ", ".join(map(str, names))[:MAX_QUOTED] or "none"
+            raise InputError(f"{key}.category_id: there is no category {category}; there are {known_ids}")
+        left, top, width, height = entry.bbox
+        box = left, top, left + width, top + height
+        objects[image_id].add(names[category], box, f"{key}.image_id: image {image_id} has")
+    for index, image in enumerate(content.images):
+        path = _find_image(split, image.file_name, f"{file}: images[{index}].file_name")
         yield path, objects[image.id]
 
 
 def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
-    data = next((split.parent / name for name in YOLO_CLASS_FILES if (split.parent / name).is_file()), None)
-    if data is None:
-        raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO data set")
+    paths = (split.parent / name for name in YOLO_CLASS_FILES)
+    class_file = next((path for path in paths if path.is_file()), None)
+    if class_file is None:
+        raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO dataset")
     content = parse_file(
-        data,
+        class_file,
         MAX_CLASS_FILE_SIZE,
         lambda text: _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader)),
     )
@@ -159,11 +164,11 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
 
 
 def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
-    """Return the objects in the label file of a YOLO image; an image without a file has none."""
+    """Return the objects in the label file of a YOLO image; an image without a label file has none."""
     objects = ImageAnnotation(is_normalized=True)
     if not os.path.lexists(file):
         return objects
-    for number, line in enumerate(_read_text(file, MAX_LABEL_SIZE).splitlines(), start=1):
+    for number, line in enumerate(_read_text(file, MAX_LABEL_FILE_SIZE).splitlines(), start=1):
         if not line.strip():
             continue
         try:
@@ -174,13 +179,13 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
             raise InputError(f"{file}:{number}: there is no class {label}; there are {len(names)}") from None
         except ValueError:
             raise InputError(
-                f'{file}:{number}: a line has a class number and normalized coordinates, not "{line}"'
+                f'{file}:{number}: must be a class number and normalized coordinates, not "{line}"'
             ) from None
-        is_polygon = len(numbers) > BOX_VALUES and len(numbers) % 2 == 0
-        if len(numbers) != BOX_VALUES and not is_polygon:
+        is_polygon = len(numbers) > BOX_VALUE_COUNT and len(numbers) % 2 == 0
+        if len(numbers) != BOX_VALUE_COUNT and not is_polygon:
             raise InputError(
-                f"{file}:{number}: a box has {BOX_VALUES} values and a polygon at least 6, an even number, "
-                f"not {len(numbers)}"
+                f"{file}:{number}: a box has {BOX_VALUE_COUNT} values and a polygon an even number, at least "
+                f"6; this line has {len(numbers)}"
             )
         # The comparison is False for numbers that are not finite.
         if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in numbers):
@@ -196,27 +201,27 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
     return objects
 
 
-def _find_image(folder: Path, name: str, place: str) -> Path:
-    """Return the path of an image; `place` is the file and the key that list it, for error messages.
+def _find_image(folder: Path, name: str, source: str) -> Path:
+    """Return the path of an image; `source` is the file and the key that name it, for error messages.
 
     Raises:
         InputError: The image is missing, is not a regular file, or lies outside of the folder.
     """
     path = folder / name
     if not name or is_outside_path(name):
-        raise InputError(f'{place}: "{name}" is not below {folder}')
+        raise InputError(f'{source}: "{name}" is not below {folder}')
     if not os.path.isfile(path):
-        raise InputError(f'{place}: "{name}" is not a file in {folder}')
+        raise InputError(f'{source}: "{name}" is not a file in {folder}')
     if has_outside_link(folder, name):
-        raise InputError(f'{place}: "{name}" is a link to a file outside of {folder}')
+        raise InputError(f'{source}: "{name}" is a link to a file outside of {folder}')
     return path
 
 
 def _read_text(file: Path, max_size: int) -> str:
     if not os.path.isfile(file):
-        raise InputError(f"{file} is no file")
+        raise InputError(f"{file} is not a file")
     if file.stat().st_size > max_size:
-        raise InputError(f"{file} has more than {max_size / 1e6:g} MB, the limit of such a file")
+        raise InputError(f"{file} has more than {max_size / 1e6:g} MB, the maximum for this kind of file")
     try:
         return file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -227,8 +232,8 @@ def parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> C
     """Return the parsed content of a file of at most `max_size` [byte].
 
     Raises:
-        InputError: The file is too large, cannot be read, is not valid, or lacks a required key; the message
-        names the line or the key.
+        InputError: The file is too large, cannot be read, is invalid, or lacks a required key; the message
+            names the line or the key.
     """
     try:
         return parse(_read_text(file, max_size))
@@ -236,8 +241,8 @@ def parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> C
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise InputError(f"{file}:{line}: invalid YAML: {error.problem}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in first["loc"])
-        raise InputError(f"{file}: {keys.removeprefix('.') or 'content'}: {first['msg']}") from error
+        problem = error.errors()[0]
+        keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in problem["loc"])
+        raise InputError(f"{file}: {keys.removeprefix('.') or 'content'}: {problem['msg']}") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise InputError(f"{file} cannot be read: {error}") from error

@@ -1,8 +1,8 @@
-"""Labelled images on disk, in the two layouts that detectors are trained from.
+"""Writer of datasets of labelled images, in two layouts from which detectors are trained.
 
-`coco` is Roboflow's: `train|valid|test/_annotations.coco.json` beside the images. `yolo` is
-`data.yaml` with `train|valid|test/images` and `…/labels`. The caller writes the images
-(see `image_path`); the annotations are written once, at the end.
+Layout `coco` is that of Roboflow: `train|valid|test/_annotations.coco.json` beside the images. Layout `yolo`
+is `data.yaml` with `train|valid|test/images` and `…/labels`. The caller writes the images (see
+`build_image_path`), then all annotations with `write_annotations`.
 """
 
 from __future__ import annotations
@@ -22,22 +22,23 @@ from executive.cell.frame import Box
 from executive.errors import InputError
 
 SPLITS = ("train", "valid", "test")
-QUALITY = 95
-"""JPEG quality of the images."""
+"""Folders of a dataset."""
+JPEG_QUALITY = 95
+"""JPEG quality of the images, 0 to 100."""
 
 
 @dataclass(frozen=True)
 class DatasetEntry:
-    """What is known of one image of a dataset.
+    """Annotations of one image of a dataset.
 
     Attributes:
         split: `train`, `valid` or `test`.
         file: File name of the image.
         size: Width and height [pixel].
         labels: Class of each labelled object.
-        boxes: Their boxes, one to one.
+        boxes: Left, top, right and bottom [pixel] of each labelled object.
         ignored: Boxes of objects that are neither labelled nor background.
-        truth: Anything else worth keeping for measurements, as plain values.
+        truth: Further ground truth for measurements, as JSON values.
     """
 
     split: str
@@ -49,62 +50,62 @@ class DatasetEntry:
     truth: Mapping[str, Any] = field(default_factory=dict)
 
 
-def image_path(root: Path, layout: str, split: str, file: str) -> Path:
-    """Return where an image of a dataset belongs."""
+def build_image_path(root: Path, layout: str, split: str, file: str) -> Path:
+    """Return the path of an image of a dataset; `layout` is `coco` or `yolo`."""
     return root / split / file if layout == "coco" else root / split / "images" / file
 
 
 def save_image(path: Path, image: NDArray[np.uint8]) -> None:
-    """Write an RGB image `(H, W, 3)`.
+    """Write an RGB image `(H, W, 3)` and create its folder.
 
     Raises:
         InputError: The file cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(path), image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY]):
+    if not cv2.imwrite(str(path), image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]):
         raise InputError(f"the image {path} could not be written; is the disk full or the folder read-only?")
 
 
 def write_annotations(
     root: Path, layout: str, entries: Sequence[DatasetEntry], classes: Sequence[str]
 ) -> None:
-    """Write the annotations of a whole dataset, the classes numbered from 0 in the order given.
+    """Write the annotations of a dataset; the classes are numbered from 0 in the given order.
 
-    Beside them each split gets `ignored.json` (boxes by file, for measurements that must neither
-    demand nor punish them) and `truth.json` (the entries' `truth` by file).
+    Each split also gets `ignored.json` (`DatasetEntry.ignored` by file name: a measurement counts their
+    detections neither as right nor as wrong) and `truth.json` (`DatasetEntry.truth` by file name).
 
     Raises:
         InputError: The layout is unknown.
     """
     if layout not in ("coco", "yolo"):
-        raise InputError(f'the dataset layout "{layout}" is unknown; there are coco and yolo')
+        raise InputError(f'the dataset layout "{layout}" is unknown; use coco or yolo')
     root.mkdir(parents=True, exist_ok=True)
     splits = [split for split in SPLITS if any(entry.split == split for entry in entries)]
     for split in splits:
-        mine = [entry for entry in entries if entry.split == split]
+        split_entries = [entry for entry in entries if entry.split == split]
         if layout == "coco":
-            _write_json(root / split / "_annotations.coco.json", _coco(mine, classes))
+            _write_json(root / split / "_annotations.coco.json", _to_coco(split_entries, classes))
         else:
-            _write_yolo(root / split / "labels", mine, classes)
-        _write_json(root / split / "ignored.json", {entry.file: entry.ignored for entry in mine})
-        _write_json(root / split / "truth.json", {entry.file: entry.truth for entry in mine})
+            _write_yolo(root / split / "labels", split_entries, classes)
+        _write_json(root / split / "ignored.json", {entry.file: entry.ignored for entry in split_entries})
+        _write_json(root / split / "truth.json", {entry.file: entry.truth for entry in split_entries})
     if layout == "yolo":
         names = {"val" if split == "valid" else split: f"{split}/images" for split in splits}
         data = {"path": ".", **names, "nc": len(classes), "names": list(classes)}
         (root / "data.yaml").write_text(yaml.safe_dump(data, sort_keys=False))
 
 
-def _coco(entries: Sequence[DatasetEntry], classes: Sequence[str]) -> dict[str, Any]:
+def _to_coco(entries: Sequence[DatasetEntry], classes: Sequence[str]) -> dict[str, Any]:
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
-    for number, entry in enumerate(entries):
+    for image_id, entry in enumerate(entries):
         width, height = entry.size
-        images.append({"id": number, "file_name": entry.file, "width": width, "height": height})
+        images.append({"id": image_id, "file_name": entry.file, "width": width, "height": height})
         for label, (left, top, right, bottom) in zip(entry.labels, entry.boxes, strict=True):
             annotations.append(
                 {
                     "id": len(annotations) + 1,
-                    "image_id": number,
+                    "image_id": image_id,
                     "category_id": classes.index(label),
                     "bbox": [round(value, 3) for value in (left, top, right - left, bottom - top)],
                     "area": round((right - left) * (bottom - top), 3),

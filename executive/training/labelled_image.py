@@ -1,4 +1,4 @@
-"""Image with labelled objects, and what its renderer knows about it."""
+"""Image with labelled objects, and the ground truth of its renderer."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from executive.cell.frame import Box, Frame
 from executive.geometry import Array, Pose
 
 MIN_BORDER_DISTANCE = 0.5
-"""Distance from the border of the searched area [pixel] from which an object is wholly in view."""
+"""Minimum distance of a box from the border of the searched region [pixel] if its object is not truncated."""
 MIN_VISIBLE_FRACTION = 0.9
-"""Visible share of the silhouette from which an object is in full view."""
+"""Minimum visible fraction of the silhouette of an object that counts as fully visible."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,11 +27,11 @@ class LabelledImage:
         image: `(H, W, 3)` uint8, RGB.
         labels: Class of each object.
         boxes: Box of each object [pixel].
-        ignored: Boxes of objects that a detector may find or not.
-        truth: Further knowledge of the renderer: `camera`, `part`, `matrix`, `X_WC`, `positions`, …
-        area: Part of the image [pixel] that is searched and labelled; None: all of it.
+        ignored: Boxes of objects that may be detected or not; both are correct.
+        truth: Ground truth of the renderer: `camera`, `part`, `matrix`, `X_WC`, `positions`, …
+        region: Region of the image [pixel] that is searched and labelled; None: the whole image.
         depth: `(H, W)` [m], as in a `Frame`; None without a depth sensor.
-        second: Another image of the same scene from the same pose; None without one.
+        second_image: Image of the same scene from the same pose with other noise; None: there is none.
     """
 
     file: str
@@ -40,56 +40,56 @@ class LabelledImage:
     boxes: tuple[Box, ...]
     ignored: tuple[Box, ...] = ()
     truth: Mapping[str, Any] = field(default_factory=dict)
-    area: Box | None = None
+    region: Box | None = None
     depth: Array | None = None
-    second: NDArray[np.uint8] | None = None
+    second_image: NDArray[np.uint8] | None = None
 
-    def as_frame(self, number: int) -> Frame:
-        """Return the image as a frame of a camera that sees exactly this; with the true pose if known."""
+    def to_frame(self, frame_id: int) -> Frame:
+        """Return the image as a frame, with the true camera pose if known."""
         is_known = "matrix" in self.truth and "X_WC" in self.truth
         return Frame(
-            id=number,
+            id=frame_id,
             camera=str(self.truth.get("camera", "image")),
             image=self.image,
             depth=self.depth,
-            matrix=self._matrix() if is_known else np.eye(3),
+            matrix=self._compute_camera_matrix() if is_known else np.eye(3),
             X_WC=Pose.of(self.truth["X_WC"][:3], self.truth["X_WC"][3:]) if is_known else Pose.identity(),
             stamp=0.0,
             visible=np.ones(self.image.shape[:2], np.bool_),
             epoch=0,
         )
 
-    def is_whole(self, number: int) -> bool:
-        """Return True if an object lies wholly in the searched area."""
-        box, (left, top, right, bottom) = self.boxes[number], self.area or self._bounds
+    def is_fully_inside(self, index: int) -> bool:
+        """Return True if an object lies completely in the searched region."""
+        box, (left, top, right, bottom) = self.boxes[index], self.region or self._image_region
         distance = min(box[0] - left, box[1] - top, right - box[2], bottom - box[3])
         return distance >= MIN_BORDER_DISTANCE
 
-    def visible_fraction(self, number: int) -> float:
-        """Return the visible share of an object, 0 to 1; 1 if it is unknown."""
-        shares = self.truth.get("visible_fraction")
-        return 1.0 if shares is None else float(shares[number])
+    def get_visible_fraction(self, index: int) -> float:
+        """Return the visible fraction of an object, 0 to 1; 1 if it is unknown."""
+        fractions = self.truth.get("visible_fraction")
+        return 1.0 if fractions is None else float(fractions[index])
 
-    def is_in_full_view(self, number: int) -> bool:
-        """Return True if an object lies wholly in the searched area, and hardly anything hides it."""
-        return self.is_whole(number) and self.visible_fraction(number) >= MIN_VISIBLE_FRACTION
+    def is_fully_visible(self, index: int) -> bool:
+        """Return True if an object lies completely in the searched region and is hardly occluded."""
+        return self.is_fully_inside(index) and self.get_visible_fraction(index) >= MIN_VISIBLE_FRACTION
 
     @property
-    def pixel_size(self) -> Array:
-        """Width and height of the image's pixels `(2,)` in pixels of the camera's whole frame."""
-        _, _, width, height = self._bounds
-        left, top, right, bottom = self.truth.get("part", self._bounds)
+    def pixel_scale(self) -> Array:
+        """Pixels of the camera's full frame per pixel of this image, along x and y `(2,)`."""
+        _, _, width, height = self._image_region
+        left, top, right, bottom = self.truth.get("part", self._image_region)
         return np.array([(right - left) / width, (bottom - top) / height])
 
     @property
-    def _bounds(self) -> tuple[int, int, int, int]:
+    def _image_region(self) -> tuple[int, int, int, int]:
         height, width = self.image.shape[:2]
         return 0, 0, width, height
 
-    def _matrix(self) -> Array:
-        """Return the camera matrix of the part of the camera's image that this image shows."""
+    def _compute_camera_matrix(self) -> Array:
+        """Return the camera matrix of this image, which may be a scaled part of the camera's frame."""
         left, top, *_ = self.truth.get("part", (0, 0))
-        shifted = np.array(self.truth["matrix"], dtype=float)
-        shifted[:2, 2] -= left, top
-        shifted[:2] /= self.pixel_size[:, None]
-        return shifted
+        matrix = np.array(self.truth["matrix"], dtype=float)
+        matrix[:2, 2] -= left, top
+        matrix[:2] /= self.pixel_scale[:, None]
+        return matrix

@@ -20,7 +20,7 @@ from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
 from executive.errors import InputError
 from executive.geometry import Array
 from executive.processes import Workers
-from executive.training.dataset import DatasetEntry, image_path, save_image, write_annotations
+from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.labelled_image import LabelledImage
 
 T = TypeVar("T")
@@ -136,7 +136,7 @@ def _render_block(
     entries = {}
     for number, camera, sample in _draw(cells, seed, numbers):
         split, file = "train" if number < first_valid else "valid", f"{camera}_{number:06d}.jpg"
-        save_image(image_path(out, layout, split, file), sample.image)
+        save_image(build_image_path(out, layout, split, file), sample.image)
         entries[number] = _entry(sample, split, file, camera)
     return entries
 
@@ -178,9 +178,9 @@ def as_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
         boxes=_boxes(sample.boxes * scale + corner),
         ignored=_boxes(sample.ignored * scale + corner),
         truth=_truth(sample, camera, (0, 0, width, height)),
-        area=sample.part,
+        region=sample.part,
         depth=sample.depth,
-        second=sample.second,
+        second_image=sample.second,
     )
 
 

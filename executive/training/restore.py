@@ -15,8 +15,8 @@ from onnx import numpy_helper
 
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.training.architecture import ARCHITECTURE, create
-from executive.training.compress import export
+from executive.training.architecture import ARCHITECTURE, create_model
+from executive.training.compress import export_model
 
 CLASS_BIAS = "class_embed.bias"
 """Name of the bias with one element for each class and one for "no object"."""
@@ -39,13 +39,13 @@ def restore(model: Path) -> Any:
     """
     stored = _read_weights(onnx.load(str(model)))
     # The last of the outputs stands for "no object".
-    detector = create(len(stored.get(CLASS_BIAS, [0])) - 1)
+    detector = create_model(len(stored.get(CLASS_BIAS, [0])) - 1)
     state = detector.model.model.state_dict()
     for tensor in state.values():
         if tensor.is_floating_point():
             tensor.normal_()
     with tempfile.TemporaryDirectory() as folder:
-        exported = export(detector, Path(folder))
+        exported = export_model(detector, Path(folder))
     for initializer in exported.graph.initializer:
         name, values = initializer.name, numpy_helper.to_array(initializer)
         if name not in stored or stored[name].shape != values.shape:

@@ -8,7 +8,7 @@ import pytorch_lightning
 import torch
 from rfdetr.training import build_trainer
 
-from executive.training.architecture import create
+from executive.training.architecture import create_model
 from executive.training.lightning import Model, SymmetricData
 from executive.training.report import Report
 from executive.training.restore import restore
@@ -31,7 +31,7 @@ def fit(
     rate = settings.rate or learning_rate(start, labels)
     if start is not None and start.suffix == ".onnx":
         start = _as_checkpoint(start, out)
-    detector = create(len(labels), start, "cuda" if cuda else "cpu")
+    detector = create_model(len(labels), start, "cuda" if cuda else "cpu")
     config = detector.get_train_config(
         dataset_dir=str(dataset),
         output_dir=str(out),

@@ -14,7 +14,7 @@ from pydantic import TypeAdapter
 from executive.errors import InputError
 from executive.training.annotations import (
     COCO_FILE_NAME,
-    MAX_COCO_SIZE,
+    MAX_COCO_FILE_SIZE,
     is_split,
     parse_file,
     read_annotations,
@@ -61,7 +61,7 @@ class Samples:
                 path.name,
                 image,
                 tuple(annotation.labels),
-                annotation.boxes_in_pixels(image.shape[1], image.shape[0]),
+                annotation.to_pixel_boxes(image.shape[1], image.shape[0]),
                 tuple(map(tuple, ignored.get(path.name, ()))),
                 truth.get(path.name, {}),
             )
@@ -101,4 +101,4 @@ def _split(folder: Path) -> Path:
 def _read_json(path: Path) -> dict[str, Any]:
     """Return the object in a file with a key for each image; empty without a file."""
     read = TypeAdapter(dict[str, Any]).validate_json
-    return parse_file(path, MAX_COCO_SIZE, read) if path.is_file() else {}
+    return parse_file(path, MAX_COCO_FILE_SIZE, read) if path.is_file() else {}

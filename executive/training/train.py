@@ -72,9 +72,9 @@ def train(
     start, rate = settings.start, settings.rate
     _check(dataset, start)
     try:
-        from executive.training.architecture import declare_missing, describe
+        from executive.training.architecture import declare_missing_operators, describe_architecture
 
-        declare_missing()
+        declare_missing_operators()
         from executive.training.compress import export_onnx
         from executive.training.run import fit
     except ImportError as error:
@@ -90,7 +90,7 @@ def train(
         title=f"Small RF-DETR trained on {dataset.name}",
         summary=f"Finds {', '.join(read_labels(labels))} in square images.",
         settings={
-            **describe(),
+            **describe_architecture(),
             "start": "random weights" if start is None else start.name,
             **({} if rate is None else {"learning rate": f"{rate:g}"}),
             "epochs": str(settings.epochs),

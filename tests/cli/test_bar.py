@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from executive.cli.main import main
 from executive.cli.progress import bar
-from executive.training.dataset import DatasetEntry, image_path, save_image, write_annotations
+from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 
 FAKE = ("--set", "cell.kind=fake")
 
@@ -72,7 +72,7 @@ def grey(tmp_path: Path) -> Path:
     root = tmp_path / "grey"
     entries = [DatasetEntry("test", f"{name}.jpg", (160, 120), (), ()) for name in "ab"]
     for entry in entries:
-        save_image(image_path(root, "coco", "test", entry.file), np.full((120, 160, 3), 128, np.uint8))
+        save_image(build_image_path(root, "coco", "test", entry.file), np.full((120, 160, 3), 128, np.uint8))
     write_annotations(root, "coco", entries, ("cube", "sphere", "duck"))
     return root
 

@@ -12,14 +12,14 @@ from click.testing import CliRunner
 from executive.cli.main import main
 from executive.perception.detectors.embedded import LABELS, MODEL
 from executive.perception.envelope.measurement import StoredErrorRates, read_measurements
-from executive.training.dataset import DatasetEntry, image_path, save_image, write_annotations
+from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 
 
 @pytest.fixture
 def dataset(tmp_path, monkeypatch):
     """A labelled image with an object that nobody can find: it is all grey."""
     root = tmp_path / "grey"
-    save_image(image_path(root, "coco", "test", "a.jpg"), np.full((120, 160, 3), 128, np.uint8))
+    save_image(build_image_path(root, "coco", "test", "a.jpg"), np.full((120, 160, 3), 128, np.uint8))
     entry = DatasetEntry("test", "a.jpg", (160, 120), ("cube",), ((10.0, 10.0, 60.0, 60.0),))
     write_annotations(root, "coco", [entry], ("cube", "sphere", "duck"))
     monkeypatch.chdir(tmp_path)

@@ -129,7 +129,7 @@ def test_boxes_and_polygons_of_yolo_are_read(yolo: Callable[..., Path]) -> None:
     split = yolo("1 0.5 0.5 0.2 0.4\n\n0 0.1 0.1 0.3 0.1 0.3 0.2\n")
     (annotation,) = read_annotations(split).values()
     assert annotation.labels == ["cube", "duck"]
-    box, polygon = annotation.boxes_in_pixels(100, 200)
+    box, polygon = annotation.to_pixel_boxes(100, 200)
     assert box == pytest.approx((40, 60, 60, 140))
     assert polygon == pytest.approx((10, 20, 30, 40))
     assert Samples(split).polygon_count == 1
@@ -143,9 +143,9 @@ def test_boxes_and_polygons_of_yolo_are_read(yolo: Callable[..., Path]) -> None:
         (
             "duck 0.5 0.5 0.2 0.4\n",
             "names: [duck]\n",
-            "labels/a.txt:1: a line has a class number and normalized",
+            "labels/a.txt:1: must be a class number and normalized",
         ),
-        ("0 0.5 0.5 0.2\n", "names: [duck]\n", "labels/a.txt:1: a box has 4 values and a polygon at least 6"),
+        ("0 0.5 0.5 0.2\n", "names: [duck]\n", "labels/a.txt:1: a box has 4 values and a polygon an even"),
         ("0 0.5 0.5 0.2 0.1 0.1\n", "names: [duck]\n", "labels/a.txt:1: a box has 4 values and a polygon"),
         ("0 0.5 0.5 nan 0.4\n", "names: [duck]\n", "labels/a.txt:1: coordinates must be normalized (0 to 1)"),
         (

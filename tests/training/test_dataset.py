@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from executive.errors import InputError
-from executive.training.dataset import DatasetEntry, image_path, save_image, write_annotations
+from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.samples import Samples
 
 CLASSES = ("cube", "duck")
@@ -26,7 +26,7 @@ def root(request, tmp_path):
     """A data set in one of the layouts, its images all red."""
     for entry in ENTRIES:
         image = np.full((64, 128, 3), (200, 10, 10), np.uint8)
-        save_image(image_path(tmp_path, request.param, entry.split, entry.file), image)
+        save_image(build_image_path(tmp_path, request.param, entry.split, entry.file), image)
     write_annotations(tmp_path, request.param, ENTRIES, CLASSES)
     return tmp_path
 
@@ -67,7 +67,7 @@ def test_the_images_that_no_training_used_are_read_as_they_were_written(root):
 
 
 def test_what_cannot_be_written_or_read_is_explained(tmp_path):
-    with pytest.raises(InputError, match='"voc" is unknown; there are coco and yolo'):
+    with pytest.raises(InputError, match='"voc" is unknown; use coco or yolo'):
         write_annotations(tmp_path, "voc", ENTRIES, CLASSES)
     with pytest.raises(InputError, match=r"no labelled images: _annotations\.coco\.json"):
         Samples(tmp_path)

@@ -76,10 +76,10 @@ def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):
     import onnxruntime
 
     from executive.perception.detectors.embedded import MODEL
-    from executive.training.compress import export
+    from executive.training.compress import export_model
     from executive.training.restore import restore
 
-    onnx.save(export(restore(MODEL), tmp_path), str(tmp_path / "again.onnx"))
+    onnx.save(export_model(restore(MODEL), tmp_path), str(tmp_path / "again.onnx"))
     image = np.random.default_rng(0).normal(size=(1, 3, 256, 256)).astype(np.float32)
     first, again = (onnxruntime.InferenceSession(str(path)) for path in (MODEL, tmp_path / "again.onnx"))
     (name,) = (one.name for one in first.get_inputs())
@@ -109,7 +109,7 @@ def test_narrow_weights_are_smaller_and_give_nearly_the_same_outputs():
     onnx = pytest.importorskip("onnx")
     import onnxruntime
 
-    from executive.training.compress import compress
+    from executive.training.compress import compress_weights
 
     rng = np.random.default_rng(0)
     weights = {"wide": (64, 128), "transposed": (32, 128), "added": (64, 32)}
@@ -129,7 +129,7 @@ def test_narrow_weights_are_smaller_and_give_nearly_the_same_outputs():
         ],
     )
     model = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=10)
-    small = compress(model)
+    small = compress_weights(model)
     stored = {one.name: one.data_type for one in small.graph.initializer}
     kinds = onnx.TensorProto
     assert (stored["wide_int8"], stored["transposed_int8"], stored["added_half"]) == (

@@ -56,7 +56,7 @@ def evaluate(
     answered: Counter[str] = Counter()
     unavailable, why = 0, ""
     for number, sample in enumerate(samples, 1):
-        frame = sample.as_frame(number)
+        frame = sample.to_frame(number)
         try:
             answer, latency = detector.ask(frame)
         except Unavailable as error:
@@ -68,9 +68,9 @@ def evaluate(
         min_confidence = answer.error_rates.threshold if threshold is None else threshold
         matches = _match(answer, sample, min_confidence)
         tally.add(matches, sample, frame)
-        if sample.second is not None:
+        if sample.second_image is not None:
             with contextlib.suppress(Unavailable):
-                second, _ = detector.ask(replace(frame, image=sample.second))
+                second, _ = detector.ask(replace(frame, image=sample.second_image))
                 repeats.add(matches, _match(second, sample, min_confidence), sample, frame)
         if table is not None and (statistics := measure_frame(frame, table)):
             frames.append(statistics)

@@ -83,8 +83,8 @@ def misses(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Miss]
     taken = {one.number for one in matches}
     for number, label in enumerate(sample.labels):
         if number not in taken:
-            share = sample.visible_fraction(number)
-            cut = "" if sample.is_whole(number) else ", cut off"
+            share = sample.get_visible_fraction(number)
+            cut = "" if sample.is_fully_inside(number) else ", cut off"
             showing = "" if share >= 0.995 else f", {share:.0%} visible"
             text = f"{label} overlooked{showing}{cut}"
             yield Miss(share / (2 if cut else 1), text, sample.boxes[number], sample, found)

@@ -51,7 +51,7 @@ class Tally:
         for number, label in enumerate(sample.labels):
             one = taken.get(number)
             self.confusion[label, one.detection.label if one else NOTHING] += 1
-            if sample.is_in_full_view(number) and (one or not is_covered(number, matches, sample)):
+            if sample.is_fully_visible(number) and (one or not is_covered(number, matches, sample)):
                 is_confused = one is not None and not one.right
                 counts.update(objects=1, missed=one is None, confused=is_confused)
             if one is not None and one.right:
@@ -116,9 +116,9 @@ class Tally:
     def _measure(self, one: BoxMatch, number: int, sample: LabelledImage, frame: Frame) -> None:
         """Measure the distance of a right detection from the object `number`."""
         self.centre.append(float(np.hypot(*one.offset)))
-        if sample.is_in_full_view(number):
-            self._squares += ((one.offset * sample.pixel_size) ** 2).tolist()
-        if not sample.is_whole(number):
+        if sample.is_fully_visible(number):
+            self._squares += ((one.offset * sample.pixel_scale) ** 2).tolist()
+        if not sample.is_fully_inside(number):
             return
         if "positions" in sample.truth:
             true = np.array(sample.truth["positions"][number])
@@ -159,7 +159,7 @@ class RepeatedErrors:
         before = {one.number: one for one in first if one.number is not None}
         after = {one.number: one for one in second if one.number is not None}
         for number, label in enumerate(sample.labels):
-            if not sample.is_in_full_view(number):
+            if not sample.is_fully_visible(number):
                 continue
             one, other = before.get(number), after.get(number)
             if one is None and is_covered(number, first, sample):
@@ -194,7 +194,7 @@ class RepeatedErrors:
     def _compare(self, one: BoxMatch, other: BoxMatch, sample: LabelledImage, frame: Frame) -> None:
         """Compare the boxes and positions of one object in both looks."""
         assert one.number is not None
-        difference = (one.offset - other.offset) * sample.pixel_size
+        difference = (one.offset - other.offset) * sample.pixel_scale
         self._random += (difference**2 / 2).tolist()
         if self._localizer is None or "centres" not in sample.truth:
             return

@@ -194,7 +194,7 @@ def test_a_frame_is_the_cameras_whole_image_labelled_where_a_run_searches_it(ove
     config = overhead.model_copy(update={"cameras": {"overhead": camera}})
     (drawn,) = samples(config, range(3, 4), randomized=False)
     frame = as_labelled_frame(drawn, "overhead", "a")
-    left, top, right, bottom = frame.area or ()
+    left, top, right, bottom = frame.region or ()
     assert frame.image.shape == (480, 640, 3)
     twice = as_labelled_frame(replace(drawn, part=(10, 20, 522, 532)), "overhead", "a")
     assert twice.boxes == pytest.approx(drawn.boxes * 2 + [10, 20, 10, 20])

@@ -63,7 +63,7 @@ def build(monkeypatch):
 
 @pytest.fixture
 def frame(sample):
-    return sample.as_frame(1)
+    return sample.to_frame(1)
 
 
 def test_an_answer_is_waited_for_on_the_clock(build, frame):

@@ -98,7 +98,7 @@ def test_what_is_cut_off_or_half_hidden_says_nothing_about_position_and_rates(sa
     cut = replace(sample, labels=("cube",), boxes=(at_edge,))
     measured = evaluate(saying([("cube", 0.9, at_edge)]), [cut])
     assert (measured.centre.worst, measured.position, counts(measured)[0]) == (0, None, (0, 0))
-    assert counts(evaluate(saying(both), [replace(sample, area=(10, 0, 256, 256))]))[0] == (0, 1)
+    assert counts(evaluate(saying(both), [replace(sample, region=(10, 0, 256, 256))]))[0] == (0, 1)
     hidden = evaluate(saying(both[1:]), [knowing(visible_fraction=[0.6, 1.0])])
     assert (hidden.recall, counts(hidden)[0]) == (0.5, (0, 1))
 
