@@ -38,7 +38,7 @@ from executive.training.evaluation.evaluate import (
 from executive.training.evaluation.figures import NOTHING, Evaluation
 from executive.training.evaluation.misses import WorstMisses
 from executive.training.labelled_image import LabelledImage
-from executive.training.rendering import generate, run_frames
+from executive.training.rendering import generate_dataset, render_run_frames
 from executive.training.samples import Samples
 
 MAX_OBJECT_COUNT = 20
@@ -182,16 +182,16 @@ def _open_images(
     elif scenes.is_varied:
         with tempfile.TemporaryDirectory() as folder:
             with progress(f"rendering {config.cell}") as update:
-                generate(
+                generate_dataset(
                     {config.cell: config}, Path(folder), images=scenes.image_count, seed=scenes.seed,
-                    layout="coco", workers=scenes.workers, valid=1.0, progress=update,
+                    layout="coco", workers=scenes.workers, valid_fraction=1.0, progress=update,
                 )  # fmt: skip
             yield Samples(Path(folder))
     else:
         table = {"objects": (0, find_max_count(config, MAX_OBJECT_COUNT))}
         limited_config = config.model_copy(update={"table": config.table.model_copy(update=table)})
         with progress(f"rendering {config.cell}") as update:
-            frames = run_frames(
+            frames = render_run_frames(
                 limited_config, images=scenes.image_count, seed=scenes.seed, workers=scenes.workers,
                 progress=update, scene=load_scene(scenes.scene, config),
             )  # fmt: skip

@@ -28,12 +28,12 @@ def command(
     with stdout_kept_clean():
         from executive.cli.cells import load_cells
         from executive.cli.progress import bar
-        from executive.training.rendering import generate
+        from executive.training.rendering import generate_dataset
 
         configs = load_cells(cells)
         with bar("rendering") as progress:
-            generate(
-                configs, out, images=images, seed=seed, layout=layout, workers=workers, valid=valid,
+            generate_dataset(
+                configs, out, images=images, seed=seed, layout=layout, workers=workers, valid_fraction=valid,
                 progress=progress,
             )  # fmt: skip
         click.echo(f"{images} images in {out}", err=True)

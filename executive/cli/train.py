@@ -32,10 +32,10 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
     """Train the small RF-DETR; needs the extra `train`, about 3 GB to download on Linux."""
     with stdout_kept_clean():
         from executive.cli.progress import bar, report_polygons
-        from executive.training.samples import splits_of
+        from executive.training.samples import list_splits
         from executive.training.train import Settings, train
 
-        for split in splits_of(dataset):
+        for split in list_splits(dataset):
             report_polygons(split)
         with bar("training") as batches:
             train(dataset, out, Settings(start, rate, epochs, seed), _epoch_printer(epochs), batches)

@@ -1,4 +1,4 @@
-"""Changes to RF-DETR's training loop: augmentation by symmetries, and mixed precision on CPUs."""
+"""Extensions of RF-DETR's training loop: augmentation by symmetries, and mixed precision on CPUs."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import torch
 from rfdetr.training import RFDETRDataModule, RFDETRModelModule
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
-from executive.training.symmetry import ELEMENTS, transform_boxes, transform_image
+from executive.training.symmetry import SYMMETRY_COUNT, transform_boxes, transform_image
 
 
-class SymmetricData(RFDETRDataModule):
-    """Data set whose training images are transformed by random symmetries of the square.
+class SymmetryAugmentedData(RFDETRDataModule):
+    """Dataset whose training images are transformed by random symmetries of the square.
 
-    The cameras look straight down, so that each of the eight symmetries gives a possible image. No pixel is
-    resampled, so that the boxes stay exact.
+    The cameras look straight down, so that each of the eight symmetries gives a possible image. Pixels are
+    not resampled, so that the boxes stay exact.
     """
 
     def on_after_batch_transfer(self, batch: tuple[Any, Any], dataloader_idx: int) -> tuple[Any, Any]:
@@ -23,55 +23,54 @@ class SymmetricData(RFDETRDataModule):
         samples, targets = super().on_after_batch_transfer(batch, dataloader_idx)
         if self.trainer is None or not self.trainer.training:
             return samples, targets
-        elements = torch.randint(ELEMENTS, (len(targets),)).tolist()
-        for image, target, element in zip(samples.tensors, targets, elements, strict=True):
-            image.copy_(transform_image(image, element))
-            target["boxes"] = transform_boxes(target["boxes"], element)
+        symmetries = torch.randint(SYMMETRY_COUNT, (len(targets),)).tolist()
+        for image, target, symmetry in zip(samples.tensors, targets, symmetries, strict=True):
+            image.copy_(transform_image(image, symmetry))
+            target["boxes"] = transform_boxes(target["boxes"], symmetry)
         return samples, targets
 
 
-class Model(RFDETRModelModule):
+class MixedPrecisionModel(RFDETRModelModule):
     """RF-DETR's training module with mixed precision on CPUs.
 
-    On CPUs with bfloat16, its matrix products are two and a half times as fast as in float32. Losses,
-    matching and
-    reference boxes stay in float32: with a mantissa of eight bits, boxes would be rounded to a pixel.
+    On CPUs with bfloat16, matrix products are two and a half times as fast as in float32. Losses, matching
+    and reference boxes stay in float32: with a mantissa of eight bits, boxes would be rounded to a pixel.
 
     Args:
         model_config: RF-DETR's configuration of the model.
         train_config: RF-DETR's configuration of the training.
-        reduced: True to train in mixed precision.
+        is_mixed: True: train in mixed precision; False: train in float32.
     """
 
-    def __init__(self, model_config: Any, train_config: Any, reduced: bool) -> None:
+    def __init__(self, model_config: Any, train_config: Any, is_mixed: bool) -> None:
         super().__init__(model_config, train_config)
-        self._reduced = reduced
-        # The decoder's reference boxes get the number type of the encoder's features.
+        self._is_mixed = is_mixed
+        # The decoder's reference boxes get the data type of the encoder's features.
         self.model.backbone[0].projector.register_forward_hook(
-            lambda _module, _inputs, output: in_float32(output)
+            lambda _module, _inputs, output: to_float32(output)
         )
 
     def training_step(self, batch: tuple[Any, Any], batch_idx: int) -> Any:
-        """Return the loss of one batch."""
-        if not self._reduced:
+        """Return the loss of a batch."""
+        if not self._is_mixed:
             return super().training_step(batch, batch_idx)
         samples, targets = batch
-        # The fused attention kernel's backward pass is slower in bfloat16 than the plain products.
+        # In bfloat16, the backward pass of the fused attention kernel is slower than plain matrix products.
         with torch.autocast("cpu", torch.bfloat16), sdpa_kernel(SDPBackend.MATH):
             outputs = self.model(samples, targets)
-        losses = self.criterion(in_float32(outputs), targets)
+        losses = self.criterion(to_float32(outputs), targets)
         weights = self.criterion.weight_dict
         loss = torch.stack([losses[name] * weights[name] for name in losses if name in weights]).sum()
         self.log("train/loss", loss, on_epoch=True, on_step=False, batch_size=len(targets))
         return loss
 
 
-def in_float32(value: Any) -> Any:
-    """Return a tensor, or nested lists and mappings of tensors, with floating-point tensors as float32."""
+def to_float32(value: Any) -> Any:
+    """Return a tensor, or a nested list or mapping of tensors, with all floating-point tensors as float32."""
     if isinstance(value, torch.Tensor):
         return value.float() if value.is_floating_point() else value
     if isinstance(value, dict):
-        return {key: in_float32(item) for key, item in value.items()}
+        return {key: to_float32(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return type(value)(in_float32(item) for item in value)
+        return type(value)(to_float32(item) for item in value)
     return value

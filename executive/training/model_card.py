@@ -1,4 +1,4 @@
-"""Card of a trained model: its settings, its accuracy and the course of its training."""
+"""Card of a trained model: its settings, its accuracy and the metrics of every epoch."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from executive.training.evaluation.figures import Evaluation, Spread
+from executive.training.evaluation.figures import Distribution, Evaluation
 
 EPOCH_COLUMNS = {
     "train/loss": "loss",
@@ -15,22 +15,22 @@ EPOCH_COLUMNS = {
     "val/precision": "precision",
     "val/recall": "recall",
 }
-"""Columns of the trainer's `metrics.csv` that a card shows, with their headings."""
+"""Columns of the trainer's `metrics.csv` that a card shows: name of the column, then heading."""
 
-FIGURES = {
+METRIC_COLUMNS = {
     "images": ("images", "{}"), "objects": ("objects", "{}"),
     "precision": ("precision", "{:.4f}"), "recall": ("recall", "{:.4f}"),
     "mAP50": ("map50", "{:.4f}"), "mAP50-95": ("map50_95", "{:.4f}"),
 }  # fmt: skip
-"""Figures of an evaluation that a card shows: heading, then name and format."""
+"""Metrics of an evaluation that a card shows: heading, then attribute of `Evaluation` and format."""
 
 
-def write_card(
+def render_card(
     title: str,
     summary: str,
     settings: Mapping[str, str],
     epochs: Sequence[Mapping[str, float]],
-    measured: Mapping[str, Evaluation],
+    evaluations: Mapping[str, Evaluation],
 ) -> str:
     """Return the card of a model as Markdown.
 
@@ -38,51 +38,51 @@ def write_card(
         title: Name of the model.
         summary: Purpose of the model, one or two sentences.
         settings: Settings of the training by name.
-        epochs: Figures of each epoch, by the names of `EPOCH_COLUMNS`.
-        measured: Measurements of the model by the name of the images.
+        epochs: Metrics of each epoch, by the keys of `EPOCH_COLUMNS`.
+        evaluations: Evaluations of the model by the name of the dataset.
     """
-    blocks = [f"# {title}", summary, _table(("setting", "value"), list(settings.items()))]
-    if measured:
-        confidences = ", ".join(f"{one:g}" for one in sorted({one.threshold for one in measured.values()}))
+    blocks = [f"# {title}", summary, _render_table(("setting", "value"), list(settings.items()))]
+    if evaluations:
+        thresholds = sorted({evaluation.threshold for evaluation in evaluations.values()})
         rows = [
             (
-                where,
-                *(form.format(getattr(one, name)) for name, form in FIGURES.values()),
-                _spread(one.centre),
-                _spread(one.position),
+                dataset,
+                *(form.format(getattr(evaluation, name)) for name, form in METRIC_COLUMNS.values()),
+                _format_distribution(evaluation.centre),
+                _format_distribution(evaluation.position),
             )
-            for where, one in measured.items()
+            for dataset, evaluation in evaluations.items()
         ]
         blocks += [
-            "## Measured",
-            f"Precision and recall at confidence {confidences} and an overlap of 0.5. Centre and position: "
-            "how far the centre of a found box lies from the true one's, in the image and in the world at "
-            "the object's height; median / 95 % / 99 %.",
-            _table(("on", *FIGURES, "centre [px]", "position [mm]"), rows),
+            "## Accuracy",
+            f"Precision and recall at confidence {', '.join(f'{one:g}' for one in thresholds)} and IoU 0.5. "
+            "Centre and position: distance between the centres of the detected and the true box, in the "
+            "image and in the world at the height of the object; median / 95 % / 99 %.",
+            _render_table(("dataset", *METRIC_COLUMNS, "centre [px]", "position [mm]"), rows),
         ]
     if epochs:
-        figures = [
-            (str(number), *(f"{row[name]:.4f}" if name in row else "" for name in EPOCH_COLUMNS))
-            for number, row in enumerate(epochs, 1)
+        epoch_rows = [
+            (str(number), *(f"{epoch[name]:.4f}" if name in epoch else "" for name in EPOCH_COLUMNS))
+            for number, epoch in enumerate(epochs, 1)
         ]
-        blocks += ["## Training", _table(("epoch", *EPOCH_COLUMNS.values()), figures)]
+        blocks += ["## Training", _render_table(("epoch", *EPOCH_COLUMNS.values()), epoch_rows)]
     return "\n\n".join(blocks) + "\n"
 
 
-def read_epochs(metrics: Path) -> list[dict[str, float]]:
-    """Return the figures of every epoch in a trainer's `metrics.csv`, which spreads one over several rows."""
+def read_epochs(metrics_file: Path) -> list[dict[str, float]]:
+    """Return the metrics of every epoch from a `metrics.csv`, which has several rows per epoch."""
     epochs: dict[int, dict[str, float]] = {}
-    with metrics.open(encoding="utf-8", newline="") as file:
+    with metrics_file.open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
-            figures = epochs.setdefault(int(row["epoch"]), {})
-            figures.update({name: float(row[name]) for name in EPOCH_COLUMNS if row.get(name)})
+            epoch = epochs.setdefault(int(row["epoch"]), {})
+            epoch.update({name: float(row[name]) for name in EPOCH_COLUMNS if row.get(name)})
     return [epochs[number] for number in sorted(epochs)]
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+def _render_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
-def _spread(spread: Spread | None) -> str:
-    return "" if spread is None else f"{spread.median:.2f} / {spread.p95:.2f} / {spread.p99:.2f}"
+def _format_distribution(errors: Distribution | None) -> str:
+    return "" if errors is None else f"{errors.median:.2f} / {errors.p95:.2f} / {errors.p99:.2f}"

@@ -1,4 +1,4 @@
-"""Data sets and frames of labelled scenes: rendered in parallel, the same for any number of workers."""
+"""Rendering of labelled images in parallel; the number of processes does not change the images."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from executive.processes import Workers
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.labelled_image import LabelledImage
 
-T = TypeVar("T")
+ItemT = TypeVar("ItemT")
 Progress = Callable[[int, int], None]
-"""Takes the number of images made so far, and of all."""
-BLOCK = 40
-"""Number of samples that a worker makes before it reports, with one world per cell."""
+"""Callback with the number of finished images and of all images."""
+BLOCK_SIZE = 40
+"""Number of images per task of a worker process, which builds one world per cell and task."""
 
 
-def generate(
+def generate_dataset(
     configs: Mapping[str, CellConfig],
     out: Path,
     *,
@@ -38,24 +38,24 @@ def generate(
     seed: int,
     layout: str,
     workers: int,
-    valid: float,
+    valid_fraction: float,
     progress: Progress,
 ) -> None:
-    """Write a dataset of random scenes, the cells taking turns; the last share of it is for validation.
+    """Write a dataset of random scenes of all cells in turn; the last images are for validation.
 
     Args:
         configs: Cells by name.
         out: Folder of the dataset.
         images: Number of images.
-        seed: Seed; with the same cells it gives the same dataset for any number of workers.
+        seed: Seed; the dataset is a function of the cells and the seed.
         layout: `coco` or `yolo`.
-        workers: Processes that render.
-        valid: Share of the images that goes into the split `valid`, 0 to 1.
-        progress: Called now and then.
+        workers: Number of processes that render.
+        valid_fraction: Fraction of the images in the split `valid`, 0 to 1.
+        progress: Called after each block of `BLOCK_SIZE` images.
 
     Raises:
-        InputError: The layout is unknown, the cells differ in their classes, a model is missing or not as
-            large as its cell says, or a file cannot be written.
+        InputError: The layout is unknown, the cells differ in their classes, a model of an object is missing
+            or has another size than in the cell file, or a file cannot be written.
     """
     cells = list(configs.values())
     classes = list(cells[0].objects)
@@ -68,11 +68,11 @@ def generate(
         for key, sentence in find_missing_models(cell):
             raise InputError(f"{name}: {'.'.join(map(str, key))}: {sentence}")
     write_annotations(out, layout, [], classes)
-    render = partial(_render_block, cells, out, layout, seed, images - round(images * valid))
-    write_annotations(out, layout, _in_blocks(render, images, workers, progress), classes)
+    render = partial(_render_block, cells, out, layout, seed, images - round(images * valid_fraction))
+    write_annotations(out, layout, _make_in_blocks(render, images, workers, progress), classes)
 
 
-def run_frames(
+def render_run_frames(
     config: CellConfig,
     *,
     images: int,
@@ -81,39 +81,39 @@ def run_frames(
     progress: Progress,
     scene: SceneConfig = DECLARED_SCENE,
 ) -> list[LabelledImage]:
-    """Return whole frames of a cell's camera, each of another scene that a run may begin with.
+    """Return full frames of a cell's camera, each of a random initial scene of a run.
 
-    They are labelled in the camera's view `table`.
+    The objects in the camera's view `table` are labelled.
 
     Args:
         config: The cell.
         images: Number of frames.
-        seed: Seed; with the same cell it gives the same frames for any number of workers.
-        workers: Processes that render.
-        progress: Called now and then.
-        scene: Changes the world without the cell's knowledge.
+        seed: Seed; the frames are a function of cell, scene and seed.
+        workers: Number of processes that render.
+        progress: Called after each block of `BLOCK_SIZE` frames.
+        scene: Differences of the simulated world from the cell file.
     """
-    return _in_blocks(partial(_take_frames, config, scene, seed), images, workers, progress)
+    return _make_in_blocks(partial(_render_frames, config, scene, seed), images, workers, progress)
 
 
-def _in_blocks(
-    make: Callable[[range], dict[int, T]], count: int, workers: int, progress: Progress
-) -> list[T]:
-    """Return items 0 to `count` - 1, which `make` makes block by block in processes, by their numbers."""
-    made: dict[int, T] = {}
+def _make_in_blocks(
+    make: Callable[[range], dict[int, ItemT]], count: int, workers: int, progress: Progress
+) -> list[ItemT]:
+    """Return items 0 to `count` - 1 in order; worker processes call `make` for blocks of item numbers."""
+    made: dict[int, ItemT] = {}
     with Workers(workers) as pool:
-        starts = range(0, count, BLOCK)
-        blocks = [pool.submit(make, range(first, min(first + BLOCK, count))) for first in starts]
+        starts = range(0, count, BLOCK_SIZE)
+        blocks = [pool.submit(make, range(first, min(first + BLOCK_SIZE, count))) for first in starts]
         for block in as_completed(blocks):
             made.update(block.result())
             progress(len(made), count)
     return [made[number] for number in sorted(made)]
 
 
-def _draw(
+def _draw_samples(
     cells: Sequence[CellConfig], seed: int, numbers: range, scene: SceneConfig | None = None
 ) -> Iterator[tuple[int, str, Sample]]:
-    """Yield number, camera and sample of scenes of the cells, which take turns; varied without `scene`."""
+    """Yield number, camera and sample of scenes of all cells in turn; widely varied if `scene` is None."""
     cv2.setNumThreads(1)
     cameras = [next(iter(cell.cameras)) for cell in cells]
     with contextlib.ExitStack() as stack:
@@ -124,49 +124,49 @@ def _draw(
         for renderer in renderers:
             stack.callback(renderer.close)
         for number in numbers:
-            turn = number % len(cells)
+            cell_index = number % len(cells)
             sample_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
-            yield number, cameras[turn], renderers[turn].sample(sample_seed)
+            yield number, cameras[cell_index], renderers[cell_index].sample(sample_seed)
 
 
 def _render_block(
     cells: Sequence[CellConfig], out: Path, layout: str, seed: int, first_valid: int, numbers: range
 ) -> dict[int, DatasetEntry]:
-    """Render and save the images of these numbers; runs in a process of its own."""
+    """Render and save the images with these numbers, in a worker process."""
     entries = {}
-    for number, camera, sample in _draw(cells, seed, numbers):
+    for number, camera, sample in _draw_samples(cells, seed, numbers):
         split, file = "train" if number < first_valid else "valid", f"{camera}_{number:06d}.jpg"
         save_image(build_image_path(out, layout, split, file), sample.image)
-        entries[number] = _entry(sample, split, file, camera)
+        entries[number] = _make_entry(sample, split, file, camera)
     return entries
 
 
-def _take_frames(
+def _render_frames(
     config: CellConfig, scene: SceneConfig, seed: int, numbers: range
 ) -> dict[int, LabelledImage]:
-    """Take the frames of these numbers; runs in a process of its own."""
-    drawn = _draw([config], seed, numbers, scene)
+    """Render the frames with these numbers, in a worker process."""
+    samples = _draw_samples([config], seed, numbers, scene)
     return {
-        number: as_labelled_frame(sample, camera, f"{camera}_{number:06d}")
-        for number, camera, sample in drawn
+        number: to_labelled_frame(sample, camera, f"{camera}_{number:06d}")
+        for number, camera, sample in samples
     }
 
 
-def _entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEntry:
-    """Return the dataset entry of a sample, with the truth for measuring localizers."""
+def _make_entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEntry:
+    """Return the dataset entry of a sample, with the ground truth for measuring localizers."""
     rounded = {
         "matrix": sample.matrix.tolist(),
         "positions": sample.positions.round(6).tolist(),
         "centres": sample.centres.round(6).tolist(),
         "visible_fraction": sample.visible_fraction.round(4).tolist(),
     }
-    boxes, ignored = _boxes(sample.boxes), _boxes(sample.ignored)
-    truth = {**_truth(sample, camera, sample.part), **rounded}
+    boxes, ignored = _to_boxes(sample.boxes), _to_boxes(sample.ignored)
+    truth = {**_collect_truth(sample, camera, sample.part), **rounded}
     return DatasetEntry(split, file, (IMAGE_SIZE, IMAGE_SIZE), sample.labels, boxes, ignored, truth)
 
 
-def as_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
-    """Return the whole frame from which a sample of an initial scene of a run was cut."""
+def to_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
+    """Return the full frame of a sample of an initial scene; `sample.image` is a scaled part of it."""
     assert sample.frame is not None
     height, width = sample.frame.shape[:2]
     left, top, right, _ = sample.part
@@ -175,17 +175,17 @@ def as_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
         file=file,
         image=sample.frame,
         labels=sample.labels,
-        boxes=_boxes(sample.boxes * scale + corner),
-        ignored=_boxes(sample.ignored * scale + corner),
-        truth=_truth(sample, camera, (0, 0, width, height)),
+        boxes=_to_boxes(sample.boxes * scale + corner),
+        ignored=_to_boxes(sample.ignored * scale + corner),
+        truth=_collect_truth(sample, camera, (0, 0, width, height)),
         region=sample.part,
         depth=sample.depth,
         second_image=sample.second,
     )
 
 
-def _truth(sample: Sample, camera: str, part: Box) -> dict[str, Any]:
-    """Return the renderer's knowledge about an image that shows `part` of the camera's image."""
+def _collect_truth(sample: Sample, camera: str, part: Box) -> dict[str, Any]:
+    """Return the ground truth of an image that shows the region `part` of the camera's frame [pixel]."""
     return {
         "camera": camera,
         "part": part,
@@ -198,5 +198,5 @@ def _truth(sample: Sample, camera: str, part: Box) -> dict[str, Any]:
     }
 
 
-def _boxes(boxes: Array) -> tuple[Box, ...]:
+def _to_boxes(boxes: Array) -> tuple[Box, ...]:
     return tuple((left, top, right, bottom) for left, top, right, bottom in boxes.tolist())

@@ -1,4 +1,4 @@
-"""Weights of an exported model, put back into a model that can be trained."""
+"""Restoration of a trainable model from the weights of an exported model."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from executive.geometry import Array
 from executive.training.architecture import ARCHITECTURE, create_model
 from executive.training.compress import export_model
 
-CLASS_BIAS = "class_embed.bias"
-"""Name of the bias with one element for each class and one for "no object"."""
-GROUPS: int = ARCHITECTURE["group_detr"]
+CLASS_BIAS_NAME = "class_embed.bias"
+"""Name of the bias with one element for each class, and a last one for "no object"."""
+QUERY_GROUP_COUNT: int = ARCHITECTURE["group_detr"]
 """Number of groups of queries during training; an exported model contains the first one only."""
 
 
-def restore(model: Path) -> Any:
+def restore_model(model: Path) -> Any:
     """Return an `rfdetr.RFDETRNano` with the weights of an exported model.
 
     The export renames some weights and drops others. To find the tensor of each exported weight, a model with
@@ -37,32 +37,33 @@ def restore(model: Path) -> Any:
     Raises:
         InputError: The file has another architecture.
     """
-    stored = _read_weights(onnx.load(str(model)))
-    # The last of the outputs stands for "no object".
-    detector = create_model(len(stored.get(CLASS_BIAS, [0])) - 1)
-    state = detector.model.model.state_dict()
-    for tensor in state.values():
+    stored_weights = _read_weights(onnx.load(str(model)))
+    # The last output means "no object".
+    detector = create_model(len(stored_weights.get(CLASS_BIAS_NAME, [0])) - 1)
+    weights_by_name = detector.model.model.state_dict()
+    for tensor in weights_by_name.values():
         if tensor.is_floating_point():
             tensor.normal_()
     with tempfile.TemporaryDirectory() as folder:
         exported = export_model(detector, Path(folder))
     for initializer in exported.graph.initializer:
         name, values = initializer.name, numpy_helper.to_array(initializer)
-        if name not in stored or stored[name].shape != values.shape:
+        if name not in stored_weights or stored_weights[name].shape != values.shape:
             raise InputError(
                 f"{model} cannot be trained further: its weight {name} is missing or has another shape than "
-                "in the architecture that `executive train` trains; start from a model that it made"
+                "in the architecture that `executive train` trains; start from a model of `executive train`"
             )
-        found = next((view for view in _candidate_tensors(state, name) if _is_equal(view, values)), None)
-        # An initializer without a tensor is a constant of the graph.
-        if found is not None:
-            found.copy_(torch.from_numpy(stored[name]))
-    _copy_groups(state)
+        candidates = _find_candidate_tensors(weights_by_name, name)
+        matching_view = next((view for view in candidates if _is_equal(view, values)), None)
+        # An initializer without a matching tensor is a constant of the graph.
+        if matching_view is not None:
+            matching_view.copy_(torch.from_numpy(stored_weights[name]))
+    _copy_query_groups(weights_by_name)
     return detector
 
 
 def _read_weights(model: onnx.ModelProto) -> dict[str, Array]:
-    """Return the weights of a model by name, as float32 whatever they are stored as (see `compress`)."""
+    """Return the weights of a model by name, converted from int8 and float16 to float32."""
     tensors = {tensor.name: numpy_helper.to_array(tensor) for tensor in model.graph.initializer}
     weights = {}
     for name, values in tensors.items():
@@ -73,17 +74,17 @@ def _read_weights(model: onnx.ModelProto) -> dict[str, Array]:
     return weights
 
 
-def _candidate_tensors(state: dict[str, torch.Tensor], name: str) -> Iterator[torch.Tensor]:
-    """Yield the parts of a model's weights that an export can contain under `name`."""
-    if name in state:
-        yield state[name]
+def _find_candidate_tensors(weights_by_name: dict[str, torch.Tensor], name: str) -> Iterator[torch.Tensor]:
+    """Yield the weights of a model, and views of them, that an export can contain under `name`."""
+    if name in weights_by_name:
+        yield weights_by_name[name]
         return
-    for tensor in state.values():
+    for tensor in weights_by_name.values():
         parts = [tensor]
         if tensor.ndim and len(tensor) % 3 == 0:  # the projections of queries, keys and values
             parts += tensor.chunk(3)
-        if tensor.ndim and len(tensor) % GROUPS == 0:
-            parts.append(tensor[: len(tensor) // GROUPS])
+        if tensor.ndim and len(tensor) % QUERY_GROUP_COUNT == 0:
+            parts.append(tensor[: len(tensor) // QUERY_GROUP_COUNT])
         for part in parts:
             yield part
             if part.ndim == 2:
@@ -95,12 +96,12 @@ def _is_equal(view: torch.Tensor, values: Array) -> bool:
     return tuple(view.shape) == values.shape and bool(np.array_equal(view.numpy(), values))
 
 
-def _copy_groups(state: dict[str, torch.Tensor]) -> None:
-    """Make every group of queries, and the layers that propose its boxes, a copy of the first group."""
-    for name, tensor in state.items():
+def _copy_query_groups(weights_by_name: dict[str, torch.Tensor]) -> None:
+    """Copy the first group of queries, and the layers that propose its boxes, to every other group."""
+    for name, tensor in weights_by_name.items():
         layer = re.fullmatch(r"(transformer\.enc_out\w+)\.0\.(.+)", name)
         if layer is not None:
-            for group in range(1, GROUPS):
-                state[f"{layer[1]}.{group}.{layer[2]}"].copy_(tensor)
+            for group in range(1, QUERY_GROUP_COUNT):
+                weights_by_name[f"{layer[1]}.{group}.{layer[2]}"].copy_(tensor)
         if name in ("refpoint_embed.weight", "query_feat.weight"):
-            tensor.copy_(tensor[: len(tensor) // GROUPS].repeat(GROUPS, 1))
+            tensor.copy_(tensor[: len(tensor) // QUERY_GROUP_COUNT].repeat(QUERY_GROUP_COUNT, 1))

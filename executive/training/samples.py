@@ -1,4 +1,4 @@
-"""Reader of labelled images in COCO and YOLO folders, for instance exports of Roboflow."""
+"""Reading of labelled images from COCO and YOLO folders, for instance exports of Roboflow."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ from executive.training.annotations import (
 from executive.training.labelled_image import LabelledImage
 
 SPLITS = ("test", "valid", "val", "train")
-"""Folders of a data set with labelled images, beginning with those that no training has used."""
+"""Folders of a dataset with labelled images; splits that are not used for training come first."""
 
 
 class Samples:
-    """The labelled images of a split, or of the first of a data set's splits that exists.
+    """Labelled images of a split, or of the first existing split of a dataset.
 
-    Iteration reads one image after the other.
+    Iteration reads one image at a time.
 
     Args:
-        folder: The split or the data set.
+        folder: Folder of the split or the dataset.
 
     Attributes:
-        polygon_count: Number of boxes that are made from polygons.
+        polygon_count: Number of boxes that enclose an annotated polygon.
 
     Raises:
         InputError: There are no labelled images, or the annotations are damaged.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._split = _split(folder)
+        self._split = _find_split(folder)
         self._annotations = read_annotations(self._split)
-        self.polygon_count = sum(one.polygon_count for one in self._annotations.values())
+        self.polygon_count = sum(image.polygon_count for image in self._annotations.values())
 
     def __len__(self) -> int:
         return len(self._annotations)
 
     def __iter__(self) -> Iterator[LabelledImage]:
-        """Yield the images.
+        """Yield the labelled images, each read when it is needed.
 
         Raises:
             InputError: An image cannot be read.
@@ -71,7 +71,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     """Return an image file as `(H, W, 3)` uint8, RGB.
 
     Raises:
-        InputError: It cannot be read.
+        InputError: The image cannot be read.
     """
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if image is None:
@@ -79,26 +79,26 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image[..., ::-1], dtype=np.uint8)
 
 
-def splits_of(dataset: Path) -> list[Path]:
-    """Return the folders of a data set with labelled images."""
+def list_splits(dataset: Path) -> list[Path]:
+    """Return the existing splits of a dataset, in the order of `SPLITS`."""
     return [dataset / name for name in SPLITS if is_split(dataset / name)]
 
 
-def _split(folder: Path) -> Path:
-    """Return the folder if it holds labelled images, else the first of its splits.
+def _find_split(folder: Path) -> Path:
+    """Return the folder if it contains labelled images, else its first existing split.
 
     Raises:
         InputError: There are no labelled images.
     """
-    if splits := [folder] if is_split(folder) else splits_of(folder):
+    if splits := [folder] if is_split(folder) else list_splits(folder):
         return splits[0]
     raise InputError(
-        f"{folder} holds no labelled images: {COCO_FILE_NAME} (COCO) or images/ and labels/ (YOLO) were "
-        f"looked for there and in {', '.join(SPLITS)}; make some with `executive dataset`"
+        f"{folder} contains no labelled images: neither it nor its folders {', '.join(SPLITS)} contain "
+        f"{COCO_FILE_NAME} (COCO) or images/ and labels/ (YOLO); render a dataset with `executive dataset`"
     )
 
 
 def _read_json(path: Path) -> dict[str, Any]:
-    """Return the object in a file with a key for each image; empty without a file."""
+    """Return the JSON object in a file, whose keys are image names; an empty one if there is no file."""
     read = TypeAdapter(dict[str, Any]).validate_json
     return parse_file(path, MAX_COCO_FILE_SIZE, read) if path.is_file() else {}

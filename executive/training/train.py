@@ -1,4 +1,4 @@
-"""Train the small RF-DETR on a COCO or YOLO folder, from random weights or from a trained model."""
+"""Training of the small RF-DETR on a COCO or YOLO dataset, from random weights or from a trained model."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from pathlib import Path
 
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import read_labels
-from executive.training.annotations import read_annotations
+from executive.training.annotations import COCO_FILE_NAME, YOLO_CLASS_FILES, read_annotations
 from executive.training.evaluation.evaluate import evaluate_folder, label_file
-from executive.training.model_card import read_epochs, write_card
-from executive.training.samples import splits_of
+from executive.training.model_card import read_epochs, render_card
+from executive.training.samples import list_splits
 
 ReportEpoch = Callable[[int, dict[str, float]], None]
 """Called after each epoch with its number, from 1, and its metrics by name."""
 ReportBatch = Callable[[int, int], None]
-"""Called after each batch with the number of finished batches and of all batches of all epochs."""
+"""Called after each batch with the number of finished batches and of all batches, over all epochs."""
 
 CARD_THRESHOLD = 0.5
-"""Confidence at which the card states precision and recall."""
+"""Minimum confidence of the detections from which the card computes precision and recall."""
 LEARNING_RATE = 3e-4
-"""Learning rate from random weights, or from the weights of a model with other classes."""
+"""Learning rate of a training from random weights, or from a model with other classes."""
 FINE_TUNING_RATE = 1e-4
-"""Learning rate from the weights of a model with the same classes; larger steps would first undo them."""
+"""Learning rate of a training from a model with the same classes; a larger one would undo its weights."""
 
 
 @dataclass(frozen=True)
@@ -31,15 +31,15 @@ class Settings:
     """Settings of a training that the user chooses.
 
     Attributes:
-        start: Checkpoint (`.pth`) or exported model (`.onnx`) of this architecture to fine-tune, with any
-            classes; a `labels.txt` beside it names them. None: training starts from random weights.
-        rate: Learning rate; None: 1e-4 if `start` has the same classes, else 3e-4.
-        epochs: Number of passes over the data.
-        seed: Seed of weights, order and augmentation.
+        start_model: Checkpoint (`.pth`) or exported model (`.onnx`) of this architecture to fine-tune; its
+            classes may be others. None: training starts from random weights.
+        learning_rate: Learning rate; None: 1e-4 if `start_model` has the same classes, else 3e-4.
+        epochs: Number of passes over the dataset.
+        seed: Seed of initial weights, order of the images and augmentation.
     """
 
-    start: Path | None = None
-    rate: float | None = None
+    start_model: Path | None = None
+    learning_rate: float | None = None
     epochs: int = 20
     seed: int = 0
 
@@ -53,81 +53,82 @@ def train(
 ) -> None:
     """Train a model and write it to `out`.
 
-    A detector of kind `rfdetr` needs `model.onnx` and `labels.txt`. `card.md` states the accuracy on the
-    validation images. A further training can start from `checkpoint_best_total.pth`. `metrics.csv` holds the
-    metrics of each epoch.
+    Files in `out`: `model.onnx` and `labels.txt` for a detector of kind `rfdetr`; `card.md` with the accuracy
+    on the validation images; `checkpoint_best_total.pth`, from which a further training can start;
+    `metrics.csv` with the metrics of each epoch.
 
     Args:
-        dataset: Folder as Roboflow exports it: `train/` and `valid/`, each with `_annotations.coco.json`, or
-            a `data.yaml` for YOLO.
+        dataset: Folder in a format of Roboflow: `train/` and `valid/`, each with `_annotations.coco.json`
+            (COCO), or `data.yaml` (YOLO).
         out: Output folder; created if missing.
         settings: Settings of the training.
         report_epoch: Called after each epoch.
         report_batch: Called after each batch.
 
     Raises:
-        InputError: The folder is no data set, `start` does not exist, or the training packages are not
-            installed.
+        InputError: The folder is not a dataset, `start_model` does not exist, or the training packages are
+            not installed.
     """
-    start, rate = settings.start, settings.rate
-    _check(dataset, start)
+    start_model, learning_rate = settings.start_model, settings.learning_rate
+    _check_inputs(dataset, start_model)
     try:
         from executive.training.architecture import declare_missing_operators, describe_architecture
 
         declare_missing_operators()
         from executive.training.compress import export_onnx
-        from executive.training.run import fit
+        from executive.training.model_fitting import fit_model
     except ImportError as error:
         raise InputError(
             f'training needs the package "{error.name}"; install the extra, about 3 GB to download on Linux: '
             "uv sync --extra train"
         ) from error
     out.mkdir(parents=True, exist_ok=True)
-    fit(dataset, out, settings, report_epoch, report_batch)
+    fit_model(dataset, out, settings, report_epoch, report_batch)
     model, labels = out / "model.onnx", out / "labels.txt"
     export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
-    card = write_card(
+    accuracy = evaluate_folder(model, labels, _find_validation_split(dataset), CARD_THRESHOLD)
+    card = render_card(
         title=f"Small RF-DETR trained on {dataset.name}",
-        summary=f"Finds {', '.join(read_labels(labels))} in square images.",
+        summary=f"Detects {', '.join(read_labels(labels))} in square images.",
         settings={
             **describe_architecture(),
-            "start": "random weights" if start is None else start.name,
-            **({} if rate is None else {"learning rate": f"{rate:g}"}),
+            "start": "random weights" if start_model is None else start_model.name,
+            **({} if learning_rate is None else {"learning rate": f"{learning_rate:g}"}),
             "epochs": str(settings.epochs),
             "seed": str(settings.seed),
             "weights stored as": "int8",
         },
         epochs=read_epochs(out / "metrics.csv"),
-        measured={"validation images": evaluate_folder(model, labels, _validation(dataset), CARD_THRESHOLD)},
+        evaluations={"validation images": accuracy},
     )
     (out / "card.md").write_text(card, encoding="utf-8")
 
 
-def learning_rate(start: Path | None, labels: list[str]) -> float:
-    """Return the learning rate for a training of `labels` from the model `start`.
+def choose_learning_rate(start_model: Path | None, labels: list[str]) -> float:
+    """Return the default learning rate of a training of the classes `labels` from `start_model`.
 
-    The labels of the model are in `labels.txt`, or in `NAME.labels.txt` for a model `NAME.onnx`.
+    The classes of a model `NAME.onnx` are in `NAME.labels.txt` or `labels.txt` in its folder.
     """
-    if start is None:
+    if start_model is None:
         return LEARNING_RATE
-    file = label_file(start)
+    file = label_file(start_model)
     return FINE_TUNING_RATE if file.is_file() and list(read_labels(file)) == labels else LEARNING_RATE
 
 
-def _check(dataset: Path, start: Path | None) -> None:
-    if start is not None and not start.is_file():
-        raise InputError(f"there is no checkpoint {start} to start from; train one first, or leave it out")
-    coco = [dataset / part / "_annotations.coco.json" for part in ("train", "valid")]
-    yolo = [dataset / name for name in ("data.yaml", "data.yml")]
-    if not (all(path.is_file() for path in coco) or any(path.is_file() for path in yolo)):
+def _check_inputs(dataset: Path, start_model: Path | None) -> None:
+    if start_model is not None and not start_model.is_file():
+        raise InputError(f"there is no model {start_model} to start from; train one first, or omit --from")
+    coco_files = [dataset / split / COCO_FILE_NAME for split in ("train", "valid")]
+    yolo_files = [dataset / name for name in YOLO_CLASS_FILES]
+    if not (all(map(Path.is_file, coco_files)) or any(map(Path.is_file, yolo_files))):
         raise InputError(
-            f"{dataset} is not a data set: it needs train/_annotations.coco.json and "
+            f"{dataset} is not a dataset: it needs train/_annotations.coco.json and "
             "valid/_annotations.coco.json (COCO), or data.yaml (YOLO); a Roboflow export has one of them"
         )
-    for split in splits_of(dataset):
+    for split in list_splits(dataset):
         read_annotations(split)
 
 
-def _validation(dataset: Path) -> Path:
-    """Return the folder of the validation split; YOLO data sets call it `valid` or `val`."""
+def _find_validation_split(dataset: Path) -> Path:
+    """Return the folder of the validation split: `valid`, or `val` in some YOLO datasets."""
     return next(path for path in (dataset / "valid", dataset / "val", dataset) if path.is_dir())

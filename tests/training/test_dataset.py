@@ -69,7 +69,7 @@ def test_the_images_that_no_training_used_are_read_as_they_were_written(root):
 def test_what_cannot_be_written_or_read_is_explained(tmp_path):
     with pytest.raises(InputError, match='"voc" is unknown; use coco or yolo'):
         write_annotations(tmp_path, "voc", ENTRIES, CLASSES)
-    with pytest.raises(InputError, match=r"no labelled images: _annotations\.coco\.json"):
+    with pytest.raises(InputError, match=r"no labelled images: neither it nor its folders test"):
         Samples(tmp_path)
     write_annotations(tmp_path, "yolo", ENTRIES, CLASSES)
     (tmp_path / "valid/images").mkdir()

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from executive.errors import InputError
-from executive.training.evaluation.figures import Evaluation, Spread
-from executive.training.model_card import read_epochs, write_card
-from executive.training.train import Settings, learning_rate, train
+from executive.training.evaluation.figures import Distribution, Evaluation
+from executive.training.model_card import read_epochs, render_card
+from executive.training.train import Settings, choose_learning_rate, train
 
 
 @pytest.mark.parametrize(
     ("start", "text"),
     [
-        (None, r"not a data set: it needs train/_annotations\.coco\.json"),
-        ("old.pth", r"no checkpoint .*old\.pth to start from"),
+        (None, r"not a dataset: it needs train/_annotations\.coco\.json"),
+        ("old.pth", r"no model .*old\.pth to start from"),
     ],
 )
 def test_a_training_that_cannot_start_is_refused(tmp_path, start, text):
@@ -29,9 +29,12 @@ def test_a_training_that_cannot_start_is_refused(tmp_path, start, text):
 
 def test_a_training_goes_on_in_smaller_steps_if_the_checkpoint_knows_its_labels(tmp_path):
     start = tmp_path / "checkpoint_best_total.pth"
-    assert learning_rate(None, ["bolt"]) == learning_rate(start, ["bolt", "nut"]) == 3e-4
+    assert choose_learning_rate(None, ["bolt"]) == choose_learning_rate(start, ["bolt", "nut"]) == 3e-4
     (tmp_path / "labels.txt").write_text("bolt\nnut\n")
-    assert (learning_rate(start, ["bolt", "nut"]), learning_rate(start, ["nut", "bolt"])) == (1e-4, 3e-4)
+    assert (choose_learning_rate(start, ["bolt", "nut"]), choose_learning_rate(start, ["nut", "bolt"])) == (
+        1e-4,
+        3e-4,
+    )
 
 
 @pytest.mark.skipif(importlib.util.find_spec("torch") is not None, reason="the extra is installed")
@@ -50,12 +53,12 @@ def test_a_training_tells_of_every_batch_and_of_every_epoch(monkeypatch):
     lightning.Callback = object
     monkeypatch.setitem(sys.modules, "pytorch_lightning", lightning)
     # What is loaded with the stand-in is not to be found by anybody else.
-    monkeypatch.setitem(sys.modules, "executive.training.report", None)
-    del sys.modules["executive.training.report"]
-    from executive.training.report import Report
+    monkeypatch.setitem(sys.modules, "executive.training.progress_reporter", None)
+    del sys.modules["executive.training.progress_reporter"]
+    from executive.training.progress_reporter import ProgressReporter
 
     reported = []
-    report = Report(lambda *epoch: reported.append(epoch), lambda *batch: reported.append(batch))
+    report = ProgressReporter(lambda *epoch: reported.append(epoch), lambda *batch: reported.append(batch))
     trainer = SimpleNamespace(max_epochs=2, num_training_batches=3, callback_metrics={"loss": 1})
     for trainer.current_epoch in range(2):
         for batch in range(3):
@@ -67,7 +70,7 @@ def test_a_training_tells_of_every_batch_and_of_every_epoch(monkeypatch):
 
 def test_the_labels_of_an_exported_model_lie_beside_it_under_its_name(tmp_path):
     (tmp_path / "embedded.labels.txt").write_text("bolt\n")
-    assert learning_rate(tmp_path / "embedded.onnx", ["bolt"]) == 1e-4
+    assert choose_learning_rate(tmp_path / "embedded.onnx", ["bolt"]) == 1e-4
 
 
 def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):
@@ -77,9 +80,9 @@ def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):
 
     from executive.perception.detectors.embedded import MODEL
     from executive.training.compress import export_model
-    from executive.training.restore import restore
+    from executive.training.restore import restore_model
 
-    onnx.save(export_model(restore(MODEL), tmp_path), str(tmp_path / "again.onnx"))
+    onnx.save(export_model(restore_model(MODEL), tmp_path), str(tmp_path / "again.onnx"))
     image = np.random.default_rng(0).normal(size=(1, 3, 256, 256)).astype(np.float32)
     first, again = (onnxruntime.InferenceSession(str(path)) for path in (MODEL, tmp_path / "again.onnx"))
     (name,) = (one.name for one in first.get_inputs())
@@ -90,10 +93,10 @@ def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):
 @pytest.mark.parametrize("element", range(8))
 def test_each_of_eight_symmetries_moves_boxes_with_the_pixels(element):
     torch = pytest.importorskip("torch")
-    from executive.training.symmetry import ELEMENTS, transform_boxes, transform_image
+    from executive.training.symmetry import SYMMETRY_COUNT, transform_boxes, transform_image
 
     square = torch.arange(16.0).reshape(4, 4)
-    others = [transform_image(square, other) for other in range(ELEMENTS) if other != element]
+    others = [transform_image(square, other) for other in range(SYMMETRY_COUNT) if other != element]
     assert not any(torch.equal(transform_image(square, element), other) for other in others)
     image = torch.zeros(3, 64, 64)
     image[:, 10:20, 30:50] = 1
@@ -146,7 +149,7 @@ def test_narrow_weights_are_smaller_and_give_nearly_the_same_outputs():
 
 EVALUATION = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.99, map50=0.995, map50_95=0.8,
-    centre=Spread(0.6, 1.5, 2.9, 5.0),
+    centre=Distribution(0.6, 1.5, 2.9, 5.0),
 )  # fmt: skip
 
 
@@ -163,12 +166,12 @@ def test_epochs_are_put_together_from_the_rows_a_trainer_spreads_them_over(tmp_p
 
 
 def test_a_card_states_settings_and_figures():
-    text = write_card(
+    text = render_card(
         title="Small model",
         summary="Finds cubes.",
         settings={"seed": "1"},
         epochs=[{"train/loss": 6.5, "val/mAP_50": 0.5}],
-        measured={"overhead": EVALUATION},
+        evaluations={"overhead": EVALUATION},
     )
     assert text.startswith("# Small model\n\nFinds cubes.\n")
     assert "| seed | 1 |" in text

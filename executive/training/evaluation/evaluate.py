@@ -18,7 +18,7 @@ from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
 from executive.perception.envelope.frame_statistics import FrameRange, FrameStatistics, measure_frame
 from executive.training.evaluation.asking import CellDetector
-from executive.training.evaluation.figures import Evaluation, Spread
+from executive.training.evaluation.figures import Distribution, Evaluation
 from executive.training.evaluation.matching import BoxMatch, is_ignored, match
 from executive.training.evaluation.misses import WorstMisses
 from executive.training.evaluation.tally import RepeatedErrors, Tally
@@ -85,11 +85,11 @@ def evaluate(
         recall=tally.recall,
         map50=map50,
         map50_95=map50_95,
-        centre=Spread.of(tally.centre),
-        position=Spread.of(tally.position),
-        localized=Spread.of(tally.localized),
+        centre=Distribution.of(tally.centre),
+        position=Distribution.of(tally.position),
+        localized=Distribution.of(tally.localized),
         # The first look warms up caches and connections.
-        latency=Spread.of(latencies[1:] or latencies),
+        latency=Distribution.of(latencies[1:] or latencies),
         by_class=tally.by_class(),
         confusion=tally.table(),
         unavailable=unavailable,

@@ -16,7 +16,7 @@ NOTHING = "nothing"
 
 
 @dataclass(frozen=True)
-class Spread:
+class Distribution:
     """How a measured quantity is distributed, all in its unit.
 
     Attributes:
@@ -29,12 +29,12 @@ class Spread:
     worst: float
 
     @staticmethod
-    def of(values: Sequence[float]) -> Spread | None:
+    def of(values: Sequence[float]) -> Distribution | None:
         """Return the spread of some values, None where there are none."""
         if not len(values):
             return None
         median, p95, p99, worst = np.percentile(values, [50, 95, 99, 100])
-        return Spread(float(median), float(p95), float(p99), float(worst))
+        return Distribution(float(median), float(p95), float(p99), float(worst))
 
 
 @dataclass(frozen=True)
@@ -86,10 +86,10 @@ class Evaluation:
     recall: float
     map50: float
     map50_95: float
-    centre: Spread | None = None
-    position: Spread | None = None
-    localized: Spread | None = None
-    latency: Spread | None = None
+    centre: Distribution | None = None
+    position: Distribution | None = None
+    localized: Distribution | None = None
+    latency: Distribution | None = None
     by_class: Mapping[str, ClassFigures] = field(default_factory=dict)
     confusion: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     unavailable: int = 0

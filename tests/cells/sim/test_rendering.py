@@ -26,7 +26,7 @@ from executive.cells.sim.silhouette import compute_silhouette_area
 from executive.errors import InputError
 from executive.geometry import Pose
 from executive.processes import Workers
-from executive.training.rendering import as_labelled_frame, generate, run_frames
+from executive.training.rendering import generate_dataset, render_run_frames, to_labelled_frame
 
 
 def samples(config: CellConfig, seeds: range, *, randomized: bool = True) -> list[Sample]:
@@ -130,8 +130,8 @@ def test_what_is_dropped_comes_to_lie_on_the_table_or_in_a_bin(overhead: CellCon
 def make(out: Path, workers: int = 1, images: int = 1, **cells: CellConfig) -> list[tuple[int, int]]:
     """Make a small data set and return what was reported on the way."""
     reported: list[tuple[int, int]] = []
-    generate(
-        cells, out, images=images, seed=3, layout="coco", workers=workers, valid=0.25,
+    generate_dataset(
+        cells, out, images=images, seed=3, layout="coco", workers=workers, valid_fraction=0.25,
         progress=lambda made, total: reported.append((made, total)),
     )  # fmt: skip
     return reported
@@ -150,7 +150,7 @@ class Here(ThreadPoolExecutor):
 def test_data_sets_and_frames_are_the_same_for_any_number_of_workers(
     pool: type, overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("executive.training.rendering.BLOCK", 2)
+    monkeypatch.setattr("executive.training.rendering.BLOCK_SIZE", 2)
     monkeypatch.setattr("executive.training.rendering.Workers", pool)
     one, two = tmp_path / "one", tmp_path / "two"
     assert make(one, 1, 4, overhead=overhead) == make(two, 2, 4, overhead=overhead) == [(2, 4), (4, 4)]
@@ -159,7 +159,7 @@ def test_data_sets_and_frames_are_the_same_for_any_number_of_workers(
     assert [(one / file).read_bytes() == (two / file).read_bytes() for file in files] == [True] * len(files)
     assert list(json.loads((one / "valid/truth.json").read_text())) == ["overhead_000003.jpg"]
     frames, again = (
-        run_frames(overhead, images=3, seed=3, workers=workers, progress=lambda taken, total: None)
+        render_run_frames(overhead, images=3, seed=3, workers=workers, progress=lambda taken, total: None)
         for workers in (1, 2)
     )
     assert [frame.file for frame in frames] == [f"overhead_00000{number}" for number in range(3)]
@@ -193,10 +193,10 @@ def test_a_frame_is_the_cameras_whole_image_labelled_where_a_run_searches_it(ove
     camera = overhead.cameras["overhead"].model_copy(update={"depth": DepthConfig()})
     config = overhead.model_copy(update={"cameras": {"overhead": camera}})
     (drawn,) = samples(config, range(3, 4), randomized=False)
-    frame = as_labelled_frame(drawn, "overhead", "a")
+    frame = to_labelled_frame(drawn, "overhead", "a")
     left, top, right, bottom = frame.region or ()
     assert frame.image.shape == (480, 640, 3)
-    twice = as_labelled_frame(replace(drawn, part=(10, 20, 522, 532)), "overhead", "a")
+    twice = to_labelled_frame(replace(drawn, part=(10, 20, 522, 532)), "overhead", "a")
     assert twice.boxes == pytest.approx(drawn.boxes * 2 + [10, 20, 10, 20])
     assert frame.depth is not None
     assert (left, top, right, bottom) == camera.table_view

@@ -11,7 +11,7 @@ from executive.errors import NoDepth
 from executive.perception.envelope.measurement import StoredErrorRates
 from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates, round_up
 from executive.training.evaluation.evaluate import evaluate
-from executive.training.evaluation.figures import ClassFigures, Spread
+from executive.training.evaluation.figures import ClassFigures, Distribution
 from executive.training.evaluation.misses import WorstMisses
 
 
@@ -141,7 +141,7 @@ def test_the_worst_misses_are_gathered(saying, sample, both):
 
 
 def test_a_spread_names_its_quantiles():
-    assert Spread.of(list(range(101))) == Spread(median=50, p95=95, p99=99, worst=100)
+    assert Distribution.of(list(range(101))) == Distribution(median=50, p95=95, p99=99, worst=100)
 
 
 def rates(full_view_count, missed, confused, invented, looks, jitter):

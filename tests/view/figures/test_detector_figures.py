@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 
 from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates
-from executive.training.evaluation.figures import ClassFigures, Evaluation, Spread
+from executive.training.evaluation.figures import ClassFigures, Distribution, Evaluation
 from executive.view.figures.detector import print_metrics
 
 MEASURED = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,
-    latency=Spread(15, 16, 17, 18),
+    latency=Distribution(15, 16, 17, 18),
     by_class={"cube": ClassFigures(900, 0.991, 0.98)},
     confusion={"cube": {"cube": 882, "nothing": 18}, "nothing": {"cube": 8, "nothing": 0}},
     answered_by={"eye": 300},
