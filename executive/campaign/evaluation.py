@@ -27,16 +27,16 @@ from executive.perception.envelope.measurement import (
 )
 from executive.perception.localization import build_localizer
 from executive.record.atomic_file import write_atomically
-from executive.training.evaluation.asking import CellDetector
+from executive.training.evaluation.cell_detector import CellDetector
 from executive.training.evaluation.evaluate import (
     MIN_CONFIDENCE,
     MODEL_NAME,
     evaluate,
-    label_file,
-    model_detector,
+    find_label_file,
+    make_model_config,
 )
-from executive.training.evaluation.figures import NOTHING, Evaluation
-from executive.training.evaluation.misses import WorstMisses
+from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
+from executive.training.evaluation.worst_mistakes import WorstMistakes
 from executive.training.labelled_image import LabelledImage
 from executive.training.rendering import generate_dataset, render_run_frames
 from executive.training.samples import Samples
@@ -109,7 +109,7 @@ def list_detectors(
     """
     model: dict[str, DetectorConfig] = {}
     if weights is not None:
-        model = {MODEL_NAME: model_detector(weights, labels or label_file(weights))}
+        model = {MODEL_NAME: make_model_config(weights, labels or find_label_file(weights))}
     elif not cells:
         model = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
     if not cells:
@@ -147,7 +147,7 @@ def measure_detector(
     scenes: SceneSettings,
     *,
     threshold: float | None,
-    worst_misses: WorstMisses,
+    worst_mistakes: WorstMistakes,
     progress: OpenProgressBar,
 ) -> Evaluation:
     """Evaluate a detector on `dataset`, or on rendered scenes of its cell, and return its errors."""
@@ -164,7 +164,7 @@ def measure_detector(
         )
         with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
             return evaluate(
-                cell_detector, _report_progress(samples, update), threshold=threshold, worst=worst_misses,
+                cell_detector, _report_progress(samples, update), threshold=threshold, worst=worst_mistakes,
                 localizer=_build_localizer(run_config) if run_config else None,
                 table=run_config.table if run_config else None,
             )  # fmt: skip
@@ -249,12 +249,12 @@ def store_evaluation(
         classes={
             label: ErrorCounts(
                 objects=sum(row.values()),
-                missed=row.get(NOTHING, 0),
-                confused=sum(row.values()) - row.get(NOTHING, 0) - row.get(label, 0),
-                false_detections=table.get(NOTHING, {}).get(label, 0),
+                missed=row.get(NO_OBJECT, 0),
+                confused=sum(row.values()) - row.get(NO_OBJECT, 0) - row.get(label, 0),
+                false_detections=table.get(NO_OBJECT, {}).get(label, 0),
             )
             for label, row in table.items()
-            if label != NOTHING
+            if label != NO_OBJECT
         },
         counts={
             str(count): ErrorCounts(**{name: errors.get(name, 0) for name in ErrorCounts.model_fields})

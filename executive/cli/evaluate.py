@@ -90,10 +90,10 @@ def command(
         from executive.campaign import evaluation
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import bar, report_polygons
-        from executive.training.evaluation.misses import WorstMisses
+        from executive.training.evaluation.worst_mistakes import WorstMistakes
         from executive.view.figures.detector import print_metrics
 
-        worst, scenes = WorstMisses(), evaluation.SceneSettings(images, seed, varied, view, workers, scene)
+        worst, scenes = WorstMistakes(), evaluation.SceneSettings(images, seed, varied, view, workers, scene)
         cell_names = cells or (() if dataset else ("overhead",))
         files = dict(zip(map(find_cell, cell_names), load_cells(cell_names, overrides).values(), strict=True))
         tested_detectors = list(evaluation.list_detectors(files, detector, weights, labels))
@@ -104,11 +104,11 @@ def command(
         for tested in tested_detectors:
             measurement, start = tested.make_measurement_name(dataset), time.monotonic()
             result = evaluation.measure_detector(
-                tested, dataset, scenes, threshold=threshold, worst_misses=worst, progress=bar
+                tested, dataset, scenes, threshold=threshold, worst_mistakes=worst, progress=bar
             )
             print_metrics(measurement, tested.name, result)
             kind = tested.configs[tested.name].kind
-            measured[measurement] = {"detector": tested.name, "kind": kind, **result.as_dict()}
+            measured[measurement] = {"detector": tested.name, "kind": kind, **result.to_dict()}
             if stored and tested.cell is not None:
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
                 repeat = f"executive evaluate --cell {tested.cell.cell} --detector {tested.name} {source}"
@@ -117,7 +117,7 @@ def command(
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
             from executive.training.dataset import save_image
-            from executive.training.evaluation.misses import draw_sheet
+            from executive.training.evaluation.worst_mistakes import draw_sheet
 
             save_image(sheet, draw_sheet(worst.kept, ", ".join(measured)))
             click.echo(f"the {len(worst.kept)} worst in {sheet}", err=True)

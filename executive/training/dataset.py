@@ -114,13 +114,8 @@ def _to_coco(entries: Sequence[DatasetEntry], classes: Sequence[str]) -> dict[st
                 }
             )
     categories = [{"id": i, "name": name, "supercategory": "object"} for i, name in enumerate(classes)]
-    return {
-        "info": {},
-        "licenses": [],
-        "categories": categories,
-        "images": images,
-        "annotations": annotations,
-    }
+    lists = {"categories": categories, "images": images, "annotations": annotations}
+    return {"info": {}, "licenses": [], **lists}
 
 
 def _write_yolo(folder: Path, entries: Sequence[DatasetEntry], classes: Sequence[str]) -> None:

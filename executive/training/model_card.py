@@ -6,7 +6,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from executive.training.evaluation.figures import Distribution, Evaluation
+from executive.training.evaluation.metrics import Distribution, Evaluation
 
 EPOCH_COLUMNS = {
     "train/loss": "loss",

@@ -9,7 +9,7 @@ from pathlib import Path
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import read_labels
 from executive.training.annotations import COCO_FILE_NAME, YOLO_CLASS_FILES, read_annotations
-from executive.training.evaluation.evaluate import evaluate_folder, label_file
+from executive.training.evaluation.evaluate import evaluate_folder, find_label_file
 from executive.training.model_card import read_epochs, render_card
 from executive.training.samples import list_splits
 
@@ -111,7 +111,7 @@ def choose_learning_rate(start_model: Path | None, labels: list[str]) -> float:
     """
     if start_model is None:
         return LEARNING_RATE
-    file = label_file(start_model)
+    file = find_label_file(start_model)
     return FINE_TUNING_RATE if file.is_file() and list(read_labels(file)) == labels else LEARNING_RATE
 
 

@@ -14,8 +14,8 @@ from executive.cell.config import CellConfig
 from executive.cli.cells import find_cell, load_cells
 from executive.cli.options import seed_option, workers_option
 from executive.cli.progress import bar
-from executive.training.evaluation.figures import NOTHING, Evaluation
-from executive.training.evaluation.misses import WorstMisses
+from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
+from executive.training.evaluation.worst_mistakes import WorstMistakes
 from tests.benchmarks.report import Figures, run_command, write_json
 from tests.benchmarks.scenes_outside import Scene
 
@@ -81,7 +81,7 @@ def measure(name_of_cell: str, images: int, seed: int, workers: int, out: Path) 
             path.write_text(yaml.safe_dump({"scene": name, **scene}), encoding="utf-8")
             evaluation = evaluate_scene(file, cell, images, seed, workers, path)
             rows.append(describe_evaluation(name, evaluation))
-            details[name] = {"scene": scene, **rows[-1], **evaluation.as_dict()}
+            details[name] = {"scene": scene, **rows[-1], **evaluation.to_dict()}
     figures = {
         "cell": cell.cell,
         "seed": seed,
@@ -112,7 +112,7 @@ def evaluate_scene(
     check_detector(detector, renders_scenes=True, scene=scene)
     scenes = SceneSettings(images, seed, is_varied=False, view="table", workers=workers, scene=scene)
     return measure_detector(
-        detector, None, scenes, threshold=THRESHOLD, worst_misses=WorstMisses(), progress=bar
+        detector, None, scenes, threshold=THRESHOLD, worst_mistakes=WorstMistakes(), progress=bar
     )
 
 
@@ -123,7 +123,7 @@ def describe_evaluation(name: str, evaluation: Evaluation) -> Figures:
         count
         for true, row in confusion.items()
         for found, count in row.items()
-        if NOTHING not in (true, found) and true != found
+        if NO_OBJECT not in (true, found) and true != found
     )
     share = wrong / max(evaluation.objects, 1)
     exceeded = {
@@ -138,8 +138,8 @@ def describe_evaluation(name: str, evaluation: Evaluation) -> Figures:
         "recall": evaluation.recall,
         "wrong class %": 100 * share,
         "wrong class": wrong,
-        "missed": sum(row.get(NOTHING, 0) for true, row in confusion.items() if true != NOTHING),
-        "invented": sum(confusion.get(NOTHING, {}).values()),
+        "missed": sum(row.get(NO_OBJECT, 0) for true, row in confusion.items() if true != NO_OBJECT),
+        "invented": sum(confusion.get(NO_OBJECT, {}).values()),
         "limits": ", ".join(limit for limit, is_exceeded in exceeded.items() if is_exceeded),
     }
 

@@ -11,7 +11,7 @@ import pytest
 
 from executive.cli.cells import find_cell
 from executive.mission.parse.cell_file import load_cell
-from executive.training.evaluation.figures import Evaluation
+from executive.training.evaluation.metrics import Evaluation
 from tests.benchmarks import detector_variants
 from tests.benchmarks.detector_variants import describe_evaluation, list_variants
 from tests.benchmarks.forks import ForkRunner

@@ -114,7 +114,7 @@ def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(mi
             ("--cell", "fruit"),
             "fruit is of kind fake; measure its detector on your own images",
         ),
-        (("--dataset", "."), ". holds no labelled images"),
+        (("--dataset", "."), ". contains no labelled images"),
         (("--weights", "no.onnx", "--labels", LABELS, "--dataset", "grey"), "there is no model file"),
         (("--sheet", "sheet.gif"), '"sheet.gif" is no picture; its name must end in .png, .jpg, .jpeg'),
     ],

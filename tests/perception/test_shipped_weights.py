@@ -8,7 +8,7 @@ from executive.cells.sim.scenes import SceneRenderer
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.detectors.embedded import LABELS, MODEL, WEIGHTS
 from executive.perception.detectors.onnx_model import read_labels
-from executive.training.evaluation.asking import CellDetector
+from executive.training.evaluation.cell_detector import CellDetector
 from executive.training.evaluation.evaluate import evaluate
 from executive.training.labelled_image import LabelledImage
 

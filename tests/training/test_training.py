@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from executive.errors import InputError
-from executive.training.evaluation.figures import Distribution, Evaluation
+from executive.training.evaluation.metrics import Distribution, Evaluation
 from executive.training.model_card import read_epochs, render_card
 from executive.training.train import Settings, choose_learning_rate, train
 

@@ -1,4 +1,4 @@
-"""Error rates of a detector with their bounds.
+"""Error rates of a detector with upper confidence bounds.
 
 The bounds are exact one-sided 95 % confidence limits (Clopper and Pearson, Biometrika 26 (1934), 404-413;
 Garwood, Biometrika 28 (1936), 437-442).
@@ -13,17 +13,17 @@ from scipy.special import betaincinv, gammaincinv
 
 from executive.perception.envelope.measurement import StoredErrorRates
 
-CONFIDENCE = 0.95
-"""Confidence level of the bounds."""
-MAX_SHARE = 0.99
-"""Largest share that is stored: a share of 1 would make every look worthless."""
+CONFIDENCE_LEVEL = 0.95
+"""Confidence level of the upper bounds."""
+MAX_PROPORTION = 0.99
+"""Maximum stored proportion: with a miss rate of 1, a look would give no information."""
 MIN_JITTER = 0.01
-"""Smallest jitter that is stored [pixel]: a jitter of 0 would make one look exact."""
+"""Minimum stored jitter [pixel]: with a jitter of 0, the position from one look would be exact."""
 
 
 @dataclass(frozen=True)
 class CountedRate:
-    """A rate that was measured by counting.
+    """Rate that was measured by counting events.
 
     Attributes:
         events: Number of events.
@@ -36,27 +36,28 @@ class CountedRate:
     bound: float
 
     @staticmethod
-    def share(events: int, trials: int) -> CountedRate:
-        """Return the share of the trials that are events; its bound is 1 if every trial is one."""
-        bound = float(betaincinv(events + 1, trials - events, CONFIDENCE)) if events < trials else 1.0
+    def estimate_proportion(events: int, trials: int) -> CountedRate:
+        """Return the proportion of the trials with an event; its bound is 1 if all trials have one."""
+        bound = float(betaincinv(events + 1, trials - events, CONFIDENCE_LEVEL)) if events < trials else 1.0
         return CountedRate(events, trials, bound)
 
     @staticmethod
-    def per_trial(events: int, trials: int) -> CountedRate:
-        """Return the mean number of events in a trial, which may hold several."""
-        return CountedRate(events, trials, float(gammaincinv(events + 1, CONFIDENCE)) / trials)
+    def estimate_mean_count(events: int, trials: int) -> CountedRate:
+        """Return the mean number of events per trial; a trial can have several events."""
+        return CountedRate(events, trials, float(gammaincinv(events + 1, CONFIDENCE_LEVEL)) / trials)
 
 
 @dataclass(frozen=True)
 class MeasuredErrorRates:
-    """Measured error rates of a detector on objects in full view.
+    """Measured error rates of a detector.
 
     Attributes:
-        miss_rate: Rate of missed objects in full view.
-        confusion_rate: Rate of wrong classes among the found objects in full view.
-        false_detections: Rate of false detections per look.
+        miss_rate: Proportion of missed objects among the fully visible objects.
+        confusion_rate: Proportion of wrong classes among the detected, fully visible objects.
+        false_detections: Mean number of false detections per image.
         jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
-        repeated: Laplace estimate of the share of the errors that a second look from the same pose repeats.
+        repeated: Laplace estimate of the fraction of the errors that a second look from the same pose makes
+            again.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
     """
 
@@ -69,19 +70,19 @@ class MeasuredErrorRates:
 
     @property
     def rates(self) -> StoredErrorRates:
-        """Rates for the ledger, rounded up: the bounds, the repeated share and the standard deviations."""
+        """Error rates for the ledger, rounded up: bounds, repeated fraction and standard deviations."""
         return StoredErrorRates(
-            miss_rate=min(round_up(self.miss_rate.bound), MAX_SHARE),
-            confusion_rate=min(round_up(self.confusion_rate.bound), MAX_SHARE),
+            miss_rate=min(round_up(self.miss_rate.bound), MAX_PROPORTION),
+            confusion_rate=min(round_up(self.confusion_rate.bound), MAX_PROPORTION),
             false_detections=round_up(self.false_detections.bound),
             jitter=max(round_up(self.jitter), MIN_JITTER),
-            repeated=min(round_up(self.repeated), MAX_SHARE),
+            repeated=min(round_up(self.repeated), MAX_PROPORTION),
             bias=round_up(self.bias),
         )
 
 
 def round_up(value: float, digits: int = 2) -> float:
-    """Return `value` rounded up to `digits` significant digits: a bound must not get smaller."""
+    """Return `value` rounded up to `digits` significant digits; a rounded bound must not be smaller."""
     if value <= 0:
         return 0.0
     places = digits - 1 - math.floor(math.log10(value))

@@ -1,4 +1,4 @@
-"""Measuring a detector on labelled images."""
+"""Evaluation of a detector on labelled images."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from executive.cell.frame import Box
 from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
 from executive.perception.envelope.frame_statistics import FrameRange, FrameStatistics, measure_frame
-from executive.training.evaluation.asking import CellDetector
-from executive.training.evaluation.figures import Distribution, Evaluation
-from executive.training.evaluation.matching import BoxMatch, is_ignored, match
-from executive.training.evaluation.misses import WorstMisses
-from executive.training.evaluation.tally import RepeatedErrors, Tally
+from executive.training.evaluation.cell_detector import CellDetector
+from executive.training.evaluation.error_statistics import ErrorStatistics, RepeatedErrors
+from executive.training.evaluation.matching import BoxMatch, is_ignored, match_detections
+from executive.training.evaluation.metrics import Distribution, Evaluation
+from executive.training.evaluation.worst_mistakes import WorstMistakes
 from executive.training.labelled_image import LabelledImage
 from executive.training.samples import Samples
 
 MIN_CONFIDENCE = 0.01
-"""Confidence from which boxes of a model file count for the mean average precision."""
+"""Minimum confidence of the detections of a model file in the mean average precision."""
 MODEL_NAME = "model"
-"""Name of the detector of a model file."""
+"""Name of the detector that is built from a model file."""
 
 
 def evaluate(
@@ -37,88 +37,89 @@ def evaluate(
     *,
     threshold: float | None = None,
     localizer: Localizer | None = None,
-    worst: WorstMisses | None = None,
+    worst: WorstMistakes | None = None,
     table: TableConfig | None = None,
 ) -> Evaluation:
-    """Return the accuracy of a detector on labelled images; ignored objects are neither found nor missed.
+    """Return the accuracy of a detector on labelled images; ignored objects do not count.
 
     Args:
         detector: The detector.
         samples: The images.
-        threshold: Confidence from which a detection counts; None for the detector's own.
+        threshold: Minimum confidence of a detection; None: the threshold of the detector.
         localizer: Computes positions from detections, for comparison with the true positions.
-        worst: Gathers the worst mistakes.
-        table: Declares the workspace whose brightness, contrast and colours are measured; None: they are not.
+        worst: Collects the worst mistakes.
+        table: Workspace of which brightness, contrast and colours are measured; None: they are not measured.
     """
-    tally, precision, repeats = Tally(localizer), AveragePrecision(), RepeatedErrors(localizer)
-    frames: list[FrameStatistics] = []
+    errors, repeats = ErrorStatistics(localizer), RepeatedErrors(localizer)
+    average_precision = AveragePrecision()
+    statistics_of_frames: list[FrameStatistics] = []
     latencies: list[float] = []
-    answered: Counter[str] = Counter()
-    unavailable, why = 0, ""
+    answer_counts: Counter[str] = Counter()
+    unavailable_count, reason = 0, ""
     for number, sample in enumerate(samples, 1):
         frame = sample.to_frame(number)
         try:
-            answer, latency = detector.ask(frame)
+            answer, latency = detector.detect(frame)
         except Unavailable as error:
-            unavailable, why = unavailable + 1, str(error)
+            unavailable_count, reason = unavailable_count + 1, str(error)
             continue
-        answered[answer.detector] += 1
+        answer_counts[answer.detector] += 1
         latencies.append(latency)
-        precision.add([one for one in answer.found if not is_ignored(one, sample)], sample)
+        average_precision.add([one for one in answer.found if not is_ignored(one, sample)], sample)
         min_confidence = answer.error_rates.threshold if threshold is None else threshold
         matches = _match(answer, sample, min_confidence)
-        tally.add(matches, sample, frame)
+        errors.add(matches, sample, frame)
         if sample.second_image is not None:
             with contextlib.suppress(Unavailable):
-                second, _ = detector.ask(replace(frame, image=sample.second_image))
-                repeats.add(matches, _match(second, sample, min_confidence), sample, frame)
-        if table is not None and (statistics := measure_frame(frame, table)):
-            frames.append(statistics)
+                second_answer, _ = detector.detect(replace(frame, image=sample.second_image))
+                repeats.add(matches, _match(second_answer, sample, min_confidence), sample, frame)
+        if table is not None and (frame_statistics := measure_frame(frame, table)):
+            statistics_of_frames.append(frame_statistics)
         if worst is not None:
             worst.add(matches, sample)
-    map50, map50_95 = precision.result()
+    map50, map50_95 = average_precision.compute()
     return Evaluation(
         threshold=detector.threshold if threshold is None else threshold,
-        images=unavailable + answered.total(),
-        objects=tally.objects,
-        precision=tally.precision,
-        recall=tally.recall,
+        images=unavailable_count + answer_counts.total(),
+        objects=errors.objects,
+        precision=errors.precision,
+        recall=errors.recall,
         map50=map50,
         map50_95=map50_95,
-        centre=Distribution.of(tally.centre),
-        position=Distribution.of(tally.position),
-        localized=Distribution.of(tally.localized),
-        # The first look warms up caches and connections.
+        centre=Distribution.of(errors.centre_errors),
+        position=Distribution.of(errors.position_errors),
+        localized=Distribution.of(errors.localization_errors),
+        # The first request is slower: it fills caches and opens connections.
         latency=Distribution.of(latencies[1:] or latencies),
-        by_class=tally.by_class(),
-        confusion=tally.table(),
-        unavailable=unavailable,
-        why=why,
-        answered_by=dict(answered),
-        by_count={count: dict(errors) for count, errors in tally.by_count.items()},
-        reliability=tally.estimate_error_rates(repeats),
-        frames=FrameRange.of(frames),
+        by_class=errors.compute_class_metrics(),
+        confusion=errors.make_confusion_matrix(),
+        unavailable=unavailable_count,
+        why=reason,
+        answered_by=dict(answer_counts),
+        by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
+        reliability=errors.estimate_error_rates(repeats),
+        frames=FrameRange.of(statistics_of_frames),
     )
 
 
 def _match(answer: Answer, sample: LabelledImage, min_confidence: float) -> list[BoxMatch]:
-    """Return the matches of the detections that count."""
+    """Return the matches of the detections from `min_confidence` on, without those of ignored objects."""
     found = [one for one in answer.found if one.confidence >= min_confidence]
-    return match([one for one in found if not is_ignored(one, sample)], sample)
+    return match_detections([one for one in found if not is_ignored(one, sample)], sample)
 
 
-def label_file(model: Path) -> Path:
+def find_label_file(model: Path) -> Path:
     """Return the label file of a model `NAME.onnx`: `NAME.labels.txt` if it exists, else `labels.txt`."""
-    own = model.with_suffix(".labels.txt")
-    return own if own.is_file() else model.with_name("labels.txt")
+    file = model.with_suffix(".labels.txt")
+    return file if file.is_file() else model.with_name("labels.txt")
 
 
-def model_detector(model: Path, labels: Path) -> DetectorConfig:
-    """Return the section of a cell file for an exported RF-DETR.
+def make_model_config(model: Path, labels: Path) -> DetectorConfig:
+    """Return the configuration of a detector for an exported RF-DETR.
 
     Args:
         model: The ONNX file.
-        labels: The text file that lists its class names.
+        labels: The text file with its class names.
     """
     files = {"model_path": str(model.absolute()), "labels": str(labels.absolute())}
     return DetectorConfig.model_validate({"kind": "rfdetr", "floor": MIN_CONFIDENCE, **files})
@@ -129,45 +130,45 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
 
     Args:
         model: The ONNX file.
-        labels: The text file that lists its class names.
-        folder: A split, or a data set whose `test` or else `valid` split is used.
-        threshold: Confidence from which a detection counts.
+        labels: The text file with its class names.
+        folder: A split, or a dataset whose first existing split of `samples.SPLITS` is used.
+        threshold: Minimum confidence of a detection.
 
     Raises:
         InputError: Model, labels or images cannot be read.
     """
-    detector = CellDetector({MODEL_NAME: model_detector(model, labels)}, MODEL_NAME, base=Path())
+    detector = CellDetector({MODEL_NAME: make_model_config(model, labels)}, MODEL_NAME, base=Path())
     with contextlib.closing(detector):
         return evaluate(detector, Samples(folder), threshold=threshold)
 
 
 class AveragePrecision:
-    """Collects detections; computes the mean average precision over all classes in the images."""
+    """Mean average precision over all classes in the images."""
 
     def __init__(self) -> None:
         # The import takes half a second and 120 MB, so only an evaluation makes it.
         import supervision
         from supervision.metrics import MeanAveragePrecision
 
-        self._kind = supervision.Detections
+        self._detections_type = supervision.Detections
         self._metric = MeanAveragePrecision()
-        self._numbers: dict[str, int] = {}
+        self._class_ids: dict[str, int] = {}
         self._has_objects = False
 
     def add(self, found: Sequence[Detection], sample: LabelledImage) -> None:
-        """Count the answer to one image, every box from the detector's floor on."""
-        predicted = self._detections([one.box for one in found], [one.label for one in found])
+        """Add the detections in one image, with any confidence that the detector reports."""
+        predicted = self._to_detections([one.box for one in found], [one.label for one in found])
         predicted.confidence = np.array([one.confidence for one in found], dtype=float)
-        self._metric.update([predicted], [self._detections(sample.boxes, sample.labels)])
+        self._metric.update([predicted], [self._to_detections(sample.boxes, sample.labels)])
         self._has_objects |= bool(sample.labels)
 
-    def result(self) -> tuple[float, float]:
-        """Return it at an IoU of 0.5, and its mean over IoUs of 0.5 to 0.95; zeros without objects."""
+    def compute(self) -> tuple[float, float]:
+        """Return the value at an IoU of 0.5, and its mean over IoUs of 0.5 to 0.95; zeros without objects."""
         if not self._has_objects:
             return 0.0, 0.0
         result = self._metric.compute()
         return float(result.map50), float(result.map50_95)
 
-    def _detections(self, boxes: Sequence[Box], labels: Sequence[str]) -> Any:
-        numbers = [self._numbers.setdefault(label, len(self._numbers)) for label in labels]
-        return self._kind(np.array(boxes, float).reshape(-1, 4), class_id=np.array(numbers, dtype=int))
+    def _to_detections(self, boxes: Sequence[Box], labels: Sequence[str]) -> Any:
+        ids = [self._class_ids.setdefault(label, len(self._class_ids)) for label in labels]
+        return self._detections_type(np.array(boxes, float).reshape(-1, 4), class_id=np.array(ids, dtype=int))

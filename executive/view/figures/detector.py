@@ -8,7 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console, RenderableType
 from rich.table import Table
 
-from executive.training.evaluation.figures import NOTHING, Evaluation
+from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
 
 
 def print_metrics(source: str, detector: str, evaluation: Evaluation) -> None:
@@ -57,7 +57,7 @@ def _make_confusion_table(evaluation: Evaluation) -> Table:
     """Return a table with the number of objects by true class (rows) and detected class (columns)."""
     table = _make_table("true \\ detected", *next(iter(evaluation.confusion.values())))
     for label, row in evaluation.confusion.items():
-        table.add_row(label, *("" if label == other == NOTHING else f"{row[other]}" for other in row))
+        table.add_row(label, *("" if label == other == NO_OBJECT else f"{row[other]}" for other in row))
     return table
 
 

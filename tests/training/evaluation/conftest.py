@@ -27,7 +27,7 @@ class Scripted:
         self.answers = list(answers)
         self.frames = []
 
-    def ask(self, frame):
+    def detect(self, frame):
         self.frames.append(frame)
         answer = self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
         if isinstance(answer, str):

@@ -11,8 +11,8 @@ from executive.errors import NoDepth
 from executive.perception.envelope.measurement import StoredErrorRates
 from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates, round_up
 from executive.training.evaluation.evaluate import evaluate
-from executive.training.evaluation.figures import ClassFigures, Distribution
-from executive.training.evaluation.misses import WorstMisses
+from executive.training.evaluation.metrics import ClassMetrics, Distribution
+from executive.training.evaluation.worst_mistakes import WorstMistakes
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def test_a_perfect_detector_is_perfect(saying, sample, both):
     assert (measured.precision, measured.recall) == (1, 1)
     assert measured.map50 == pytest.approx(1, abs=1e-3)
     assert (measured.centre.worst, measured.position.worst) == (0, pytest.approx(0, abs=1e-9))
-    plain = measured.as_dict()
+    plain = measured.to_dict()
     perfect = {"objects": 1, "precision": 1, "recall": 1}
     assert plain["by_class"] == {"cube": perfect, "duck": perfect}
     bounds = {"miss_rate": 0.78, "confusion_rate": 0.78, "false_detections": 3.0}
@@ -55,7 +55,7 @@ def test_a_miss_lowers_recall_and_a_phantom_lowers_precision(saying, sample, bot
     assert (missing.precision, missing.recall) == (1, 0.5)
     imagining = evaluate(saying((*both, ("duck", 0.7, (150.0, 200.0, 180.0, 230.0)))), [sample])
     assert (imagining.precision, imagining.recall) == (2 / 3, 1)
-    assert imagining.by_class["duck"] == ClassFigures(1, 0.5, 1)
+    assert imagining.by_class["duck"] == ClassMetrics(1, 0.5, 1)
     assert imagining.confusion["nothing"] == {"cube": 0, "duck": 1}
     assert counts(imagining) == [(0, 2), (0, 2), (1, 1)]
 
@@ -135,9 +135,9 @@ def test_the_cells_localizer_is_held_against_the_true_middle(saying, sample, bot
 
 
 def test_the_worst_misses_are_gathered(saying, sample, both):
-    worst = WorstMisses()
+    worst = WorstMistakes()
     evaluate(saying(both[:1]), [sample], worst=worst)
-    assert [miss.text for miss in worst.kept] == ["duck overlooked", "cube off by 0.0 px"]
+    assert [mistake.text for mistake in worst.kept] == ["duck missed", "cube off by 0.0 px"]
 
 
 def test_a_spread_names_its_quantiles():
@@ -146,8 +146,9 @@ def test_a_spread_names_its_quantiles():
 
 def rates(full_view_count, missed, confused, invented, looks, jitter):
     return MeasuredErrorRates(
-        CountedRate.share(missed, full_view_count), CountedRate.share(confused, full_view_count - missed),
-        CountedRate.per_trial(invented, looks), jitter, repeated=0.751, bias=0.00112,
+        CountedRate.estimate_proportion(missed, full_view_count),
+        CountedRate.estimate_proportion(confused, full_view_count - missed),
+        CountedRate.estimate_mean_count(invented, looks), jitter, repeated=0.751, bias=0.00112,
     )  # fmt: skip
 
 

@@ -11,16 +11,22 @@ import pytest
 from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.training.dataset import save_image
-from executive.training.evaluation.matching import is_ignored, match
-from executive.training.evaluation.misses import FOUND, TRUE, WorstMisses, draw_sheet, misses
+from executive.training.evaluation.matching import is_ignored, match_detections
+from executive.training.evaluation.worst_mistakes import (
+    DETECTED_COLOUR,
+    TRUE_COLOUR,
+    WorstMistakes,
+    draw_sheet,
+    find_mistakes,
+)
 
 
 def matches(sample, *found):
-    return match([Detection(*one) for one in found], sample)
+    return match_detections([Detection(*one) for one in found], sample)
 
 
-def find_misses(sample, *found):
-    return list(misses(matches(sample, *found), sample))
+def list_mistakes(sample, *found):
+    return list(find_mistakes(matches(sample, *found), sample))
 
 
 def right_by(box, pixels, down=0):
@@ -37,7 +43,9 @@ def test_an_object_goes_to_its_own_class_then_to_the_most_confident(sample):
         ([("cube", 0.9, right_by(cube, 11))], [(0.9, None, False)]),
         ([("cube", 0.9, right_by(cube, 9))], [(0.9, 0, True)]),
     ):
-        assert [(m.detection.confidence, m.number, m.right) for m in matches(sample, *found)] == expected
+        assert [
+            (m.detection.confidence, m.object_index, m.is_correct) for m in matches(sample, *found)
+        ] == expected
 
 
 def test_an_ignored_object_is_one_that_a_box_fits_better_than_any_other(sample):
@@ -50,45 +58,45 @@ def test_an_ignored_object_is_one_that_a_box_fits_better_than_any_other(sample):
 def test_every_kind_of_mistake_has_a_text_and_a_weight(sample, knowing):
     cube, duck = sample.boxes
     phantom = ("duck", 0.7, (150.0, 200.0, 180.0, 230.0))
-    found = find_misses(knowing(visible_fraction=[0.62, 1.0]), ("cube", 0.91, duck), phantom)
+    found = list_mistakes(knowing(visible_fraction=[0.62, 1.0]), ("cube", 0.91, duck), phantom)
     # A box off its place is as bad as its share of the object; what is cut off weighs half.
-    found += find_misses(sample, ("duck", 0.9, duck), ("cube", 0.8, right_by(cube, 3, down=4)))[1:]
-    found += find_misses(replace(sample, labels=("cube",), boxes=((0.0, 10.0, 30.0, 40.0),)))
-    assert [(miss.text, pytest.approx(miss.severity)) for miss in found] == [
-        ("cube overlooked, 62% visible", 0.62),
-        ("duck taken for cube 0.91", 0.91),
-        ("no such thing: duck 0.70", 0.7),
+    found += list_mistakes(sample, ("duck", 0.9, duck), ("cube", 0.8, right_by(cube, 3, down=4)))[1:]
+    found += list_mistakes(replace(sample, labels=("cube",), boxes=((0.0, 10.0, 30.0, 40.0),)))
+    assert [(mistake.text, pytest.approx(mistake.severity)) for mistake in found] == [
+        ("cube missed, 62% visible", 0.62),
+        ("duck detected as cube 0.91", 0.91),
+        ("false detection: duck 0.70", 0.7),
         ("cube off by 5.0 px", 5 / 30),
-        ("cube overlooked, cut off", 0.5),
+        ("cube missed, truncated", 0.5),
     ]
 
 
 def test_the_worst_come_first_and_the_others_are_forgotten(knowing):
-    worst = WorstMisses(3)
+    worst = WorstMistakes(3)
     for share in (0.55, 0.95, 0.75, 0.65):
         worst.add([], knowing(visible_fraction=[share, 0.5]))
-    assert [miss.severity for miss in worst.kept] == [0.95, 0.75, 0.65]
+    assert [mistake.severity for mistake in worst.kept] == [0.95, 0.75, 0.65]
 
 
 def test_the_sheet_shows_the_true_and_the_found_box(sample):
-    shown = find_misses(sample, ("cube", 0.9, right_by(sample.boxes[0], 6)))
-    assert [miss.text for miss in shown] == ["duck overlooked", "cube off by 6.0 px"]
+    shown = list_mistakes(sample, ("cube", 0.9, right_by(sample.boxes[0], 6)))
+    assert [mistake.text for mistake in shown] == ["duck missed", "cube off by 6.0 px"]
     picture = draw_sheet(shown, "overhead")
     tiles = picture[34:274, 10:250], picture[34:274, 260:500]
-    colours = [np.array(list(bytes.fromhex(colour[1:]))) for colour in (TRUE, FOUND)]
+    colours = [np.array(list(bytes.fromhex(colour[1:]))) for colour in (TRUE_COLOUR, DETECTED_COLOUR)]
     shows = [[bool((tile == colour).all(axis=-1).any()) for colour in colours] for tile in tiles]
     assert shows == [[True, False], [True, True]]
 
 
 def test_a_sheet_without_mistakes_is_narrow_and_more_than_a_row_of_them_make_two(sample):
     assert draw_sheet([], "overhead").shape == (34 + 290, 10 + 3 * 250, 3)
-    assert draw_sheet(find_misses(sample) * 4, "overhead").shape == (34 + 2 * 290, 10 + 6 * 250, 3)
+    assert draw_sheet(list_mistakes(sample) * 4, "overhead").shape == (34 + 2 * 290, 10 + 6 * 250, 3)
 
 
 def test_a_sheet_is_written_where_it_is_asked_for_or_that_is_explained(sample, tmp_path):
     path = tmp_path / "new" / "sheet.png"
-    save_image(path, draw_sheet(find_misses(sample), "overhead"))
-    assert np.array_equal(cv2.imread(str(path))[..., ::-1], draw_sheet(find_misses(sample), "overhead"))
+    save_image(path, draw_sheet(list_mistakes(sample), "overhead"))
+    assert np.array_equal(cv2.imread(str(path))[..., ::-1], draw_sheet(list_mistakes(sample), "overhead"))
     (tmp_path / "sheet.png").mkdir()
     with pytest.raises(InputError, match=r"sheet\.png could not be written; is the disk full"):
-        save_image(tmp_path / "sheet.png", draw_sheet(find_misses(sample), "overhead"))
+        save_image(tmp_path / "sheet.png", draw_sheet(list_mistakes(sample), "overhead"))

@@ -7,17 +7,19 @@ from dataclasses import replace
 import pytest
 
 from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates
-from executive.training.evaluation.figures import ClassFigures, Distribution, Evaluation
+from executive.training.evaluation.metrics import ClassMetrics, Distribution, Evaluation
 from executive.view.figures.detector import print_metrics
 
 MEASURED = Evaluation(
     threshold=0.5, images=300, objects=900, precision=0.991, recall=0.98, map50=0.995, map50_95=0.8,
     latency=Distribution(15, 16, 17, 18),
-    by_class={"cube": ClassFigures(900, 0.991, 0.98)},
+    by_class={"cube": ClassMetrics(900, 0.991, 0.98)},
     confusion={"cube": {"cube": 882, "nothing": 18}, "nothing": {"cube": 8, "nothing": 0}},
     answered_by={"eye": 300},
     reliability=MeasuredErrorRates(
-        CountedRate.share(2, 800), CountedRate.share(0, 798), CountedRate.per_trial(8, 300),
+        CountedRate.estimate_proportion(2, 800),
+        CountedRate.estimate_proportion(0, 798),
+        CountedRate.estimate_mean_count(8, 300),
         jitter=0.5, repeated=0.8, bias=0.001,
     ),
 )  # fmt: skip

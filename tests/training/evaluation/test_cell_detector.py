@@ -11,8 +11,8 @@ from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.errors import Unavailable
 from executive.perception.detectors.views import list_parts
-from executive.training.evaluation import asking
-from executive.training.evaluation.asking import WHOLE_IMAGE, CellDetector
+from executive.training.evaluation import cell_detector
+from executive.training.evaluation.cell_detector import WHOLE_IMAGE, CellDetector
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
 FOUND = tuple(Detection(label, 0.9, (1.0, 2.0, 3.0, 4.0)) for label in ("cube", "boat"))
@@ -55,7 +55,7 @@ def build(monkeypatch):
             behind.eye = Delayed(camera, clock, answer)
             return vars(behind)
 
-        monkeypatch.setattr(asking, "build_detectors", build_detectors)
+        monkeypatch.setattr(cell_detector, "build_detectors", build_detectors)
         return CellDetector(CONFIGS, "eye", base=Path(), **options), behind.eye
 
     return build
@@ -68,15 +68,15 @@ def frame(sample):
 
 def test_an_answer_is_waited_for_on_the_clock(build, frame):
     detector, eye = build()
-    answer, latency = detector.ask(frame)
+    answer, latency = detector.detect(frame)
     assert (answer, detector.threshold) == (ANSWER, 0.6)
     assert latency >= 0
-    detector.ask(frame)
+    detector.detect(frame)
     assert eye.stamps == pytest.approx([0.0, 1.3], abs=0.01)
 
 
 def test_what_the_cell_does_not_handle_is_no_object_of_its(build, frame):
-    answer, _ = build(classes=("cube",))[0].ask(frame)
+    answer, _ = build(classes=("cube",))[0].detect(frame)
     assert answer.found == FOUND[:1]
 
 
@@ -84,19 +84,19 @@ def test_an_unavailable_detector_says_why_and_one_that_never_answers_is_given_up
     detector, eye = build(Unavailable("the server is gone"))
     for _ in range(2):
         with pytest.raises(Unavailable, match="the server is gone"):
-            detector.ask(frame)
+            detector.detect(frame)
     assert eye.stamps == pytest.approx([0.0, 1.3], abs=0.01)
-    with pytest.raises(Unavailable, match="no answer within 60 s of the clock"):
-        build(None)[0].ask(frame)
+    with pytest.raises(Unavailable, match="no answer within 60 s of simulated time"):
+        build(None)[0].detect(frame)
 
 
 def test_frames_of_a_camera_are_searched_as_in_a_run_and_other_images_as_a_whole(build, frame):
     camera = WHOLE_IMAGE.model_copy(update={"table_view": (0, 0, 256, 256)})
     detector, eye = build(camera=camera, view="table")
-    detector.ask(frame)
+    detector.detect(frame)
     assert (eye.camera, eye.views) == (camera, ["table"])
     detector, eye = build()
-    detector.ask(frame)
+    detector.detect(frame)
     assert eye.views == ["full"]
     for size in ((300, 100), (64, 900)):
         assert list_parts("full", eye.camera.table_view, size) == [(0, 0, *size)]

@@ -1,4 +1,4 @@
-"""Detectors of a cell file outside of any run, asked as a run asks them."""
+"""Detector of a cell file, used without a run but with the same requests as in a run."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from executive.cell.frame import Frame
 from executive.errors import Unavailable
 from executive.perception.detectors.registry import build_detectors
 
-PAUSE = 1.0
-"""Time on the clock between two looks [s]: about what lies between two in a run."""
-TIMEOUT = 60.0
-"""Longest time on the clock for an answer [s]."""
+LOOK_INTERVAL = 1.0
+"""Simulated time between two requests [s]; similar to the time between two looks in a run."""
+ANSWER_TIMEOUT = 60.0
+"""Maximum simulated time from a request to its answer [s]."""
 WHOLE_IMAGE = CameraConfig(
     mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
     table_view=(0, 0, 64, 64), scan_poses=("none",),
 ).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
-"""A camera whose view `full` is searched in one piece, whatever the size of the image."""
+"""Camera whose view `full` is searched in one piece for images of any size."""
 
 
 class CellDetector:
-    """A detector of a cell file, built for measuring it.
+    """Detector of a cell file for measurements of its accuracy.
 
     Args:
-        configs: The detectors section of the cell file; a detector may need the others.
-        name: Name of the detector that is asked.
-        base: Folder that paths in their options start from.
-        camera: The camera that the frames come from; with None every image is searched as a whole.
-        view: The part of such frames that is searched.
-        classes: Classes that the cell handles: as in a run, nothing else counts. None: everything counts.
+        configs: Section `detectors` of the cell file; a detector may use other detectors.
+        name: Name of the detector to measure.
+        base: Folder to which paths in the options are relative.
+        camera: Camera of the frames; None: every image is searched as a whole.
+        view: View of `camera` that is searched, `table` or `full`.
+        classes: Classes of the cell; as in a run, detections of other classes are dropped. None: all classes.
 
     Raises:
         InputError: A detector cannot be built.
@@ -56,29 +56,31 @@ class CellDetector:
         self._classes = classes
         self._now = 0.0
         clock = StepClock(lambda: self._now)
-        self._built = build_detectors(configs, camera=camera or WHOLE_IMAGE, clock=clock, base=base, seed=0)
+        self._detectors = build_detectors(
+            configs, camera=camera or WHOLE_IMAGE, clock=clock, base=base, seed=0
+        )
 
-    def ask(self, frame: Frame) -> tuple[Answer, float]:
-        """Return the detector's answer to a frame, and the wall time that it took [ms].
+    def detect(self, frame: Frame) -> tuple[Answer, float]:
+        """Return the answer of the detector to a frame, and its latency in wall time [ms].
 
         Raises:
             Unavailable: The detector gave no usable answer.
         """
-        began, asked = time.perf_counter(), self._now
+        start_time, request_time = time.perf_counter(), self._now
         try:
-            request = self._built[self._name].request(replace(frame, stamp=asked), self._view)
+            request = self._detectors[self._name].request(replace(frame, stamp=request_time), self._view)
             while not request.ready:
-                if self._now - asked > TIMEOUT:
-                    raise Unavailable(f"no answer within {TIMEOUT:g} s of the clock")
+                if self._now - request_time > ANSWER_TIMEOUT:
+                    raise Unavailable(f"no answer within {ANSWER_TIMEOUT:g} s of simulated time")
                 self._now += STEP
             answer = request.result()
         finally:
-            self._now += PAUSE
-        latency = (time.perf_counter() - began) * 1000
+            self._now += LOOK_INTERVAL
+        latency = (time.perf_counter() - start_time) * 1000
         found = tuple(one for one in answer.found if self._classes is None or one.label in self._classes)
         return replace(answer, found=found), latency
 
     def close(self) -> None:
-        """Give back what the detectors hold."""
-        for detector in self._built.values():
+        """Release the resources of the detectors."""
+        for detector in self._detectors.values():
             detector.close()

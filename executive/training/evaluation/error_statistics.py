@@ -1,0 +1,209 @@
+"""Statistics of the errors of a detector over all images of an evaluation."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from executive.cell.frame import Frame
+from executive.cell.protocols import Localizer
+from executive.errors import NoDepth
+from executive.geometry import Array
+from executive.perception.camera_model import intersect_plane
+from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates
+from executive.training.evaluation.matching import MIN_IOU, BoxMatch, compute_ious, is_covered
+from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics
+from executive.training.labelled_image import LabelledImage
+
+
+class ErrorStatistics:
+    """Counts of correct and wrong detections, and distances between detected and true positions.
+
+    Args:
+        localizer: Computes the positions of detections; None: they are not compared with the true positions.
+
+    Attributes:
+        counts_by_object_count: Number of fully visible `objects`, of `missed` and `confused` ones, and of
+            `false_detections`, by the number of objects in the image.
+        confusion: Number of objects by true and detected class, each also `nothing`.
+        centre_errors: Distances of the centres of correct detections from the true centres [pixel].
+        position_errors: Distances between these centres in the world, at the height of the object [mm]; only
+            of objects that lie completely in the searched region.
+        localization_errors: Distances from the true centres of these objects to the positions of the
+            localizer [mm].
+    """
+
+    def __init__(self, localizer: Localizer | None = None) -> None:
+        self._localizer = localizer
+        self._image_count = 0
+        self.counts_by_object_count: dict[int, Counter[str]] = defaultdict(Counter)
+        self.confusion: Counter[tuple[str, str]] = Counter()
+        self.centre_errors, self.position_errors = list[float](), list[float]()
+        self.localization_errors, self._squared_errors = list[float](), list[float]()
+
+    def add(self, matches: Sequence[BoxMatch], sample: LabelledImage, frame: Frame) -> None:
+        """Count the matches of one image, and measure the position errors of its correct detections."""
+        self._image_count += 1
+        counts = self.counts_by_object_count[len(sample.labels)]
+        match_by_object = {one.object_index: one for one in matches if one.object_index is not None}
+        for index, label in enumerate(sample.labels):
+            one = match_by_object.get(index)
+            self.confusion[label, one.detection.label if one else NO_OBJECT] += 1
+            if sample.is_fully_visible(index) and (one or not is_covered(index, matches, sample)):
+                is_confused = one is not None and not one.is_correct
+                counts.update(objects=1, missed=one is None, confused=is_confused)
+            if one is not None and one.is_correct:
+                self._measure_errors(one, index, sample, frame)
+        false_detections = [one.detection.label for one in matches if one.object_index is None]
+        self.confusion.update((NO_OBJECT, label) for label in false_detections)
+        counts.update(false_detections=len(false_detections))
+
+    @property
+    def objects(self) -> int:
+        """Number of objects in all images."""
+        return sum(count for (true, _), count in self.confusion.items() if true != NO_OBJECT)
+
+    @property
+    def precision(self) -> float:
+        """Fraction of the detections that are correct; 0 without detections."""
+        found = sum(count for (_, label), count in self.confusion.items() if label != NO_OBJECT)
+        return self._correct_count / max(found, 1)
+
+    @property
+    def recall(self) -> float:
+        """Fraction of the objects that are detected with their class; 0 without objects."""
+        return self._correct_count / max(self.objects, 1)
+
+    def compute_class_metrics(self) -> dict[str, ClassMetrics]:
+        """Return the metrics of every class in the images."""
+        table = self.make_confusion_matrix()
+        figures = {}
+        for label in sorted(set(table) - {NO_OBJECT}):
+            correct_count, objects = self.confusion[label, label], sum(table[label].values())
+            found = sum(row.get(label, 0) for row in table.values())
+            figures[label] = ClassMetrics(objects, correct_count / max(found, 1), correct_count / objects)
+        return figures
+
+    def make_confusion_matrix(self) -> dict[str, dict[str, int]]:
+        """Return the confusion matrix: number of objects by true class, then by detected class."""
+        rows, columns = (
+            sorted({pair[side] for pair in self.confusion}, key=lambda label: (label == NO_OBJECT, label))
+            for side in (0, 1)
+        )
+        return {true: {found: self.confusion[true, found] for found in columns} for true in rows}
+
+    def estimate_error_rates(self, repeats: RepeatedErrors) -> MeasuredErrorRates | None:
+        """Return the error rates on fully visible objects, or None if there was no answer."""
+        if not self._image_count:
+            return None
+        counts = sum(self.counts_by_object_count.values(), Counter[str]())
+        detected_count = counts["objects"] - counts["missed"]
+        jitter = float(np.sqrt(np.mean(self._squared_errors))) if self._squared_errors else 0.0
+        return MeasuredErrorRates(
+            miss_rate=CountedRate.estimate_proportion(counts["missed"], counts["objects"]),
+            confusion_rate=CountedRate.estimate_proportion(counts["confused"], detected_count),
+            false_detections=CountedRate.estimate_mean_count(counts["false_detections"], self._image_count),
+            jitter=jitter if repeats.jitter is None else repeats.jitter,
+            repeated=repeats.repeated_fraction,
+            bias=repeats.bias,
+        )
+
+    @property
+    def _correct_count(self) -> int:
+        return sum(count for (true, found), count in self.confusion.items() if true == found)
+
+    def _measure_errors(self, match: BoxMatch, index: int, sample: LabelledImage, frame: Frame) -> None:
+        """Measure the position errors of a correct detection of the object `index`."""
+        self.centre_errors.append(float(np.hypot(*match.offset)))
+        if sample.is_fully_visible(index):
+            self._squared_errors += ((match.offset * sample.pixel_scale) ** 2).tolist()
+        if not sample.is_fully_inside(index):
+            return
+        if "positions" in sample.truth:
+            true_position = np.array(sample.truth["positions"][index])
+            position = intersect_plane(frame.matrix, frame.X_WC, match.detection.centre, true_position[2])
+            self.position_errors.append(float(np.linalg.norm(position - true_position) * 1000))
+        if self._localizer is not None and "centres" in sample.truth:
+            # Without a depth, a run does not localize the object either.
+            with contextlib.suppress(NoDepth):
+                position = self._localizer.locate(match.detection, frame)
+                true_centre = np.array(sample.truth["centres"][index])
+                self.localization_errors.append(float(np.linalg.norm(position - true_centre) * 1000))
+
+
+class RepeatedErrors:
+    """Counts the errors that a second look repeats, and separates random from systematic position errors.
+
+    The two images of a scene differ only in the noise of the sensor. Half the mean squared difference of the
+    errors in both is the variance of the random error; their mean product is that of the systematic error.
+
+    Args:
+        localizer: Computes the positions of detections; None: systematic errors are not measured.
+
+    Attributes:
+        error_count: Number of errors in the first images.
+        repeated_count: Number of errors in the first images that occur also in the second images.
+    """
+
+    def __init__(self, localizer: Localizer | None) -> None:
+        self._localizer = localizer
+        self.error_count = self.repeated_count = 0
+        self._random_variances, self._error_products = list[float](), list[float]()
+
+    def add(
+        self, first: Sequence[BoxMatch], second: Sequence[BoxMatch], sample: LabelledImage, frame: Frame
+    ) -> None:
+        """Count the errors in the first image of a scene, and those that occur also in the second image."""
+        first_by_object = {one.object_index: one for one in first if one.object_index is not None}
+        second_by_object = {one.object_index: one for one in second if one.object_index is not None}
+        for index, label in enumerate(sample.labels):
+            if not sample.is_fully_visible(index):
+                continue
+            first_match, second_match = first_by_object.get(index), second_by_object.get(index)
+            if first_match is None and is_covered(index, first, sample):
+                continue
+            first_label, second_label = (one and one.detection.label for one in (first_match, second_match))
+            self.error_count += first_label != label
+            self.repeated_count += first_label != label and first_label == second_label
+            if first_match and second_match and first_match.is_correct and second_match.is_correct:
+                self._compare(first_match, second_match, sample, frame)
+        false_detections = [one.detection for one in second if one.object_index is None]
+        for false in (one.detection for one in first if one.object_index is None):
+            boxes = [one.box for one in false_detections if one.label == false.label]
+            self.error_count += 1
+            self.repeated_count += bool(compute_ious([false.box], boxes).max(initial=0.0) >= MIN_IOU)
+
+    @property
+    def repeated_fraction(self) -> float:
+        """Fraction of the errors that a second look repeats, estimated by Laplace's rule of succession."""
+        return (self.repeated_count + 1) / (self.error_count + 2)
+
+    @property
+    def jitter(self) -> float | None:
+        """Standard deviation of the random error of a box's centre [pixel of the frame]; None if unknown."""
+        return float(np.sqrt(np.mean(self._random_variances))) if self._random_variances else None
+
+    @property
+    def bias(self) -> float:
+        """Standard deviation of the systematic error of a position, along each axis of the table [m]."""
+        variance = float(np.mean(self._error_products)) if self._error_products else 0.0
+        return math.sqrt(max(variance, 0.0))
+
+    def _compare(self, first: BoxMatch, second: BoxMatch, sample: LabelledImage, frame: Frame) -> None:
+        """Compare the errors of box and position of one object in both images."""
+        assert first.object_index is not None
+        difference = (first.offset - second.offset) * sample.pixel_scale
+        self._random_variances += (difference**2 / 2).tolist()
+        if self._localizer is None or "centres" not in sample.truth:
+            return
+        true_centre = np.array(sample.truth["centres"][first.object_index])
+        with contextlib.suppress(NoDepth):
+            errors: list[Array] = [
+                (self._localizer.locate(match.detection, frame) - true_centre)[:2]
+                for match in (first, second)
+            ]
+            self._error_products += (errors[0] * errors[1]).tolist()

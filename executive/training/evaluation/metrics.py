@@ -1,0 +1,108 @@
+"""Metrics of an evaluation of a detector."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from executive.perception.envelope.frame_statistics import FrameRange
+from executive.training.evaluation.error_rates import MeasuredErrorRates
+
+NO_OBJECT = "nothing"
+"""Class name in a confusion matrix for a missed object or a false detection."""
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """Quantiles of a measured quantity, in its unit.
+
+    Attributes:
+        median, p95, p99, worst: Median, 95th and 99th percentile, and maximum.
+    """
+
+    median: float
+    p95: float
+    p99: float
+    worst: float
+
+    @staticmethod
+    def of(values: Sequence[float]) -> Distribution | None:
+        """Return the distribution of `values`, or None if there are no values."""
+        if not len(values):
+            return None
+        median, p95, p99, worst = np.percentile(values, [50, 95, 99, 100])
+        return Distribution(float(median), float(p95), float(p99), float(worst))
+
+
+@dataclass(frozen=True)
+class ClassMetrics:
+    """Accuracy of a detector for one class.
+
+    Attributes:
+        objects: Number of objects of this class.
+        precision: Fraction of the detections of this class that are correct.
+        recall: Fraction of the objects of this class that are detected with this class.
+    """
+
+    objects: int
+    precision: float
+    recall: float
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Accuracy of a detector on labelled images; images without an answer count only in `images`.
+
+    Attributes:
+        threshold: Minimum confidence of a detection.
+        images: Number of images.
+        objects: Number of objects in the images with an answer.
+        precision: Fraction of the detections with the correct class and an IoU of at least 0.5.
+        recall: Fraction of the objects that are detected with their class.
+        map50: Mean average precision at IoU 0.5, over all detections, also below `threshold`.
+        map50_95: Mean average precision, averaged over IoUs from 0.5 to 0.95.
+        centre: Distance between the centres of detected and true box [pixel of the image].
+        position: Distance of the centres in the world, at the height of the object [mm]; None if unknown.
+        localized: Distance of the localizer's position from the true centre of the object [mm].
+        latency: Wall time from a frame to its detections [ms], without the first image.
+        by_class: Metrics of each class.
+        confusion: Number of objects by true and detected class, each also `nothing`.
+        unavailable: Number of images without a usable answer of the detector.
+        why: Message of the last unusable answer, or "".
+        answered_by: Number of answers by the name of the detector that gave them.
+        by_count: Number of fully visible `objects`, of `missed` and `confused` ones, and of
+            `false_detections`, by the number of objects in the image.
+        reliability: Error rates for the ledger; None if there was no answer.
+        frames: Brightness, contrast and colours of the workspace; None if no image shows all of it.
+    """
+
+    threshold: float
+    images: int
+    objects: int
+    precision: float
+    recall: float
+    map50: float
+    map50_95: float
+    centre: Distribution | None = None
+    position: Distribution | None = None
+    localized: Distribution | None = None
+    latency: Distribution | None = None
+    by_class: Mapping[str, ClassMetrics] = field(default_factory=dict)
+    confusion: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    unavailable: int = 0
+    why: str = ""
+    answered_by: Mapping[str, int] = field(default_factory=dict)
+    by_count: Mapping[int, Mapping[str, int]] = field(default_factory=dict)
+    reliability: MeasuredErrorRates | None = None
+    frames: FrameRange | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all metrics as JSON values."""
+        values = asdict(self)
+        values["frames"] = self.frames and self.frames.model_dump()
+        if self.reliability is not None:
+            values["reliability"]["rates"] = self.reliability.rates.model_dump()
+        return values

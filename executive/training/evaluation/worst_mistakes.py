@@ -1,0 +1,174 @@
+"""Worst mistakes of a detector, and a contact sheet of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from executive.cell.detection import Detection
+from executive.cell.frame import Box
+from executive.training.evaluation.matching import BoxMatch
+from executive.training.labelled_image import LabelledImage
+
+COLUMNS = 6
+"""Maximum number of tiles in a row of the sheet."""
+TILE_SIZE, CAPTION_HEIGHT, GAP, HEADER_HEIGHT = 240, 40, 10, 34
+"""Side of a tile, height of its caption, gap between tiles, height of the header of the sheet [pixel]."""
+CROP_SCALE = 2.2
+"""Side of the crop of the image, as a multiple of the longer side of the mistake's box."""
+MIN_CROP_SIZE = 40.0
+"""Minimum side of the crop [pixel of the image]."""
+LINE_THICKNESS = 2
+"""Thickness of the coloured lines [pixel]."""
+LEGEND = "boxes: detected, corners: ground truth"
+"""Text in the header that explains the lines."""
+
+BACKGROUND, TEXT, SECONDARY_TEXT = (32, 38, 43), (255, 255, 255), (169, 180, 188)
+"""Colours of background, main text and secondary text of the sheet, RGB."""
+TRUE_COLOUR, DETECTED_COLOUR, OUTLINE_COLOUR = "#56B4E9", "#E69F00", "#000000"
+"""Colours of true boxes, of detected boxes, and of the outline around their lines."""
+
+Picture = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Mistake:
+    """Missed object, false detection, wrong class, or position error of a correct detection.
+
+    Attributes:
+        severity: Visible fraction of a missed object (half of it if truncated), confidence of a wrong
+            detection, or offset of a correct box divided by the longer side of the object's box; 0 to 1.
+        text: Short description of the mistake.
+        box: Box around the mistake [pixel].
+        sample: The labelled image.
+        found: All detections in the image at or above the threshold.
+    """
+
+    severity: float
+    text: str
+    box: Box
+    sample: LabelledImage
+    found: tuple[Detection, ...]
+
+
+class WorstMistakes:
+    """Keeps the worst mistakes of all images.
+
+    Args:
+        count: Maximum number of mistakes.
+
+    Attributes:
+        kept: The mistakes by falling severity; equally severe mistakes in the order in which they were added.
+    """
+
+    def __init__(self, count: int = 24) -> None:
+        self._count = count
+        self.kept: list[Mistake] = []
+
+    def add(self, matches: Sequence[BoxMatch], sample: LabelledImage) -> None:
+        """Add the mistakes in one image, and drop the least severe ones beyond the maximum number."""
+        self.kept += find_mistakes(matches, sample)
+        self.kept.sort(key=lambda mistake: -mistake.severity)
+        del self.kept[self._count :]
+
+
+def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Mistake]:
+    """Yield the mistakes in one image, and every correct detection with the position error of its box."""
+    found = tuple(one.detection for one in matches)
+    detected_objects = {one.object_index for one in matches}
+    for index, label in enumerate(sample.labels):
+        if index not in detected_objects:
+            fraction = sample.get_visible_fraction(index)
+            truncation = "" if sample.is_fully_inside(index) else ", truncated"
+            visibility = "" if fraction >= 0.995 else f", {fraction:.0%} visible"
+            text = f"{label} missed{visibility}{truncation}"
+            yield Mistake(fraction / (2 if truncation else 1), text, sample.boxes[index], sample, found)
+    for one in matches:
+        box, severity = one.detection.box, one.detection.confidence
+        text = f"{one.detection.label} {severity:.2f}"
+        if one.is_correct:
+            offset = float(np.hypot(*one.offset))
+            size = max(one.box[2] - one.box[0], one.box[3] - one.box[1], 1.0)
+            severity, text = min(offset / size, 1.0), f"{one.detection.label} off by {offset:.1f} px"
+        elif one.object_index is None:
+            text = f"false detection: {text}"
+        else:
+            text = f"{sample.labels[one.object_index]} detected as {text}"
+        left, top, right, bottom = one.box
+        enclosing_box = min(box[0], left), min(box[1], top), max(box[2], right), max(box[3], bottom)
+        yield Mistake(severity, text, enclosing_box, sample, found)
+
+
+def draw_sheet(mistakes: Sequence[Mistake], title: str) -> Picture:
+    """Return a contact sheet with one tile per mistake, `(H, W, 3)` RGB.
+
+    Args:
+        mistakes: Mistakes in the order of their tiles.
+        title: Name of the measurement, for the header.
+    """
+    columns = min(COLUMNS, max(len(mistakes), 3))
+    rows = max(math.ceil(len(mistakes) / columns), 1)
+    column_width, row_height = TILE_SIZE + GAP, TILE_SIZE + CAPTION_HEIGHT + GAP
+    width = GAP + columns * column_width
+    sheet = np.full((HEADER_HEIGHT + rows * row_height, width, 3), BACKGROUND, np.uint8)
+    legend_left = width - GAP - _measure_text(LEGEND)
+    _write_text(sheet, LEGEND, (legend_left, 21), SECONDARY_TEXT)
+    _write_text(sheet, title if mistakes else f"{title}: no mistakes", (GAP, 21), TEXT, legend_left - 2 * GAP)
+    for index, mistake in enumerate(mistakes):
+        row, column = divmod(index, columns)
+        left, top = GAP + column * column_width, HEADER_HEIGHT + row * row_height
+        sheet[top : top + TILE_SIZE, left : left + TILE_SIZE] = _draw_tile(mistake)
+        _write_text(sheet, f"{index + 1}. {mistake.text}", (left, top + TILE_SIZE + 15), TEXT)
+        _write_text(sheet, mistake.sample.file, (left, top + TILE_SIZE + 32), SECONDARY_TEXT)
+    return sheet
+
+
+def _draw_tile(mistake: Mistake) -> Picture:
+    """Return a crop around a mistake with true and detected boxes, `(TILE_SIZE, TILE_SIZE, 3)` RGB."""
+    import supervision as sv
+
+    left, top, right, bottom = mistake.box
+    side = max(CROP_SCALE * max(right - left, bottom - top), MIN_CROP_SIZE)
+    corner = np.array([left + right - side, top + bottom - side]) / 2
+    zoom = TILE_SIZE / side
+    # The centre of pixel i is at i + 0.5 in the coordinates of boxes, and at i in those of OpenCV.
+    shift = zoom * (0.5 - corner) - 0.5
+    matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
+    image = mistake.sample.image[..., ::-1]  # The annotators expect BGR.
+    tile = cv2.warpAffine(
+        image, matrix, (TILE_SIZE, TILE_SIZE), flags=cv2.INTER_CUBIC, borderValue=BACKGROUND[::-1]
+    )
+    detected = sv.BoxAnnotator, [detection.box for detection in mistake.found], DETECTED_COLOUR
+    layers: Any = (detected, (sv.BoxCornerAnnotator, mistake.sample.boxes, TRUE_COLOUR))
+    for annotator, boxes, colour in layers:
+        tile_boxes = ((np.array(boxes).reshape(-1, 2, 2) - corner) * zoom).reshape(-1, 4)
+        detections = sv.Detections(tile_boxes, class_id=np.zeros(len(boxes), int))
+        for hex_colour, thickness in ((OUTLINE_COLOUR, 2 * LINE_THICKNESS), (colour, LINE_THICKNESS)):
+            tile = annotator(sv.Color.from_hex(hex_colour), thickness).annotate(tile, detections)
+    return np.asarray(tile[..., ::-1], dtype=np.uint8)
+
+
+def _write_text(
+    image: Picture,
+    text: str,
+    corner: tuple[int, int],
+    colour: tuple[int, int, int],
+    max_width: int = TILE_SIZE,
+) -> None:
+    """Write a text with its lower left corner at `corner` [pixel], truncated to `max_width` [pixel]."""
+    shown = text
+    while _measure_text(shown) > max_width and len(text) > 1:
+        text = text[:-1]
+        shown = f"{text}..."
+    cv2.putText(image, shown, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, 1, cv2.LINE_AA)
+
+
+def _measure_text(text: str) -> int:
+    """Return the width of a text [pixel]."""
+    return int(cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.42, 1)[0][0])
