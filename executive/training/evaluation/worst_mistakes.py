@@ -35,6 +35,7 @@ TRUE_COLOUR, DETECTED_COLOUR, OUTLINE_COLOUR = "#56B4E9", "#E69F00", "#000000"
 """Colours of true boxes, of detected boxes, and of the outline around their lines."""
 
 Picture = NDArray[np.uint8]
+Colour = tuple[int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +156,7 @@ def _draw_tile(mistake: Mistake) -> Picture:
 
 
 def _write_text(
-    image: Picture,
-    text: str,
-    corner: tuple[int, int],
-    colour: tuple[int, int, int],
-    max_width: int = TILE_SIZE,
+    image: Picture, text: str, corner: tuple[int, int], colour: Colour, max_width: int = TILE_SIZE
 ) -> None:
     """Write a text with its lower left corner at `corner` [pixel], truncated to `max_width` [pixel]."""
     shown = text
