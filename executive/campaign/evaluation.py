@@ -1,4 +1,4 @@
-"""Evaluation of detectors on labelled images, rendered or from a data set."""
+"""Evaluation of detectors on labelled images, rendered or from a dataset."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class DetectorUnderTest:
     base: Path
 
     def make_measurement_name(self, dataset: Path | None) -> str:
-        """Return the name of a measurement on a data set, or on scenes of the cell if `dataset` is None."""
+        """Return the name of a measurement on a dataset, or on scenes of the cell if `dataset` is None."""
         if dataset is None:
             assert self.cell is not None
             return self.cell.cell
@@ -174,7 +174,7 @@ def measure_detector(
 def _open_images(
     detector: DetectorUnderTest, dataset: Path | None, scenes: SceneSettings, progress: OpenProgressBar
 ) -> Iterator[Samples | list[LabelledImage]]:
-    """Open the images of the data set, or render scenes of the cell; a context manager."""
+    """Open the images of the dataset, or render scenes of the cell; a context manager."""
     config = detector.cell
     if dataset is not None or config is None:
         assert dataset is not None
