@@ -16,11 +16,11 @@ from executive.cells.fake.noisy_detector import NoisyOptions
 from executive.cells.sim.scene_file import SceneConfig
 from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
-from executive.mission.findings import CODES
+from executive.mission.findings import MEANING_BY_CODE
 from executive.mission.model import grammar
 from executive.mission.parse.control import find_inner_keys
-from executive.mission.schema.types import Json, type_schema
-from executive.mission.text.files import shipped_missions
+from executive.mission.schema.types import Json, make_type_schema
+from executive.mission.text.files import list_shipped_missions
 from executive.perception.detectors.registry import find_detector_kinds
 from executive.perception.detectors.rfdetr import RfdetrOptions
 from executive.perception.detectors.roboflow.options import RoboflowOptions
@@ -60,7 +60,7 @@ KINDS = {
 
 def generate() -> str:
     """Return the text of the reference."""
-    codes = ([f"`{code}`", meaning] for code, meaning in CODES.items())
+    codes = ([f"`{code}`", meaning] for code, meaning in MEANING_BY_CODE.items())
     chapters = {
         "Mission files": _mission_files(),
         "Control nodes": _control_nodes(),
@@ -85,12 +85,13 @@ def slug(heading: str) -> str:
 
 def _mission_files() -> Iterator[str]:
     tables = {
-        "A mission": grammar.MISSION, "A param of a mission": grammar.PARAM, "A library": grammar.LIBRARY,
-        "A subtree": grammar.SUBTREE, "Beside `use`": grammar.USE_SIBLINGS, "Any node": {"as": grammar.AS},
+        "A mission": grammar.MISSION_KEYS, "A param of a mission": grammar.PARAM_KEYS,
+        "A library": grammar.LIBRARY_KEYS, "A subtree": grammar.SUBTREE_KEYS,
+        "Beside `use`": grammar.USE_SIBLINGS, "Any node": {"as": grammar.LABEL_KEY},
     }  # fmt: skip
     for title, keys in tables.items():
         yield f"### {title}"
-        defaults = [_default(... if key.required else "") for key in keys.values()]
+        defaults = [_default(... if key.is_required else "") for key in keys.values()]
         cells = zip(keys.items(), defaults, strict=True)
         yield _table(
             KEYS, ([f"`{name}`", KINDS[key.kind], default, key.doc] for (name, key), default in cells)
@@ -157,7 +158,7 @@ def _sorting_library() -> Iterator[str]:
 
 
 def _shipped_missions() -> Iterator[str]:
-    texts = ((MISSIONS / f"{name}.yaml").read_text(encoding="utf-8") for name in shipped_missions())
+    texts = ((MISSIONS / f"{name}.yaml").read_text(encoding="utf-8") for name in list_shipped_missions())
     missions = map(yaml.safe_load, texts)
     rows = ([f"`{one['mission']}`", f"`{one['cell']}`", one["description"]] for one in missions)
     yield _table("mission, cell, meaning", rows)
@@ -172,7 +173,7 @@ def _detectors() -> Iterator[str]:
 
 def _model(model: type[Section]) -> Iterator[str]:
     """Yield the tables of a file or section, and of the sections below it."""
-    schema = type_schema(model)
+    schema = make_type_schema(model)
     paths: dict[str, list[str]] = {}
 
     def visit(part: Json, prefix: str) -> None:

@@ -15,7 +15,7 @@ from executive.cell.protocols import Localizer
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_count
 from executive.errors import InputError, explain_os_errors
-from executive.mission.findings import alternatives
+from executive.mission.findings import list_choices
 from executive.perception.detectors.registry import find_problems
 from executive.perception.envelope.fingerprint import take_fingerprint
 from executive.perception.envelope.measurement import (
@@ -118,7 +118,7 @@ def list_detectors(
         configs = model or dict(config.detectors)
         name = detector or next(iter(configs))
         if name not in configs:
-            hint = alternatives(name, configs, "Its detectors")
+            hint = list_choices(name, configs, "Its detectors")
             raise InputError(f'the cell {config.cell} has no detector "{name}". {hint}')
         yield DetectorUnderTest(config, configs, name, file.parent)
 

@@ -37,15 +37,15 @@ def find_cell(name: str) -> Path:
         InputError: Neither a file nor a shipped cell has this name.
     """
     from executive.errors import InputError
-    from executive.mission.findings import alternatives
-    from executive.mission.text.files import shipped_folder
+    from executive.mission.findings import list_choices
+    from executive.mission.text.files import get_shipped_folder
 
     path = Path(name)
     if path.is_file():
         return path
-    folder = shipped_folder() / "cells"
+    folder = get_shipped_folder() / "cells"
     shipped = {file.stem: file for file in sorted(folder.glob("*.yaml"))}
     if name in shipped:
         return shipped[name]
-    hint = alternatives(name, shipped, "Shipped cells")
+    hint = list_choices(name, shipped, "Shipped cells")
     raise InputError(f'there is no cell file "{name}", and no shipped cell of that name. {hint}')

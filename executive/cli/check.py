@@ -13,7 +13,7 @@ from executive.cli.streams import print_json, stdout_kept_clean
 
 if TYPE_CHECKING:
     from executive.mission.findings import Finding
-    from executive.mission.flow.endings import Ending
+    from executive.mission.flow.unhandled_failures import UnhandledFailure
 
 
 @click.command(name="check")
@@ -38,7 +38,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
         for mission in missions:
             try:
                 loaded = load_mission(mission, skills, overrides, cell_kind)
-                findings, endings, ok = loaded.warnings, loaded.endings, True
+                findings, endings, ok = loaded.warnings, loaded.unhandled_failures, True
                 texts.append(_describe(mission, findings, endings))
             except InputError as error:
                 missing = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
@@ -59,7 +59,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     ctx.exit(0 if all(report["ok"] for report in reports) else 2)
 
 
-def _describe(mission: str, findings: Sequence[Finding], endings: Sequence[Ending]) -> str:
+def _describe(mission: str, findings: Sequence[Finding], endings: Sequence[UnhandledFailure]) -> str:
     """Return the warnings of a valid mission, and the failures that can end its run, as text."""
     from executive.mission.findings import describe_findings
 

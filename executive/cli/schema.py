@@ -20,14 +20,16 @@ def command(cell: bool, library: bool, journal: bool) -> None:
     if cell + library + journal > 1:
         raise click.UsageError("--cell, --library and --journal exclude each other; give one of them")
     with stdout_kept_clean():
-        from executive.mission.schema.files import library_schema, mission_schema
-        from executive.mission.schema.types import cell_schema
+        from executive.mission.schema.files import make_library_schema, make_mission_schema
+        from executive.mission.schema.types import make_cell_schema
         from executive.plugins import discover
         from executive.record.journal_format import make_journal_schema
         from executive.tree.registry import load_control_nodes
 
         if cell or journal:
-            schema = cell_schema() if cell else make_journal_schema()
+            schema = make_cell_schema() if cell else make_journal_schema()
         else:
-            schema = (library_schema if library else mission_schema)(discover(), load_control_nodes())
+            schema = (make_library_schema if library else make_mission_schema)(
+                discover(), load_control_nodes()
+            )
     print_json(schema)

@@ -39,12 +39,12 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
     """
     with stdout_kept_clean():
         from executive.errors import InputError
-        from executive.mission.findings import alternatives
+        from executive.mission.findings import list_choices
         from executive.plugins import discover
 
         skills = discover()
         if name is not None and name not in skills:
-            raise InputError(f'no skill "{name}" is installed. {alternatives(name, skills, "There are")}')
+            raise InputError(f'no skill "{name}" is installed. {list_choices(name, skills, "There are")}')
         if name is not None:
             skills = {name: skills[name]}
     if conform:

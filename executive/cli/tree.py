@@ -64,9 +64,9 @@ def command(
 def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:
     """Return a mission's name and its tree's outline."""
     from executive.events import discard_event
-    from executive.mission.build import build
+    from executive.mission.build import build_tree
     from executive.mission.load import load_mission
-    from executive.mission.outline import outline
+    from executive.mission.outline import make_outline
     from executive.plugins import discover
     from executive.tree.blackboard import Blackboard
 
@@ -74,4 +74,4 @@ def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[
     loaded = load_mission(mission, skills, overrides)
     # A tree that never runs needs no cell, only a clock, which stands still.
     nowhere = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
-    return loaded.mission.name, outline(build(loaded, skills, nowhere, Blackboard(), discard_event))
+    return loaded.mission.name, make_outline(build_tree(loaded, skills, nowhere, Blackboard(), discard_event))

@@ -10,10 +10,10 @@ from executive.cell.protocols import Cell
 from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.load import LoadedMission
-from executive.mission.model.grammar import SEQUENCE
+from executive.mission.model.conversion import convert_value
+from executive.mission.model.grammar import SEQUENCE_KEYWORD
 from executive.mission.model.instance import make_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
-from executive.mission.model.typed import convert
 from executive.mission.model.wiring import find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.blackboard import Blackboard
@@ -22,10 +22,10 @@ from executive.tree.registry import ControlNodes, load_control_nodes
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 
 TreeNode = ControlNode | SkillLeaf
-"""Node of the tree that runs: a py_trees behaviour with a `path` and a `failure`."""
+"""Node of the built tree: a py_trees behaviour with a `path` and a `failure`."""
 
 
-def build(
+def build_tree(
     loaded: LoadedMission,
     skills: Mapping[str, type[Skill]],
     cell: Cell,
@@ -33,25 +33,25 @@ def build(
     emit: Emit,
     substitutes: Mapping[str, type[Skill]] | None = None,
 ) -> TreeNode:
-    """Return the root of a fresh tree of py_trees behaviours; every node has a unique, readable `path`.
+    """Return the root of a new tree of py_trees behaviours; every node has a unique, readable `path`.
 
-    `substitutes` maps patterns of node paths to the skills that run there
-    instead; `*` matches any characters, including `/`. The first matching pattern applies.
+    `substitutes` maps patterns of node paths to skills that run in place of the mission's skills; `*` in a
+    pattern matches any characters, including `/`. The first matching pattern applies.
 
     Raises:
         InputError: A pattern matches no skill node.
     """
-    builder = Builder(skills, cell, blackboard, emit, substitutes or {})
+    builder = TreeBuilder(skills, cell, blackboard, emit, substitutes or {})
     root = builder.build_node(loaded.tree)
     if unused := [pattern for pattern in builder.substitutes if pattern not in builder.matched_patterns]:
         paths = [node.path for node in root.iterate() if isinstance(node, SkillLeaf)]
-        raise InputError(f'no node is called "{unused[0]}"; there are: {", ".join(paths)}')
+        raise InputError(f'no skill node matches "{unused[0]}"; the skill nodes are: {", ".join(paths)}')
     return root
 
 
 @dataclass(frozen=True)
-class Builder:
-    """Builds the nodes of one tree."""
+class TreeBuilder:
+    """Builder of one tree; `matched_patterns` collects the keys of `substitutes` that match a skill node."""
 
     skills: Mapping[str, type[Skill]]
     cell: Cell
@@ -62,34 +62,35 @@ class Builder:
     node_classes: ControlNodes = field(default_factory=load_control_nodes)
 
     def build_node(self, node: Node) -> TreeNode:
-        """Return the behaviour for a node."""
+        """Return the behaviour for a node of the mission, with the behaviours of all nodes below it."""
         context = NodeContext(node.path, self.cell.clock, self.blackboard, node.label, self.emit)
         match node:
             case SkillNode():
                 return self._build_skill_leaf(context, node)
             case InnerNode():
                 return make_instance(node, context, self.build_node)
-            case UseNode(body=Node() as written):
-                body = self.build_node(written)
-                root = self.node_classes[SEQUENCE](context, do=(body,)) if node.label else body
+            case UseNode(body=Node() as expanded):
+                body = self.build_node(expanded)
+                # A labelled use needs a node of its own, which has the label.
+                root = self.node_classes[SEQUENCE_KEYWORD](context, do=(body,)) if node.label else body
                 root.subtrees = (node.name, *root.subtrees)
                 return root
-        raise AssertionError(f"a checked mission has no {type(node).__name__}")
+        raise AssertionError(f"a checked mission contains no {type(node).__name__}")
 
     def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
         skill = self.skills[node.skill]
         declared: dict[str, Param | Port] = {**skill.params, **skill.ports}
         wiring = Wiring(
             constants={
-                name: convert(value.value, declared[name].type) for name, value in find_literals(node)
+                name: convert_value(value.value, declared[name].type) for name, value in find_literals(node)
             },
             inputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.IN)},
             outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},
         )
-        runs = self._find_substitute(node.path) or skill
-        return SkillLeaf(context, node.skill, runs, wiring, self.cell)
+        executed_skill = self._find_substitute(node.path) or skill
+        return SkillLeaf(context, node.skill, executed_skill, wiring, self.cell)
 
     def _find_substitute(self, path: str) -> type[Skill] | None:
-        fitting = [pattern for pattern in self.substitutes if fnmatchcase(path, pattern)]
-        self.matched_patterns.extend(fitting)
-        return self.substitutes[fitting[0]] if fitting else None
+        matching = [pattern for pattern in self.substitutes if fnmatchcase(path, pattern)]
+        self.matched_patterns.extend(matching)
+        return self.substitutes[matching[0]] if matching else None

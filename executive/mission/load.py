@@ -1,4 +1,4 @@
-"""Loading of missions: the mission file and its cell file are read and checked."""
+"""Loading of a mission: reading and checking of the mission file, its libraries and its cell file."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from pydantic import JsonValue
 from executive.cell.config import CellConfig
 from executive.cell.workcell import CellKind
 from executive.errors import InputError
-from executive.mission.check.case import Case
-from executive.mission.check.checks import check
+from executive.mission.check.checks import run_checks
+from executive.mission.check.context import CheckContext
 from executive.mission.expand.expand import expand
-from executive.mission.findings import Finding, MissionError, in_file_order, warning
-from executive.mission.flow.endings import Ending, find_endings
+from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
+from executive.mission.flow.unhandled_failures import UnhandledFailure, find_unhandled_failures
 from executive.mission.model.mission import Mission
 from executive.mission.model.nodes import Node, UnknownNode
-from executive.mission.model.paths import with_paths
+from executive.mission.model.paths import assign_paths
 from executive.mission.parse.cell_file import CellFile
-from executive.mission.parse.read_mission import GivenCell, MissionFiles, read_mission
-from executive.mission.parse.validate import mark_of
-from executive.mission.text.files import find_mission, shipped_folder
+from executive.mission.parse.read_mission import MissionFiles, RecordedCell, read_mission
+from executive.mission.parse.validate import find_mark
+from executive.mission.text.files import find_mission, get_shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured
 from executive.skill import Skill
 from executive.tree.registry import load_control_nodes
 
-Kinds = Callable[[str], CellKind]
-"""Function that returns the installed kind of cell with a name, or raises InputError."""
+FindCellKind = Callable[[str], CellKind]
+"""Function from the name of a kind of cell to its class; raises InputError if it is not installed."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +37,15 @@ class LoadedMission:
 
     Attributes:
         mission: Content of the mission file.
-        tree: Tree with expanded subtrees, params and arguments.
+        tree: Tree in which all subtrees, params and arguments are expanded.
         cell_config: Content of the cell file.
         text: Text of the mission file.
         path: Path of the mission file.
         cell_path: Path of the cell file.
         libraries: Text of each library file by its path as written in the mission.
-        endings: Unhandled failures, which can end the mission.
+        unhandled_failures: Failures that can end the mission, because no node handles them.
         warnings: Findings that do not prevent a run.
-        overrides: Overridden values of params and keys of the cell, as given.
+        overrides: Values of `--set` as text, by name of a param or by `cell.<key>.<key>`.
     """
 
     mission: Mission
@@ -55,7 +55,7 @@ class LoadedMission:
     path: Path
     cell_path: Path
     libraries: Mapping[str, str]
-    endings: tuple[Ending, ...] = ()
+    unhandled_failures: tuple[UnhandledFailure, ...] = ()
     warnings: tuple[Finding, ...] = ()
     overrides: Mapping[str, str] = field(default_factory=dict)
 
@@ -66,7 +66,7 @@ class LoadedMission:
 
     @property
     def routes(self) -> dict[str, tuple[str, ...]]:
-        """Permitted bins for each class."""
+        """Names of the permitted bins by class."""
         return {route.label: tuple(bin.name for bin in route.bins) for route in self.mission.routes}
 
 
@@ -74,67 +74,71 @@ def load_mission(
     path: str | Path,
     skills: Mapping[str, type[Skill]],
     overrides: Mapping[str, str] | None = None,
-    kinds: Kinds | None = None,
-    cell: GivenCell | None = None,
+    find_cell_kind: FindCellKind | None = None,
+    cell: RecordedCell | None = None,
 ) -> LoadedMission:
-    """Return the mission in a file, or of a shipped name.
+    """Return a mission that has passed all checks.
 
     Args:
         path: A mission file, or the name of a shipped mission.
         skills: Installed skills by name.
-        overrides: Values for params by name, and for keys of the cell as `cell.<key>.<key>`.
-        kinds: Finds the kind of the cell, which checks the mission against its abilities; None for no check.
+        overrides: Values as text, by name of a param or by `cell.<key>.<key>` for a key of the cell.
+        find_cell_kind: Finds the kind of the cell, whose own checks are then included; None: no such checks.
         cell: Cell that replaces the mission's cell, or None.
 
     Raises:
         MissionError: Mission or cell have errors; the exception contains every finding.
         InputError: The mission does not exist.
     """
-    file, control = find_mission(path), load_control_nodes()
-    files = read_mission(file, overrides or {}, skills, control, cell)
+    file, node_classes = find_mission(path), load_control_nodes()
+    files = read_mission(file, overrides or {}, skills, node_classes, cell)
     mission, config = files.mission, files.cell.config if files.cell else None
     findings = list(files.findings)
-    kind = _find_kind(files, kinds, findings)
-    labels, min_times = {}, None
+    kind = _find_kind(files, find_cell_kind, findings)
+    classes_by_detector, min_times = {}, None
     if kind is not None and files.cell is not None and files.cell_path is not None:
-        base = files.cell_path.parent
-        cell_findings = [files.cell.finding(keys, "robot", text) for keys, text in kind.check(config, base)]
+        folder = files.cell_path.parent
+        problems = kind.check(config, folder)
+        cell_findings = [files.cell.make_error(keys, "robot", text) for keys, text in problems]
         findings += cell_findings
-        labels = dict(kind.labels(config, base))
+        classes_by_detector = dict(kind.labels(config, folder))
         min_times = None if cell_findings else kind.min_times(config)
     expanded = expand(mission, skills)
-    tree = with_paths(expanded.tree or UnknownNode(files.source.mark(), ""))
-    case = Case(mission, tree, expanded.unused, skills, control, config, labels, min_times)
-    findings += (*expanded.findings, *check(case))
-    ordered = in_file_order(findings, files.source.path)
+    tree = assign_paths(expanded.tree or UnknownNode(files.source.make_mark(), ""))
+    context = CheckContext(
+        mission, tree, expanded.unused_subtrees, skills, node_classes, config, classes_by_detector, min_times
+    )
+    findings += (*expanded.findings, *run_checks(context))
+    ordered = sort_findings(findings, files.source.path)
     is_valid = expanded.tree is not None and all(finding.severity != "error" for finding in findings)
     if config is None or files.cell_path is None or not is_valid:
         raise MissionError(ordered)
     if kind is not None and files.cell is not None:
-        ordered = in_file_order(
-            (*ordered, *_find_unmeasured(files.cell, files.cell_path.parent)), files.source.path
-        )
+        warnings = _find_unmeasured(files.cell, files.cell_path.parent)
+        ordered = sort_findings((*ordered, *warnings), files.source.path)
     return LoadedMission(
         mission, tree, config, files.source.text, file, files.cell_path, files.libraries,
-        find_endings(case.flow), ordered, dict(overrides or {}),
+        find_unhandled_failures(context.flow_analysis), ordered, dict(overrides or {}),
     )  # fmt: skip
 
 
-def _find_unmeasured(cell: CellFile, base: Path) -> Iterator[Finding]:
-    """Yield a warning for each detector of a cell without a measurement that applies to it."""
+def _find_unmeasured(cell: CellFile, folder: Path) -> Iterator[Finding]:
+    """Yield a warning for each detector of the cell file in `folder` whose error rates were not measured."""
     assert cell.config is not None
-    folders = (base, shipped_folder() / "cells")
-    for keys, text in find_unmeasured(cell.config, base, folders):
-        mark = mark_of(cell.root, keys, of_key=True) if cell.root else cell.source.mark()
-        yield warning(mark, "not-measured", text)
+    measurement_folders = (folder, get_shipped_folder() / "cells")
+    for keys, text in find_unmeasured(cell.config, folder, measurement_folders):
+        mark = find_mark(cell.root, keys, of_key=True) if cell.root else cell.source.make_mark()
+        yield make_warning(mark, "not-measured", text)
 
 
-def _find_kind(files: MissionFiles, kinds: Kinds | None, findings: list[Finding]) -> CellKind | None:
-    """Return the kind of the mission's cell, or None if it is unknown."""
-    if files.cell is None or files.cell.config is None or kinds is None:
+def _find_kind(
+    files: MissionFiles, find_cell_kind: FindCellKind | None, findings: list[Finding]
+) -> CellKind | None:
+    """Return the kind of the mission's cell; None without `find_cell_kind`, or if it is not installed."""
+    if files.cell is None or files.cell.config is None or find_cell_kind is None:
         return None
     try:
-        return kinds(files.cell.config.kind)
+        return find_cell_kind(files.cell.config.kind)
     except InputError as problem:
-        findings.append(files.cell.finding(("kind",), "unknown-kind", str(problem)))
+        findings.append(files.cell.make_error(("kind",), "unknown-kind", str(problem)))
         return None

@@ -1,4 +1,4 @@
-"""Outline of a built tree as plain data, for drawings, records and pages."""
+"""Outline of a built behaviour tree as plain data, for drawings, run records and web pages."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from py_trees.behaviour import Behaviour
 from executive.tree.node import ControlNode
 from executive.tree.skill_leaf import SkillLeaf
 
-_NUMBER = re.compile(r"[0-9]+:")
-SKILL = "skill"
-"""Kind of the leaves that run a skill."""
+_INDEX_PATTERN = re.compile(r"[0-9]+:")
+"""Index that precedes the name of a list element in a path, as in `2:try`."""
+SKILL_KIND = "skill"
+"""Value of `OutlineNode.kind` for leaves that run a skill."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Connection:
     """A port of a skill and the variable it is connected to.
 
     Attributes:
-        required: False for an input with a default for an unwritten variable.
+        required: False for an input that has a default, which applies while the variable is unwritten.
     """
 
     port: str
@@ -36,19 +37,19 @@ class OutlineNode:
 
     Attributes:
         path: Unique path from the root.
-        name: Name with the role under its parent: `Grasp`, `recover: look`, `do`.
+        name: Name below its parent, with the key of the parent if there is one: `Grasp`, `recover: look`.
         depth: Number of ancestors.
-        detail: Settings of the node in the mission, in a few words.
+        detail: Summary of the node's settings in the mission.
         kind: `skill`, or the keyword of a control node.
-        symbol, shape: Its symbol and its Graphviz shape in drawings; "" for a skill.
+        symbol, shape: Symbol and Graphviz shape of a control node in drawings; "" for a skill.
         title: Label, or name of the skill or keyword.
-        slot: Role under its parent: `do`, `recover`, `catch 1`; "" in a list.
-        when: Failures after which a catch runs: `on Grasp.missed`; else "".
+        slot: Key of the parent under which the node is written: `do`, `recover`, `catch 1`; "" in a list.
+        when: Failures after which a catch runs: `on Grasp.missed`; "" for other nodes.
         subtrees: Names of the subtrees with this node as root, the outermost first.
-        skill: Name of the skill; "" for a control node. The fields below are empty for a control node.
-        doc: Description of the skill, one sentence.
-        params: Constants of the skill from the mission.
-        reads, writes: Connected ports.
+        skill: Name of the skill; "" for a control node.
+        doc: Description of the skill, one sentence; like the fields below, empty for a control node.
+        params: Values of the skill's params.
+        reads, writes: Connections of the skill's inputs and outputs.
         reasons: Reasons for which the skill may fail.
         senses: True if the skill senses the scene.
         uses: Parts of the cell that the skill uses exclusively.
@@ -80,70 +81,74 @@ class OutlineNode:
         return " / ".join(self.subtrees)
 
 
-def outline(root: Behaviour) -> list[OutlineNode]:
+def make_outline(root: Behaviour) -> list[OutlineNode]:
     """Return every node of the tree in the order of the mission, parents before children."""
-    return list(_outline(root, None))
+    return list(_iterate_outline(root, None))
 
 
-def children(nodes: Sequence[OutlineNode]) -> list[list[int]]:
-    """Return the indices of the children of each node."""
-    found: list[list[int]] = [[] for _ in nodes]
-    above: list[int] = []
+def list_child_indices(nodes: Sequence[OutlineNode]) -> list[list[int]]:
+    """Return for each node of an outline the indices of its children in `nodes`."""
+    child_indices: list[list[int]] = [[] for _ in nodes]
+    ancestors: list[int] = []
     for index, node in enumerate(nodes):
-        del above[node.depth :]
-        if above:
-            found[above[-1]].append(index)
-        above.append(index)
-    return found
+        del ancestors[node.depth :]
+        if ancestors:
+            child_indices[ancestors[-1]].append(index)
+        ancestors.append(index)
+    return child_indices
 
 
-def _outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) -> Iterator[OutlineNode]:
-    path = _path(node)
-    place = path.removeprefix(f"{_path(parent) if parent else 'tree'}/")
+def _iterate_outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) -> Iterator[OutlineNode]:
+    path = _get_path(node)
+    relative_path = path.removeprefix(f"{_get_path(parent) if parent else 'tree'}/")
     label, detail = getattr(node, "label", ""), getattr(node, "detail", "")
-    kind = _kind(node)
-    if label and kind != SKILL:
+    kind = _get_kind(node)
+    if label and kind != SKILL_KIND:
         detail = ", ".join(part for part in (kind, detail) if part)
     title = label or (node.skill_name if isinstance(node, SkillLeaf) else kind)
     subtrees = tuple(getattr(node, "subtrees", ()))
-    slot = _slot(place, parent, node, title, subtrees) if parent else ""
+    slot = _find_slot(relative_path, parent, node, title, subtrees) if parent else ""
     when = parent.describe_trigger(node) if isinstance(parent, ControlNode) else ""
-    drawn = OutlineNode(path, _name(place), depth, detail, kind, title, slot, when, subtrees)
+    name = _format_name(relative_path)
+    outline_node = OutlineNode(path, name, depth, detail, kind, title, slot, when, subtrees)
     if isinstance(node, SkillLeaf):
-        yield _add_skill(drawn, node)
+        yield _add_skill(outline_node, node)
     else:
         style = node if isinstance(node, ControlNode) else ControlNode
-        yield replace(drawn, symbol=style.symbol, shape=style.shape)
+        yield replace(outline_node, symbol=style.symbol, shape=style.shape)
     for child in node.children:
-        yield from _outline(child, node, depth + 1)
+        yield from _iterate_outline(child, node, depth + 1)
 
 
-def _path(node: Behaviour) -> str:
+def _get_path(node: Behaviour) -> str:
     return str(getattr(node, "path", node.name))
 
 
-def _kind(node: Behaviour) -> str:
-    """Return the keyword of a control node; a py_trees behaviour has the name of its class."""
+def _get_kind(node: Behaviour) -> str:
+    """Return "skill", the keyword of a control node, or the class name of another py_trees behaviour."""
     if isinstance(node, SkillLeaf):
-        return SKILL
+        return SKILL_KIND
     return node.keyword if isinstance(node, ControlNode) else type(node).__name__.lower()
 
 
-def _name(place: str) -> str:
-    """Return what a node is called below its parent."""
-    slot, _, last = place.rpartition("/")
-    last = _NUMBER.sub("", last)
+def _format_name(relative_path: str) -> str:
+    """Return the name of a node below its parent, from its path relative to the parent."""
+    slot, _, last = relative_path.rpartition("/")
+    last = _INDEX_PATTERN.sub("", last)
     slot = slot.replace("/", " ")
-    # A list in the second catch is the catch itself.
+    # The path of a bare list in the second catch ends with "catch/2".
     return f"{slot} {last}" if last.isdigit() else f"{slot}: {last}" if slot else last
 
 
-def _slot(place: str, parent: Behaviour, node: Behaviour, title: str, subtrees: tuple[str, ...]) -> str:
-    """Return the rest of a node's place below its parent without its own name and its subtrees'.
+def _find_slot(
+    relative_path: str, parent: Behaviour, node: Behaviour, title: str, subtrees: tuple[str, ...]
+) -> str:
+    """Return the key of the parent under which a node is written, or "".
 
-    A bare list has no name of its own: it is the slot. Some keys are left out of paths.
+    The key is the relative path without the names of the node and its subtrees. The path of a bare list has
+    no such name. A key that paths omit is searched among the keys of the parent.
     """
-    parts = [_NUMBER.sub("", part) for part in place.split("/")]
+    parts = [_INDEX_PATTERN.sub("", part) for part in relative_path.split("/")]
     if parts[-1] == title:
         del parts[-1]
     for subtree in reversed(subtrees):
@@ -157,22 +162,21 @@ def _slot(place: str, parent: Behaviour, node: Behaviour, title: str, subtrees: 
 
 
 def _add_skill(node: OutlineNode, leaf: SkillLeaf) -> OutlineNode:
-    """Return `node` with the declarations of the skill and the wiring of its leaf."""
+    """Return `node` with the declarations of the skill of `leaf`, and with the variables of its ports."""
     skill, wiring = leaf.skill_type, leaf.wiring
     ports = skill.ports
 
-    def connections(wires: Mapping[str, str]) -> tuple[Connection, ...]:
-        return tuple(
-            Connection(port, variable, ports[port].default is ...) for port, variable in wires.items()
-        )
+    def make_connections(variables_by_port: Mapping[str, str]) -> tuple[Connection, ...]:
+        connected = variables_by_port.items()
+        return tuple(Connection(port, variable, ports[port].default is ...) for port, variable in connected)
 
     return replace(
         node,
         skill=leaf.skill_name,
         doc=(inspect.getdoc(skill) or "").partition("\n")[0],
         params=dict(wiring.constants),
-        reads=connections(wiring.inputs),
-        writes=connections(wiring.outputs),
+        reads=make_connections(wiring.inputs),
+        writes=make_connections(wiring.outputs),
         reasons=tuple(skill.reasons),
         senses=skill.senses,
         uses=tuple(skill.uses),

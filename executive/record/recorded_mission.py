@@ -14,7 +14,7 @@ from executive.cell.config import CellConfig
 from executive.errors import InputError, explain_os_errors
 from executive.events import RunStarted
 from executive.mission.outline import OutlineNode
-from executive.mission.parse.read_mission import GivenCell
+from executive.mission.parse.read_mission import RecordedCell
 from executive.skill import Skill
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def read_mission_of_run(
     from executive.mission.load import load_mission
 
     overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
-    given_cell = GivenCell(read_cell(path), Path(start.base) / "cell.yaml")
+    given_cell = RecordedCell(read_cell(path), Path(start.base) / "cell.yaml")
     return load_mission(mission or path / "mission.yaml", skills, overrides, cell=given_cell)
 
 

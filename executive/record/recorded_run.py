@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from executive.errors import ExecutiveError
 from executive.events import Observer, RunEnded, TimedEvent
-from executive.mission.outline import outline
+from executive.mission.outline import make_outline
 from executive.mission.text.files import read_source
 from executive.record.diagnosis.diagnose import diagnose
 from executive.record.recorded_mission import format_tree
@@ -118,7 +118,7 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, run
         mission=loaded.text,
         params=loaded.params,
         cell=loaded.cell_config.model_dump(mode="json", exclude_unset=True),
-        tree=format_tree(outline(run.root)),
+        tree=format_tree(make_outline(run.root)),
         libraries=loaded.libraries,
         scene=scene,
     )

@@ -10,7 +10,7 @@ from executive.cell.protocols import Operator
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.events import Observer, RequestGiven, RunStarted
-from executive.mission.build import TreeNode, build
+from executive.mission.build import TreeNode, build_tree
 from executive.mission.load import LoadedMission
 from executive.plugins import cell_kind
 from executive.replay.input_log import InputLog, Interruption
@@ -175,7 +175,7 @@ class _RunBuilder:
     def build_tree(self) -> TreeNode:
         """Return the behaviour tree of the mission on the cell of `context`."""
         cell, emit = self.context.cell, self.context.emit
-        return build(self._loaded, self._skills, cell, Blackboard(), emit, self._options.substitutes)
+        return build_tree(self._loaded, self._skills, cell, Blackboard(), emit, self._options.substitutes)
 
     def build_resumed_run(
         self, inner: Workcell, log: InputLog, last: Interruption | None = None

@@ -18,7 +18,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.mission.text.files import shipped_missions
+from executive.mission.text.files import list_shipped_missions
 
 MISSION = """\
 mission: small
@@ -62,7 +62,7 @@ CASES = {
         m.yaml:5:7: error[yaml]: not valid YAML: while parsing a flow mapping that began in line 4: expected ',' or '}', but got ':'
            5 | routes: {cube: red_bin, sphere: blue_bin, duck: yellow_bin}
              |       ^
-          A bracket or brace that was opened is not closed.
+          Close the bracket or brace.
         """,
         mission=("{attempts: 4}", "{attempts: 4"),
     ),
@@ -80,7 +80,7 @@ CASES = {
         cells/overhead.yaml:LINE:1: error[unknown-key]: the file has no key "ledgre"
         LINE | ledgre: {gate: 0.03}
              | ^^^^^^
-          Did you mean "ledger"? the file takes: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, ledger, safe_place.
+          Did you mean "ledger"? Keys of the file: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, ledger, safe_place.
         """,
         cell=("safe_place:", "ledgre: {gate: 0.03}\nsafe_place:"),
     ),
@@ -148,7 +148,7 @@ def test_a_mistake_in_a_file_is_reported_once_and_nothing_moves(
             --set:1:1: error[unknown-param]: the mission has no param "atempts"
                1 | atempts=5
                  | ^^^^^^^
-              Did you mean "attempts"? The mission's params: attempts.
+              Did you mean "attempts"? Params of the mission: attempts.
             """,
         ),
         (
@@ -157,7 +157,7 @@ def test_a_mistake_in_a_file_is_reported_once_and_nothing_moves(
             --set:1:22: error[unknown-key]: the cell has no key "tols"
                1 | cell.tols.cup_radius=0.01
                  |                      ^^^^
-              Did you mean "tool"? It has: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, ledger, safe_place.
+              Did you mean "tool"? Keys of the cell: base, cell, description, kind, arm, tool, motion, table, bins, cameras, detector, detectors, localization, objects, ledger, safe_place.
             """,
         ),
     ],
@@ -188,16 +188,16 @@ def test_a_whole_process_says_the_same_and_ends_with_the_same_code(write: Callab
     assert done.stderr == dedent(CASES["an unknown skill"].expected).lstrip("\n")
 
 
-SHIPPED = f"Shipped missions: {', '.join(shipped_missions())}.\n"
+SHIPPED = f"Shipped missions: {', '.join(list_shipped_missions())}.\n"
 
 
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ("sort_overhed", f'there is no mission file "sort_overhed", and no shipped mission of that name. Did you mean "sort_overhead"? {SHIPPED}'),
-        ("nowhere.yaml", f'there is no mission file "nowhere.yaml", and no shipped mission of that name. {SHIPPED}'),
-        ("cells", '"cells" is a folder; name one of its files\n'),
-        ("9" * 300, f'there is no mission file "{"9" * 197}…", and no shipped mission of that name. {SHIPPED}'),
+        ("sort_overhed", f'there is no mission file and no shipped mission "sort_overhed". Did you mean "sort_overhead"? {SHIPPED}'),
+        ("nowhere.yaml", f'there is no mission file and no shipped mission "nowhere.yaml". {SHIPPED}'),
+        ("cells", '"cells" is a folder; give the path of one of its files\n'),
+        ("9" * 300, f'there is no mission file and no shipped mission "{"9" * 197}…". {SHIPPED}'),
         ("m.yaml --request cube --request banana", 'cannot pick "banana"; ask for one of: cube, sphere, duck\n'),
     ],
 )  # fmt: skip

@@ -19,7 +19,7 @@ from executive.cell.json_values import to_json
 from executive.cli.main import COMMANDS, main
 from executive.errors import Fault, InputError
 from executive.mission.findings import Finding, MissionError
-from executive.mission.flow.endings import Ending
+from executive.mission.flow.unhandled_failures import UnhandledFailure
 from executive.record.result import Audit, ItemCounts, Result
 from executive.record.timeline.timeline import PlanningTotals
 from executive.run.assembly import RunOptions
@@ -43,7 +43,7 @@ def project(monkeypatch):
         if asked.load_error is not None:
             raise asked.load_error
         named = SimpleNamespace(name=mission)
-        return SimpleNamespace(mission=named, warnings=asked.warnings, endings=asked.endings)
+        return SimpleNamespace(mission=named, warnings=asked.warnings, unhandled_failures=asked.endings)
 
     def record_run(loaded, skills, options, runs, record):
         asked.run.append((options, runs, record))
@@ -138,10 +138,10 @@ print_json([1])
 
 def test_check_tells_what_can_still_end_the_mission(project):
     project.endings = (
-        Ending("Detect", "hidden", "tree/look/Detect", "sort.yaml", 9),
-        Ending("Detect", "unsure", "tree/look/Detect", "sort.yaml", 9),
-        Ending("Detect", "hidden", "tree/again/look/Detect", "sort.yaml", 9),
-        Ending("Release", "stuck", "tree/Release", "sort.yaml", 12),
+        UnhandledFailure("Detect", "hidden", "tree/look/Detect", "sort.yaml", 9),
+        UnhandledFailure("Detect", "unsure", "tree/look/Detect", "sort.yaml", 9),
+        UnhandledFailure("Detect", "hidden", "tree/again/look/Detect", "sort.yaml", 9),
+        UnhandledFailure("Release", "stuck", "tree/Release", "sort.yaml", 12),
     )
     shown = invoke("check", "sort.yaml")
     assert shown.exit_code == 0

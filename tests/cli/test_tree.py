@@ -11,9 +11,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.mission.text.files import shipped_folder
+from executive.mission.text.files import get_shipped_folder
 
-SHIPPED = sorted(path.stem for path in shipped_folder().glob("*.yaml"))
+SHIPPED = sorted(path.stem for path in get_shipped_folder().glob("*.yaml"))
 QUICK = ("sort_overhead", "kit_fasteners")
 
 EVERY_NODE = """
@@ -60,7 +60,7 @@ def shown(*words: str) -> Result:
 @pytest.fixture
 def every_node(tmp_path: Path) -> str:
     """Return a mission with every control node, and a param that means something in XML and Graphviz."""
-    shutil.copytree(shipped_folder() / "cells", tmp_path / "cells")
+    shutil.copytree(get_shipped_folder() / "cells", tmp_path / "cells")
     path = tmp_path / "every_node.yaml"
     path.write_text(EVERY_NODE, encoding="utf-8")
     return str(path)

@@ -35,7 +35,10 @@ def check(tmp_path, monkeypatch):
             "the file has more than 20000 keys and values",
         ),
         (HEAD + f"tree: {'[' * 60}Wait{']' * 60}\n", "nested more than 50 levels deep"),
-        (HEAD + f"tree: {{parallel: [{'Wait,' * 201}]}}\n", "a parallel has at most 200 branches, not 201"),
+        (
+            HEAD + f"tree: {{parallel: [{'Wait,' * 201}]}}\n",
+            "parallel has 201 branches, but may have at most 200",
+        ),
     ],
     ids=["values", "keys", "depth", "branches"],
 )

@@ -19,8 +19,8 @@ from click.testing import CliRunner
 
 from executive.cli.main import main
 from executive.cli.streams import stdout_kept_clean
-from executive.mission.findings import CODES, Finding, MissionError
-from executive.mission.load import Kinds, load_mission
+from executive.mission.findings import MEANING_BY_CODE, Finding, MissionError
+from executive.mission.load import FindCellKind, load_mission
 from executive.plugins import cell_kind, discover
 from executive.skill import Skill
 
@@ -64,10 +64,12 @@ def look(shared_cells: None) -> Look:
     return functools.cache(lambda path: findings_of(path, skills, kind))
 
 
-def findings_of(path: Path, skills: dict[str, type[Skill]], kind: Kinds = cell_kind) -> tuple[Finding, ...]:
+def findings_of(
+    path: Path, skills: dict[str, type[Skill]], kind: FindCellKind = cell_kind
+) -> tuple[Finding, ...]:
     """Return the findings of a mission."""
     try:
-        return load_mission(path, skills, kinds=kind).warnings
+        return load_mission(path, skills, find_cell_kind=kind).warnings
     except MissionError as error:
         return error.findings
 
@@ -110,7 +112,7 @@ def test_the_command_prints_what_is_found_and_refuses_to_go_on(look: Look) -> No
 
 
 def test_every_kind_of_finding_has_a_broken_mission() -> None:
-    assert {place.code for path in BROKEN for place in expected(path)} == set(CODES)
+    assert {place.code for path in BROKEN for place in expected(path)} == set(MEANING_BY_CODE)
 
 
 if __name__ == "__main__":

@@ -10,9 +10,9 @@ import pytest
 from py_trees.common import Status
 
 from executive.events import Event, NodeEnded, discard_event
-from executive.mission.build import build
+from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
-from executive.mission.outline import outline
+from executive.mission.outline import make_outline
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard
 
@@ -50,7 +50,7 @@ def built(load: Callable[..., LoadedMission], skills: dict[str, type[Skill]]) ->
     def built(text: str, scope: Blackboard | None = None, emit: Any = discard_event) -> Any:
         clock = SimpleNamespace(now=0.0)
         cell: Any = SimpleNamespace(clock=clock)
-        return build(load(text), skills, cell, Blackboard() if scope is None else scope, emit)
+        return build_tree(load(text), skills, cell, Blackboard() if scope is None else scope, emit)
 
     return built
 
@@ -58,7 +58,7 @@ def built(load: Callable[..., LoadedMission], skills: dict[str, type[Skill]]) ->
 def test_the_outline_reads_like_the_mission_and_paths_are_unique(built: Any) -> None:
     lines = [
         ("  " * node.depth + node.name + (f" ({node.detail})" if node.detail else ""), node.path)
-        for node in outline(built(EVERYTHING))
+        for node in make_outline(built(EVERYTHING))
     ]
     body, tried, caught = "tree/repeat/do", "tree/repeat/do/2:try", "tree/repeat/do/2:try/catch/1"
     assert lines == [
@@ -109,7 +109,7 @@ def test_two_trees_of_one_mission_share_nothing(
     loaded = load(HEAD + "tree: Look\n")
     first, second = Blackboard(), Blackboard()
     cell: Any = SimpleNamespace(clock=None)
-    one, two = (build(loaded, skills, cell, scope, discard_event) for scope in (first, second))
+    one, two = (build_tree(loaded, skills, cell, scope, discard_event) for scope in (first, second))
     one.tick_once()
     one.tick_once()
     assert (dict(first), dict(second)) == ({"seen": [1]}, {})
@@ -122,7 +122,7 @@ def test_a_labelled_use_names_its_failures(built: Any) -> None:
         + "tree:\n  try: [{use: pick, as: first}]\n  catch:\n    - {on: [first.missed], do: succeed}\n"
         + "trees: {pick: [Look, Pick]}\n"
     )
-    assert [node.path for node in outline(root)] == [
+    assert [node.path for node in make_outline(root)] == [
         "tree/try", "tree/try/do", "tree/try/do/first", "tree/try/do/first/do",
         "tree/try/do/first/do/Look", "tree/try/do/first/do/Pick", "tree/try/catch/1/succeed",
     ]  # fmt: skip

@@ -13,12 +13,12 @@ from py_trees.common import Status
 
 from executive.cell.protocols import Cell, Steps
 from executive.events import discard_event
-from executive.mission.build import Builder
-from executive.mission.check.case import Case
-from executive.mission.check.checks import check
+from executive.mission.build import TreeBuilder
+from executive.mission.check.checks import run_checks
+from executive.mission.check.context import CheckContext
 from executive.mission.expand.expand import expand
-from executive.mission.flow.endings import find_endings
-from executive.mission.model.paths import with_paths
+from executive.mission.flow.unhandled_failures import find_unhandled_failures
+from executive.mission.model.paths import assign_paths
 from executive.mission.parse.mission_file import parse_mission
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml
@@ -191,7 +191,7 @@ def bodies(node: st.SearchStrategy[Tree]) -> st.SearchStrategy[Tree]:
 trees = st.recursive(st.one_of(leaves, routine), bodies, max_leaves=14)
 
 
-def sound(tree: Tree) -> Case | None:
+def sound(tree: Tree) -> CheckContext | None:
     """Return the mission of this tree if the checker finds no error in it."""
     source = Source("m.yaml", json.dumps({"mission": "m", "cell": "none", "tree": tree}))
     root, wrong = parse_yaml(source)
@@ -199,15 +199,17 @@ def sound(tree: Tree) -> Case | None:
     mission, malformed = parse_mission(root, {}, SKILLS, load_control_nodes())
     expanded = expand(mission, SKILLS)
     assert expanded.tree is not None
-    case = Case(mission, with_paths(expanded.tree), (), SKILLS, load_control_nodes(), None, {}, None)
-    findings = [*wrong, *malformed, *expanded.findings, *check(case)]
+    case = CheckContext(
+        mission, assign_paths(expanded.tree), (), SKILLS, load_control_nodes(), None, {}, None
+    )
+    findings = [*wrong, *malformed, *expanded.findings, *run_checks(case)]
     return None if any(finding.severity == "error" for finding in findings) else case
 
 
-def run(case: Case, seed: int) -> tuple[World, Any]:
+def run(case: CheckContext, seed: int) -> tuple[World, Any]:
     """Run a mission until it ends or for long enough; return its world and its root."""
     world = World(seed)
-    root = Builder(SKILLS, cast("Cell", world), Blackboard(), discard_event).build_node(case.tree)
+    root = TreeBuilder(SKILLS, cast("Cell", world), Blackboard(), discard_event).build_node(case.tree)
     while world.ticks < MOST_TICKS:
         root.tick_once()
         if root.status is not Status.RUNNING:
@@ -233,7 +235,7 @@ def hold_against_runs(tree: Tree, seed: int) -> None:
     case = sound(tree)
     if case is None:
         return
-    flow = case.flow
+    flow = case.flow_analysis
     for number in range(8):
         world, root = run(case, seed + number)
         if root.status is Status.RUNNING:
@@ -247,7 +249,9 @@ def hold_against_runs(tree: Tree, seed: int) -> None:
             ends = {(f.source, f.reason, f.origin): after for f, after in flow.result.failures.items()}
             key = failure.source, failure.reason, failure.path
             assert key in ends, f"the checker has not foreseen {key}"
-            assert str(failure) in [f"{ending.source}.{ending.reason}" for ending in find_endings(flow)]
+            assert str(failure) in [
+                f"{ending.source}.{ending.reason}" for ending in find_unhandled_failures(flow)
+            ]
             state = ends[key]
         assert state.find_tool_state(HOLDING if world.holding else EMPTY), (
             "the checker thinks the tool otherwise"

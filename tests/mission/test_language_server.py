@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import pytest
 from editor import Editor
 
-from executive.mission.text.files import shipped_folder
+from executive.mission.text.files import get_shipped_folder
 from executive.plugins import discover
 from executive.tree.registry import load_control_nodes
 
@@ -27,7 +27,7 @@ pytestmark = [
     ),
 ]
 
-MISSIONS = shipped_folder()
+MISSIONS = get_shipped_folder()
 HEAD = "# yaml-language-server: $schema=mission.schema.json\nmission: m\ncell: cells/overhead.yaml\n"
 LIBRARY = "# yaml-language-server: $schema=library/library.schema.json\nlibrary: l\n"
 CELL = "# yaml-language-server: $schema=cells/cell.schema.json\nbase: overhead.yaml\n"

@@ -15,7 +15,7 @@ from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.model import nodes
 from executive.mission.model.values import Reference
-from executive.mission.text.files import find_mission, shipped_folder
+from executive.mission.text.files import find_mission, get_shipped_folder
 
 Load = Callable[..., LoadedMission]
 
@@ -66,7 +66,7 @@ def test_an_override_out_of_range_is_shown_where_it_was_given(load: Load) -> Non
     with pytest.raises(MissionError) as caught:
         load(text, {"tries": "0"})
     assert str(caught.value) == (
-        "--set:1:7: error[out-of-range]: retry.attempts must be at least 1, not 0 (it is $tries in m.yaml:4)\n"
+        "--set:1:7: error[out-of-range]: retry.attempts must be at least 1, not 0 (value of $tries in m.yaml:4)\n"
         "   1 | tries=0\n"
         "     |       ^"
     )
@@ -92,7 +92,7 @@ def test_findings_of_the_robot_stand_in_the_cell_file(load: Load) -> None:
             yield ("bins", "blue_bin", "position"), "0.3 m out of reach"
 
     with pytest.raises(MissionError) as caught:
-        load(HEAD + "tree: Look\n", kinds=lambda name: Short)
+        load(HEAD + "tree: Look\n", find_cell_kind=lambda name: Short)
     assert str(caught.value).startswith("cells/small.yaml:16:14: error[robot]: 0.3 m out of reach\n")
 
 
@@ -100,14 +100,14 @@ def test_a_link_out_of_the_folder_is_refused(load: Load, tmp_path: Path, small_c
     outside = tmp_path.parent / f"{tmp_path.name}_outside.yaml"
     outside.write_text(small_cell)
     Path("link.yaml").symlink_to(outside)
-    with pytest.raises(MissionError, match=r'"link\.yaml" is a link to a file outside of'):
+    with pytest.raises(MissionError, match=r'"link\.yaml" is a link to a file outside'):
         load("mission: m\ncell: link.yaml\ntree: Look\n")
 
 
 @pytest.mark.parametrize("name", ["sort_overhead", "sort_overhead.yaml", "missions/sort_overhead.yaml"])
 def test_shipped_missions_go_by_name(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert find_mission(name) == shipped_folder() / "sort_overhead.yaml"
+    assert find_mission(name) == get_shipped_folder() / "sort_overhead.yaml"
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ BUSH = "".join(f"  t{i}: [{', '.join([f'{{use: t{i + 1}}}'] * 10)}]\n" for i in 
         (f"tree: {{use: t0}}\ntrees:\n{BUSH}  t8: Look\n", r"error\[too-large\].*the tree has more than 5000 nodes"),
         ("tree: " + "{invert: " * 45 + "Look" + "}" * 45 + "\n", "the tree is more than 40 levels deep"),
         (f"tree: {{repeat: {{times: {'9' * 40}, do: Look}}}}\n", r"repeat\.times must be a whole number"),
-        (f"params: {{a: {{default: 1, min: 0x{'f' * 298}}}}}\ntree: {{repeat: {{times: $a, do: Look}}}}\n", r'the param "a".min must be a number'),
+        (f"params: {{a: {{default: 1, min: 0x{'f' * 298}}}}}\ntree: {{repeat: {{times: $a, do: Look}}}}\n", r'min of the param "a" must be a number'),
     ],
     ids=["a bush", "a deep tree", "40 digits", "298 digits"],
 )  # fmt: skip

@@ -21,7 +21,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.load import LoadedMission, load_mission
-from executive.mission.model.grammar import USE
+from executive.mission.model.grammar import USE_KEYWORD
 from executive.plugins import cell_kind, discover
 from executive.run import assembly
 from executive.run.assembly import RunOptions, assemble
@@ -134,13 +134,13 @@ def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) ->
 
 @pytest.mark.parametrize("file", OWN_BASES, ids=lambda file: file.stem)
 def test_the_bases_of_the_mutants_pass_the_check(file: Path) -> None:
-    assert load_mission(file, discover(), kinds=cell_kind).mission.name == file.stem
+    assert load_mission(file, discover(), find_cell_kind=cell_kind).mission.name == file.stem
 
 
 def test_the_bases_of_the_mutants_use_every_control_node() -> None:
     files = [yaml.safe_load(file.read_text()) for file in OWN_BASES]
     words = {str(word) for container, key in places(files) for word in (key, container[key])}
-    assert {*load_control_nodes(), USE} - words == set()
+    assert {*load_control_nodes(), USE_KEYWORD} - words == set()
 
 
 @pytest.mark.parametrize(

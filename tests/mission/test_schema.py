@@ -13,19 +13,19 @@ from referencing import Registry
 
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
-from executive.mission.schema.files import library_schema, mission_schema
-from executive.mission.schema.types import cell_schema
+from executive.mission.schema.files import make_library_schema, make_mission_schema
+from executive.mission.schema.types import make_cell_schema
 from executive.mission.source import Source
-from executive.mission.text.files import shipped_folder
-from executive.mission.text.yaml_text import parse_yaml, plain
+from executive.mission.text.files import get_shipped_folder
+from executive.mission.text.yaml_text import parse_yaml, to_python_value
 from executive.plugins import discover
 from executive.skill import Skill
 from executive.tree.registry import load_control_nodes
 
-MISSIONS = shipped_folder()
+MISSIONS = get_shipped_folder()
 SCHEMAS: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {
-    "mission.schema.json": (lambda: mission_schema(discover(), load_control_nodes()), ""),
-    "cells/cell.schema.json": (cell_schema, " --cell"),
+    "mission.schema.json": (lambda: make_mission_schema(discover(), load_control_nodes()), ""),
+    "cells/cell.schema.json": (make_cell_schema, " --cell"),
 }
 """The generated files: how each is made, and the option that prints it."""
 FILES = {
@@ -48,7 +48,7 @@ def problems(schema: dict[str, Any], text: str) -> list[str]:
     root, findings = parse_yaml(Source("shown.yaml", text))
     assert root is not None
     assert not findings
-    found = Draft7Validator(schema, registry=SHIPPED).iter_errors(plain(root))
+    found = Draft7Validator(schema, registry=SHIPPED).iter_errors(to_python_value(root))
     return [f"{'.'.join(map(str, problem.absolute_path))}: {problem.message}" for problem in found]
 
 
@@ -62,9 +62,9 @@ def test_the_shipped_schema_is_the_generated_one(name: str) -> None:
 @pytest.mark.parametrize(
     "schema",
     [
-        mission_schema(discover(), load_control_nodes()),
-        library_schema(discover(), load_control_nodes()),
-        cell_schema(),
+        make_mission_schema(discover(), load_control_nodes()),
+        make_library_schema(discover(), load_control_nodes()),
+        make_cell_schema(),
     ],
     ids=FILES,
 )
@@ -132,7 +132,7 @@ trees:
 
 
 def test_everything_of_the_language_is_accepted(skills: dict[str, type[Skill]]) -> None:
-    assert problems(mission_schema(skills, load_control_nodes()), WELL_FORMED) == []
+    assert problems(make_mission_schema(skills, load_control_nodes()), WELL_FORMED) == []
     written = set(re.findall(r"[a-z_]+(?=:)", WELL_FORMED))
     assert set(load_control_nodes()) <= written, "the example must show every control node"
 
@@ -185,7 +185,7 @@ BROKEN = {
 @pytest.mark.parametrize("case", BROKEN)
 def test_what_is_wrong_is_marked(case: str, skills: dict[str, type[Skill]]) -> None:
     text, expected = BROKEN[case]
-    found = problems(mission_schema(skills, load_control_nodes()), HEAD + text)
+    found = problems(make_mission_schema(skills, load_control_nodes()), HEAD + text)
     assert expected in "\n".join(found)
 
 
@@ -199,7 +199,10 @@ def test_what_the_schema_marks_is_an_error_of_check_too(
 
 @pytest.mark.parametrize(
     "schema",
-    [{"$ref": f"{FOLDER}/library/library.schema.json"}, library_schema(discover(), load_control_nodes())],
+    [
+        {"$ref": f"{FOLDER}/library/library.schema.json"},
+        make_library_schema(discover(), load_control_nodes()),
+    ],
     ids=["shipped", "printed"],
 )
 def test_a_library_has_subtrees_and_no_tree(schema: dict[str, Any]) -> None:
@@ -209,7 +212,7 @@ def test_a_library_has_subtrees_and_no_tree(schema: dict[str, Any]) -> None:
 
 
 def test_a_cell_with_a_base_needs_no_other_key(small_cell: str) -> None:
-    schema = cell_schema()
+    schema = make_cell_schema()
     assert problems(schema, small_cell) == []
     assert problems(schema, "base: small.yaml") == []
     assert ": 'arm' is a required property" in problems(schema, "cell: a")
@@ -225,7 +228,7 @@ def test_a_cell_with_a_base_needs_no_other_key(small_cell: str) -> None:
 
 
 def test_a_param_says_its_unit_bounds_and_default(skills: dict[str, type[Skill]]) -> None:
-    (shape,) = mission_schema(skills, load_control_nodes())["definitions"]["Pick"]["allOf"]
+    (shape,) = make_mission_schema(skills, load_control_nodes())["definitions"]["Pick"]["allOf"]
     height = shape["properties"]["height"]
     assert height["description"] == "[m] (at least 0, at most 0.5, 0.1 if not given)"
     assert height["anyOf"][0] == {"type": "number", "minimum": 0, "maximum": 0.5, "default": 0.1}

@@ -10,7 +10,7 @@ import pytest
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
-from executive.mission.model.wiring import find_wires, find_written_variables
+from executive.mission.model.wiring import find_control_node_outputs, find_wires
 from executive.skill import Direction, Skill
 
 Load = Callable[..., LoadedMission]
@@ -92,7 +92,7 @@ def test_what_a_subtree_does_not_return_cannot_be_read(load: Load) -> None:
             HEAD + "tree: [use: get, {Pick: {seen: $seen}}, {Drop: {bin: red_bin}}]\n"
             "trees: {get: {returns: [held], do: [Look, Pick]}}\n"
         )
-    assert "3:32: error[unwritten]: Pick.seen reads $seen, which nothing writes" in str(caught.value)
+    assert "3:32: error[unwritten]: Pick.seen reads $seen, which no node writes" in str(caught.value)
 
 
 def test_a_loop_in_a_closed_subtree_has_a_variable_of_its_own(load: Load) -> None:
@@ -103,7 +103,7 @@ def test_a_loop_in_a_closed_subtree_has_a_variable_of_its_own(load: Load) -> Non
         "    returns: [held]\n"
         "    do: [Look, {for_each: {each: kind, in: [cube], do: {Pick: {only: $kind}}}}]\n"
     )
-    names = [variable.name for node in loaded.tree.walk() for _, variable in find_written_variables(node)]
+    names = [variable.name for node in loaded.tree.walk() for _, variable in find_control_node_outputs(node)]
     assert names == ["get.kind"]
 
 
@@ -131,8 +131,8 @@ def test_a_library_does_not_see_the_params_of_the_mission(load: Load) -> None:
     with pytest.raises(MissionError) as caught:
         load(HEAD + "params: {high: 0.2}\nlibrary: library/hands.yaml\ntree: {use: get}\n")
     text = str(caught.value)
-    assert "library/hands.yaml:2:37: error[unknown-param]: Pick.height is a constant" in text
-    assert "A library sees its own arguments only: declare it under args and give it with `with`." in text
+    assert "library/hands.yaml:2:37: error[unknown-param]: Pick.height must be a constant" in text
+    assert "A library cannot use params: declare high below args of the subtree" in text
 
 
 def test_mistakes_in_a_library_are_found_in_its_own_file(load: Load) -> None:
@@ -153,5 +153,7 @@ def test_what_a_library_has_and_nobody_uses_is_no_mistake(load: Load) -> None:
 
 def test_an_output_cannot_take_the_name_of_an_argument(load: Load) -> None:
     text = "tree: {use: get, with: {seen: 0.1}}\ntrees: {get: {args: [seen], do: Look}}"
-    with pytest.raises(MissionError, match=r"Look\.seen would write \$seen, but that is an argument here"):
+    with pytest.raises(
+        MissionError, match=r"Look\.seen writes \$seen, but seen is an argument of the subtree"
+    ):
         load(HEAD + text + "\n")

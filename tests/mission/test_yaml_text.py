@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.mission.source import Source
-from executive.mission.text.scalars import core_value
-from executive.mission.text.yaml_text import Mapping, Scalar, parse_yaml, plain
+from executive.mission.text.scalars import convert_scalar
+from executive.mission.text.yaml_text import YamlMapping, YamlScalar, parse_yaml, to_python_value
 
 
 def read(text: str) -> tuple[Any, list[str]]:
     root, findings = parse_yaml(Source("a.yaml", text))
-    return (None if root is None else plain(root)), [str(finding) for finding in findings]
+    return (None if root is None else to_python_value(root)), [str(finding) for finding in findings]
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def read(text: str) -> tuple[Any, list[str]]:
     ],
 )  # fmt: skip
 def test_plain_scalars_follow_yaml_1_2(text: str, value: object) -> None:
-    read_value = core_value(text)
+    read_value = convert_scalar(text)
     assert read_value == value and type(read_value) is type(value)
 
 
@@ -46,11 +46,11 @@ def test_quoted_scalars_and_keys_are_text_and_aliases_what_is_marked(text: str, 
 
 def test_every_key_and_value_knows_its_place() -> None:
     root, _ = parse_yaml(Source("a.yaml", "a:\n  bcd: 'e f'\n"))
-    assert isinstance(root, Mapping)
+    assert isinstance(root, YamlMapping)
     inner = root.get("a")
-    assert isinstance(inner, Mapping)
+    assert isinstance(inner, YamlMapping)
     (entry,) = inner.entries
-    assert isinstance(entry.value, Scalar)
+    assert isinstance(entry.value, YamlScalar)
     assert (entry.key.mark.line, entry.key.mark.col, entry.key.mark.length) == (2, 3, 3)
     assert (entry.value.mark.line, entry.value.mark.col, entry.value.mark.length) == (2, 8, 5)
 
@@ -61,7 +61,7 @@ def test_a_billion_laughs_are_refused() -> None:
     root, (finding,) = read("\n".join(lines))
     assert root is None
     assert (
-        "error[too-large]: the file has more than 20000 keys and values, those behind aliases included"
+        "error[too-large]: the file has more than 20000 keys and values, including those of aliases"
         in finding
     )
 
@@ -85,7 +85,7 @@ def test_aliases_cannot_nest_deeper_than_text() -> None:
         ("a: \x07\n", "the character '\\x07' is not allowed in YAML"),
         ("[" * 100, "nested more than 50 levels deep"),
         ("a: b: c\n", "mapping values are not allowed here"),
-        ("a: &x [*x]\n", "nothing above is marked"),
+        ("a: &x [*x]\n", 'there is no anchor "&x" above'),
     ],
 )
 def test_what_a_mission_cannot_use_is_refused(text: str, sentence: str) -> None:
@@ -110,6 +110,6 @@ def test_half_a_surrogate_pair_is_refused() -> None:
     root, findings = parse_yaml(Source("m.yaml", 'a: "x\\ud800"\n'))
     assert root is not None
     assert [(f.line, f.col, f.message) for f in findings] == [
-        (1, 4, "half of a surrogate pair is no character")
+        (1, 4, "a surrogate (U+D800 to U+DFFF) is no character")
     ]
-    assert plain(root) == {"a": "x?"}
+    assert to_python_value(root) == {"a": "x?"}

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from py_trees.common import Status
 
 from executive.events import NodeStarted, RunEnded, TimedEvent
-from executive.mission.flow.analysis import Analysis
+from executive.mission.flow.analysis import FlowAnalysis
 from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
 from executive.run.run import Run
@@ -29,8 +29,10 @@ class Witness:
     """
 
     def __init__(self, loaded: LoadedMission, skills: Mapping[str, type[Skill]], scope: Blackboard) -> None:
-        self._flow = Analysis(loaded.tree, skills)
-        self._endings = {(f"{ending.source}.{ending.reason}", ending.node) for ending in loaded.endings}
+        self._flow = FlowAnalysis(loaded.tree, skills)
+        self._endings = {
+            (f"{ending.source}.{ending.reason}", ending.node) for ending in loaded.unhandled_failures
+        }
         self._skills = {
             node.path: skills[node.skill] for node in loaded.tree.walk() if isinstance(node, SkillNode)
         }

@@ -114,7 +114,7 @@ def run_crowded(
 ) -> tuple[Result, str]:
     """Run a shipped mission and return its result and its journal."""
     skills = discover()
-    loaded = load_mission(mission, skills, kinds=cell_kind)
+    loaded = load_mission(mission, skills, find_cell_kind=cell_kind)
     options = RunOptions(1, keyboard=False, kind=kind)
     result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))
     return result, (Path(result.run) / "journal.jsonl").read_text()

@@ -26,7 +26,7 @@ def loaded(tmp_path: Path, mission: str) -> LoadedMission:
     text = (MISSIONS / f"{mission}.yaml").read_text().replace("cells/overhead.yaml", "cells/noisy.yaml")
     path = tmp_path / f"{mission}.yaml"
     path.write_text(text)
-    return load_mission(path, discover(), kinds=cell_kind)
+    return load_mission(path, discover(), find_cell_kind=cell_kind)
 
 
 class Spoilt(FakeCell):

@@ -42,7 +42,7 @@ class Done:
 @functools.cache
 def loaded(name: str) -> LoadedMission:
     """Return a shipped mission."""
-    return load_mission(MISSIONS[name], discover(), kinds=cell_kind)
+    return load_mission(MISSIONS[name], discover(), find_cell_kind=cell_kind)
 
 
 def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = FakeCell) -> Done:

@@ -17,7 +17,7 @@ from py_trees.common import Status
 from executive.cell.json_values import to_json
 from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
-from executive.mission.build import build
+from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
 from executive.record.trace import Trace
@@ -46,7 +46,7 @@ class Interleaved:
         self._fake = FakeCell(loaded.cell_config, seed=seed, routes=loaded.routes, emit=emit)
         self._context.connect(self._fake, LookaheadPlanner(self._fake.cell))
         self._context.begin_step(0)
-        self._root = build(loaded, skills(), self._context.cell, Variables(), emit)
+        self._root = build_tree(loaded, skills(), self._context.cell, Variables(), emit)
 
     def tick(self) -> bool:
         """Go on by one tick; return whether there is more to do."""

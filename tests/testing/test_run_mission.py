@@ -115,7 +115,9 @@ def test_patterns_that_fit_no_node_are_refused(look: Path) -> None:
     sentence = 'the pattern "*/Grasp" of seal_fails matches no path of a node; the paths are: tree/Wait, '
     with pytest.raises(InputError, match=sentence.replace("*", r"\*")):
         run_mission(look, faults=[during("*/Grasp", seal_fails())])
-    with pytest.raises(InputError, match='no node is called "Wait"; there are: tree/Wait, tree/Detect'):
+    with pytest.raises(
+        InputError, match='no skill node matches "Wait"; the skill nodes are: tree/Wait, tree/Detect'
+    ):
         run_mission(look, substitutes={"Wait": make_endless(Wait)})
     with pytest.raises(InputError, match="tree/Detect runs Detect, but EndlessWait is not a subclass; give"):
         run_mission(look, substitutes={"tree/*": make_endless(Wait)})

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import executive
-from executive.mission.model.grammar import SEQUENCE, USE
+from executive.mission.model.grammar import SEQUENCE_KEYWORD, USE_KEYWORD
 from executive.tree.registry import load_control_nodes
 
 PACKAGE = Path(inspect.getfile(executive)).parent
 
-GRAMMAR = {("mission/model/grammar.py", SEQUENCE), ("mission/model/grammar.py", USE)}
+GRAMMAR = {("mission/model/grammar.py", SEQUENCE_KEYWORD), ("mission/model/grammar.py", USE_KEYWORD)}
 """The two words that belong to the grammar: a bare list is a sequence, and `use` stands before a subtree."""
 
 OTHER_MEANINGS = {
@@ -38,7 +38,7 @@ def names_in(file: Path, words: set[str], classes: dict[str, str]) -> Iterator[s
 
 def test_no_other_file_names_a_control_node() -> None:
     kinds = load_control_nodes().values()
-    words = {kind.keyword for kind in kinds} | {USE}
+    words = {kind.keyword for kind in kinds} | {USE_KEYWORD}
     # `Sequence` is also a type of Python: imports of its module are found all the same.
     classes = {kind.__name__: kind.keyword for kind in kinds if kind.__name__ != "Sequence"}
     classes |= {kind.__module__: kind.keyword for kind in kinds}

@@ -133,7 +133,7 @@ def run(tree: str) -> MissionResult:
 )
 def test_a_mission_that_uses_it_is_checked(project: Path, tree: str, code: str) -> None:
     with pytest.raises(MissionError) as caught:
-        load_mission(write(tree), discover(), kinds=cell_kind)
+        load_mission(write(tree), discover(), find_cell_kind=cell_kind)
     assert code in {finding.code for finding in caught.value.findings}
 
 

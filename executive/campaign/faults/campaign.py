@@ -15,7 +15,7 @@ from executive.campaign.faults.trial import FaultsByNumber, make_empty_trial, ru
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.campaign.pool import run_jobs
 from executive.errors import InputError
-from executive.mission.model.instance import inspection_instance, node_of
+from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, UseNode
 from executive.mission.source import Mark
 from executive.view.figures.fault import Branch, FaultFigures, Trial
@@ -180,8 +180,8 @@ def _walk_branches(tree: Node) -> Iterator[tuple[Mark, str, Node]]:
     """Yield the position in the file, the name and the node of each branch."""
     for node in tree.walk():
         if isinstance(node, InnerNode):
-            for name, child in inspection_instance(node).list_contingencies():
-                yield node_of(child).mark, name, node_of(child)
+            for name, child in make_inspection_instance(node).list_contingencies():
+                yield get_mission_node(child).mark, name, get_mission_node(child)
 
 
 def _find_path(node: Node) -> str:

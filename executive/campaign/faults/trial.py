@@ -103,7 +103,7 @@ class _TrialRun:
         is_bug_raised = any(self._has_effect(fault) for fault in self._faults.values() if fault.ends_run)
         faults, unobserved = tuple(self._faults.values()), self._count_unobserved_objects()
         problems = [
-            *trial_checks.check_end(outcome, faults, self._mission.loaded.endings, is_bug_raised),
+            *trial_checks.check_end(outcome, faults, self._mission.loaded.unhandled_failures, is_bug_raised),
             *trial_checks.check_tree(run.root),
             *check_journal(self._events, outcome),
             *trial_checks.check_ledger(outcome, items, audit, removed_count, unobserved),

@@ -15,7 +15,7 @@ from executive.events import FaultInjected, FrameSearched, ItemChanged, RunEnded
 from executive.geometry import Array
 from executive.ledger.item import State
 from executive.ledger.outcomes import is_balanced
-from executive.mission.flow.endings import Ending
+from executive.mission.flow.unhandled_failures import UnhandledFailure
 from executive.testing.faults.world_access import TrueObject
 
 DISPLACING_EFFECTS = frozenset({"object_removed", "object_moved", "seal_breaks"})
@@ -35,7 +35,10 @@ NO_UNOBSERVED_OBJECTS = UnobservedCounts(0, 0)
 
 
 def check_end(
-    outcome: RunEnded, faults: Sequence[PlannedFault], endings: Sequence[Ending], is_bug_raised: bool
+    outcome: RunEnded,
+    faults: Sequence[PlannedFault],
+    endings: Sequence[UnhandledFailure],
+    is_bug_raised: bool,
 ) -> Iterator[str]:
     """Yield a problem if the run did not end as its faults require.
 

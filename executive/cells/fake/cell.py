@@ -25,7 +25,7 @@ from executive.errors import Fault, InputError
 from executive.events import Emit, discard_event
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
-from executive.mission.text.files import shipped_folder
+from executive.mission.text.files import get_shipped_folder
 from executive.motion.arms import find_arm_errors
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.localization import build_localizer
@@ -199,7 +199,7 @@ class FakeCell(CellWithoutHardware):
 @functools.cache
 def load_empty_cell() -> CellConfig:
     """Return the shipped cell `overhead` as a fake cell without objects, for tests of single skills."""
-    path = shipped_folder() / "cells" / "overhead.yaml"
+    path = get_shipped_folder() / "cells" / "overhead.yaml"
     return load_cell(path, {"cell.kind": "fake", "cell.table.objects": "[0, 0]"})
 
 

@@ -27,7 +27,7 @@ from executive.cells.sim.visuals import SimVisuals
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
 from executive.events import Emit
-from executive.mission.text.files import shipped_folder
+from executive.mission.text.files import get_shipped_folder
 from executive.motion.arms import build_planner, find_arm_errors
 from executive.perception.detectors.registry import find_known_labels, find_problems
 from executive.perception.detectors.screening import screen_detectors
@@ -97,7 +97,7 @@ class SimCell(CellWithoutHardware):
         classes = {label: object_class_with_mass(label, kind) for label, kind in config.objects.items()}
         localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
         # Detectors are built last, because their processes would not be ended if a later statement failed.
-        folders = (options.base, shipped_folder() / "cells")
+        folders = (options.base, get_shipped_folder() / "cells")
         self._detectors = detectors(
             config, clock=clock, base=options.base, seed=seeds.detectors, folders=folders
         )

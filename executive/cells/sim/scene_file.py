@@ -14,10 +14,10 @@ from executive.cells.sim.arrangements import DAMAGED_MODEL, UNKNOWN_COUNT
 from executive.cells.sim.camera import Light
 from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
 from executive.errors import InputError
-from executive.mission.findings import Finding, MissionError, alternatives, error, in_file_order
-from executive.mission.parse.validate import mark_of, validate
+from executive.mission.findings import Finding, MissionError, list_choices, make_error, sort_findings
+from executive.mission.parse.validate import find_mark, validate
 from executive.mission.text.files import read_source
-from executive.mission.text.yaml_text import Node, parse_yaml
+from executive.mission.text.yaml_text import YamlNode, parse_yaml
 from executive.perception.camera_model import compute_calibration, compute_field_of_view
 
 ANY = "any"
@@ -175,39 +175,39 @@ def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
     source = read_source(path)
     root, findings = parse_yaml(source)
     if root is None:
-        raise MissionError(in_file_order(findings, source.path))
+        raise MissionError(sort_findings(findings, source.path))
     validated = validate(root, SceneConfig)
     scene = validated.model
     mismatches = () if scene is None else _find_mismatches(scene, root, config)
     found = (*findings, *validated.findings, *mismatches)
     if scene is None or found:
-        raise MissionError(in_file_order(found, source.path))
+        raise MissionError(sort_findings(found, source.path))
     return scene
 
 
-def _find_mismatches(scene: SceneConfig, root: Node, config: CellConfig) -> Iterator[Finding]:
+def _find_mismatches(scene: SceneConfig, root: YamlNode, config: CellConfig) -> Iterator[Finding]:
     """Yield a finding for every value that does not fit the cell."""
     for label in scene.objects:
         if label not in (ANY, *config.objects):
-            mark = mark_of(root, ("objects", label), of_key=True)
-            hint = alternatives(label, (*config.objects, ANY), "Valid keys")
-            yield error(mark, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
+            mark = find_mark(root, ("objects", label), of_key=True)
+            hint = list_choices(label, (*config.objects, ANY), "Valid keys")
+            yield make_error(mark, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
     name, camera = next(iter(config.cameras.items()))
     if any(scene.camera.orbit_deg) and camera.mount != "fixed":
-        yield error(
-            mark_of(root, ("camera", "orbit_deg")), "wrong-value",
+        yield make_error(
+            find_mark(root, ("camera", "orbit_deg")), "wrong-value",
             f"camera.orbit_deg moves a fixed camera, and the camera {name} of the cell {config.cell} is "
             "mounted on the wrist; use shift and turn_deg",
         )  # fmt: skip
     yield from _check_field_of_view(scene, root, camera)
 
 
-def _check_field_of_view(scene: SceneConfig, root: Node, camera: CameraConfig) -> Iterator[Finding]:
+def _check_field_of_view(scene: SceneConfig, root: YamlNode, camera: CameraConfig) -> Iterator[Finding]:
     """Yield a finding if the field of view of the scene exceeds `MAX_FOV_DEG`."""
     declared = compute_field_of_view(compute_calibration(camera)[0], camera.height)
     if declared * scene.camera.fov_factor > MAX_FOV_DEG:
-        yield error(
-            mark_of(root, ("camera", "fov_factor")), "out-of-range",
+        yield make_error(
+            find_mark(root, ("camera", "fov_factor")), "out-of-range",
             f"camera.fov_factor must be at most {MAX_FOV_DEG / declared:.2f}, for the declared field of "
             f"view is {declared:.1f} degrees, and no lens has more than {MAX_FOV_DEG:g}",
         )  # fmt: skip

@@ -1,1 +1,1 @@
-"""Everything that can be known to be wrong before anything moves; one file per subject."""
+"""Checks that find errors in a mission before it runs; one module per subject."""

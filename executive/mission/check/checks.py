@@ -1,23 +1,16 @@
-"""Everything that can be known to be wrong with a mission before it runs; one function per check."""
+"""List of all checks, and their execution."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import islice
 
-from executive.mission.check import (
-    inner_nodes,
-    parallel,
-    port_types,
-    reach,
-    reasons,
-    skills,
-    variables,
-)
-from executive.mission.check.case import Case
+from executive.mission.check import inner_nodes, parallel, port_types, reach, reasons, skills, variables
+from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding
 
-Check = Callable[[Case], Iterator[Finding]]
+Check = Callable[[CheckContext], Iterator[Finding]]
+"""Function that yields the findings of one check."""
 
 CHECKS: tuple[Check, ...] = (
     skills.find_unknown_skills,
@@ -25,7 +18,7 @@ CHECKS: tuple[Check, ...] = (
     inner_nodes.check_constants,
     reasons.check_labels,
     skills.check_routes,
-    skills.find_unseen_classes,
+    skills.find_undetectable_classes,
     reasons.check_failure_names,
     variables.find_unwritten_inputs,
     variables.find_unwritten_library_inputs,
@@ -41,13 +34,13 @@ CHECKS: tuple[Check, ...] = (
     parallel.find_shared_variables,
     parallel.find_racing_reads,
 )
-"""Each holds whatever else is wrong: what is unknown in one place makes no findings in others."""
+"""All checks. Each tolerates the errors that other checks report, and reports no consequence of them."""
 
 
-MAX_FINDINGS = 1000
-"""Largest number of findings of one check: hostile missions have hundreds of thousands."""
+MAX_FINDINGS_PER_CHECK = 1000
+"""Maximum number of findings of one check; a mission can be written to cause hundreds of thousands."""
 
 
-def check(case: Case) -> list[Finding]:
-    """Return the findings of every check."""
-    return [finding for one in CHECKS for finding in islice(one(case), MAX_FINDINGS)]
+def run_checks(context: CheckContext) -> list[Finding]:
+    """Return the findings of all checks."""
+    return [finding for check in CHECKS for finding in islice(check(context), MAX_FINDINGS_PER_CHECK)]

@@ -5,62 +5,64 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from executive.cell.protocols import MinTimes
-from executive.mission.check.case import Case
-from executive.mission.model.instance import has_valid_constants, inspection_instance, node_of
+from executive.mission.check.context import CheckContext
+from executive.mission.model.conversion import WrongType, convert_value
+from executive.mission.model.instance import get_mission_node, has_valid_constants, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
-from executive.mission.model.typed import WrongType, convert
 from executive.mission.model.wiring import find_literals
 from executive.skill import HOLDING, Param, Port
 
 
-def min_time(case: Case, node: Node) -> float:
-    """Return a lower bound of the time in which a node can succeed [s]; 0 if nothing is known."""
+def compute_min_time(context: CheckContext, node: Node) -> float:
+    """Return a lower bound of the time in which a node can succeed [s]; 0 if the bound is unknown."""
     match node:
         case SkillNode():
-            return _skill(case, node)
+            return _compute_min_time_of_skill(context, node)
         case UseNode(body=Node() as body):
-            return min_time(case, body)
+            return compute_min_time(context, body)
         case InnerNode() if has_valid_constants(node):
-            return inspection_instance(node).min_time(lambda child: min_time(case, node_of(child)))
+            instance = make_inspection_instance(node)
+            return instance.min_time(lambda child: compute_min_time(context, get_mission_node(child)))
     return 0.0
 
 
-def _skill(case: Case, node: SkillNode) -> float:
-    skill = case.skills.get(node.skill)
-    if skill is None or case.min_times is None:
+def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
+    skill = context.skills.get(node.skill)
+    if skill is None or context.min_times is None:
         return 0.0
     declared: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
-    given = {name: param.default for name, param in skill.params.items() if not param.is_required}
-    for name, value in find_literals(node):
+    values = {name: param.default for name, param in skill.params.items() if not param.is_required}
+    for name, literal in find_literals(node):
         try:
-            given[name] = convert(value.value, declared[name].type)
+            values[name] = convert_value(literal.value, declared[name].type)
         except (KeyError, WrongType):
-            # Another check says so.
+            # The check of settings reports this error.
             return 0.0
-    entry = case.flow.entry.get(node.path)
-    tools = entry.tools if entry else None
-    carries = skill.tool_state[0] is HOLDING
-    from_elsewhere = carries and (tools is None or any(tool.is_arm_moved for tool in tools))
-    # How long a carry takes is known from where objects lie, not from wherever the arm went with its load.
-    return skill.min_time(_FromAnywhere(case.min_times) if from_elsewhere else case.min_times, given)
+    state = context.flow_analysis.entry_states.get(node.path)
+    tools = state.tools if state else None
+    needs_object = skill.tool_state[0] is HOLDING
+    starts_anywhere = needs_object and (tools is None or any(tool.is_arm_moved for tool in tools))
+    # The time of a transport has a bound only if it starts where an object was grasped.
+    min_times = _TimesFromAnywhere(context.min_times) if starts_anywhere else context.min_times
+    return skill.min_time(min_times, values)
 
 
-class _FromAnywhere:
-    """Least times of a cell for an arm that may be anywhere with its load."""
+class _TimesFromAnywhere:
+    """Minimum times of a cell if the arm may have any pose at the start of a transport."""
 
-    def __init__(self, least: MinTimes) -> None:
-        self._least = least
+    def __init__(self, min_times: MinTimes) -> None:
+        self._min_times = min_times
 
     @property
     def descent_time(self) -> float:
-        """The guarded last part of an approach [s]."""
-        return self._least.descent_time
+        """Time of the guarded last part of an approach [s]."""
+        return self._min_times.descent_time
 
     def get_transport_time(self, bin: str | None) -> float:
-        """Nothing: it may be over the bin already."""
+        """Return 0, because the object may be above the bin already."""
         del bin
         return 0.0
 
     def get_answer_time(self, detector: str) -> float:
-        """From a frame to the answer of a detector [s]."""
-        return self._least.get_answer_time(detector)
+        """Return the time from a frame to the answer of a detector [s]."""
+        return self._min_times.get_answer_time(detector)

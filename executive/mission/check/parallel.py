@@ -1,125 +1,133 @@
-"""Checks of what happens at the same time: no two may use one thing or write one variable."""
+"""Checks of concurrent branches: they must not use the same part of the cell or write the same variable."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations, permutations
 
-from executive.mission.check.case import Case
-from executive.mission.findings import Finding, error
-from executive.mission.model.instance import inspection_instance, node_of
+from executive.mission.check.context import CheckContext
+from executive.mission.findings import Finding, make_error
+from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
-from executive.mission.model.paths import word_of
-from executive.mission.model.wiring import find_read_variables, find_written_variables
+from executive.mission.model.paths import get_type_name
+from executive.mission.model.wiring import find_control_node_inputs, find_control_node_outputs
 from executive.mission.source import Mark
 from executive.skill import Direction
 
 
-def find_shared_resources(case: Case) -> Iterator[Finding]:
-    """Find every two branches that run at the same time and use the same part of the cell."""
-    for branches in _concurrent(case):
-        for first, second in combinations([_uses(case, branch) for branch in branches], 2):
-            # Two skills that share arm and tool clash once.
-            clashes = {(first[part].mark, second[part].mark): part for part in second if part in first}
-            for part in clashes.values():
-                one, other = first[part], second[part]
-                use = case.library_uses.get(other.path)
-                mark = use.mark if use else other.mark
-                who = f'{other.skill} in the subtree "{use.name}"' if use else other.skill
+def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every two concurrent branches that use the same part of the cell."""
+    for branches in _list_concurrent_branches(context):
+        users_by_branch = [_find_first_users(context, branch) for branch in branches]
+        for users, other_users in combinations(users_by_branch, 2):
+            # Two skills that share both arm and tool are reported once.
+            shared = [part for part in other_users if part in users]
+            conflicts = {(users[part].mark, other_users[part].mark): part for part in shared}
+            for part in conflicts.values():
+                user, other_user = users[part], other_users[part]
+                use = context.library_uses_by_path.get(other_user.path)
+                mark = use.mark if use else other_user.mark
+                name = f'{other_user.skill} in the subtree "{use.name}"' if use else other_user.skill
                 message = (
-                    f"{who} uses the {part} while {one.skill} in {one.mark.place(mark.source)} may use it, "
-                    "in another branch of the same parallel"
+                    f"{name} uses the {part}, and {user.skill} in {user.mark.describe_place(mark.source)} "
+                    "may use it at the same time in another branch of this parallel"
                 )
                 hint = "Write a sequence, or put both into one branch."
-                yield error(mark, "shared-resource", message, hint)
+                yield make_error(mark, "shared-resource", message, hint)
 
 
-def find_shared_variables(case: Case) -> Iterator[Finding]:
-    """Find every two branches that run at the same time and write the same variable."""
-    for branches in _concurrent(case):
-        for first, second in combinations([_writes(case, branch) for branch in branches], 2):
-            for variable, (other, mark, hint) in second.items():
-                if variable in first:
-                    one, place, _ = first[variable]
+def find_shared_variables(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every two concurrent branches that write the same variable."""
+    for branches in _list_concurrent_branches(context):
+        writers_by_branch = [_find_first_writers(context, branch) for branch in branches]
+        for writers, other_writers in combinations(writers_by_branch, 2):
+            for variable, (other_writer, mark, hint) in other_writers.items():
+                if variable in writers:
+                    writer, writer_mark, _ = writers[variable]
                     message = (
-                        f"{other} writes ${variable}, and so does {one} in {place.place(mark.source)}, "
+                        f"{other_writer} writes ${variable}, and so does {writer} in "
+                        f"{writer_mark.describe_place(mark.source)}, in another branch of the same parallel"
+                    )
+                    yield make_error(mark, "shared-variable", message, hint)
+
+
+def find_racing_reads(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every input whose variable a concurrent branch may write."""
+    for branches in _list_concurrent_branches(context):
+        inputs = [list(_find_inputs(context, branch)) for branch in branches]
+        writers = [_find_first_writers(context, branch) for branch in branches]
+        for index, other in permutations(range(len(branches)), 2):
+            # Branches start in order: the first skill of a branch reads before a later branch writes.
+            safe_reader = _find_first_leaf(branches[index]) if index < other else None
+            for reader, input_name, variable, mark in inputs[index]:
+                # find_shared_variables reports a variable that both branches write.
+                if (
+                    reader is not safe_reader
+                    and variable in writers[other]
+                    and variable not in writers[index]
+                ):
+                    writer, writer_mark, hint = writers[other][variable]
+                    message = (
+                        f"{input_name} reads ${variable}, while {writer} in "
+                        f"{writer_mark.describe_place(mark.source)} may write it, "
                         "in another branch of the same parallel"
                     )
-                    yield error(mark, "shared-variable", message, hint)
+                    yield make_error(mark, "shared-variable", message, hint)
 
 
-def find_racing_reads(case: Case) -> Iterator[Finding]:
-    """Find every variable that one branch reads while another may write it."""
-    for branches in _concurrent(case):
-        known = [
-            (index, _first(branch), list(_reads(case, branch)), _writes(case, branch))
-            for index, branch in enumerate(branches)
-        ]
-        for (index, first, reads, own), (other_index, _, _, written) in permutations(known, 2):
-            # A skill with which an earlier branch begins has read before anything else can write.
-            begins = first if index < other_index else None
-            for reader, what, variable, mark in reads:
-                # What both write is told as such.
-                if reader is not begins and variable in written and variable not in own:
-                    other, place, hint = written[variable]
-                    message = (
-                        f"{what} reads ${variable}, while {other} in {place.place(mark.source)} "
-                        "may write it, in another branch of the same parallel"
-                    )
-                    yield error(mark, "shared-variable", message, hint)
+def _list_concurrent_branches(context: CheckContext) -> Iterator[list[Node]]:
+    """Yield for each control node with concurrent children the list of these children."""
+    for node in context.iterate_control_nodes():
+        if branches := make_inspection_instance(node).concurrent_children:
+            yield [get_mission_node(branch) for branch in branches]
 
 
-def _concurrent(case: Case) -> Iterator[list[Node]]:
-    """Yield the children of each node that run at the same time."""
-    for node in case.inner_nodes():
-        if branches := inspection_instance(node).concurrent_children:
-            yield [node_of(branch) for branch in branches]
-
-
-def _first(node: Node) -> Node:
-    """Return the node with which another begins in its first tick."""
+def _find_first_leaf(node: Node) -> Node:
+    """Return the skill, or other node without children, that a node executes first."""
     if isinstance(node, UseNode):
-        return _first(node.body) if node.body else node
-    first = inspection_instance(node).first_child if isinstance(node, InnerNode) else None
-    return _first(node_of(first)) if first else node
+        return _find_first_leaf(node.body) if node.body else node
+    first = make_inspection_instance(node).first_child if isinstance(node, InnerNode) else None
+    return _find_first_leaf(get_mission_node(first)) if first else node
 
 
-def _reads(case: Case, branch: Node) -> Iterator[tuple[Node, str, str, Mark]]:
-    """Yield everything below `branch` that reads a variable which is or may be written before it."""
+def _find_inputs(context: CheckContext, branch: Node) -> Iterator[tuple[Node, str, str, Mark]]:
+    """Yield node, name, variable and position of every input below `branch` that may be read.
+
+    The check of unwritten variables reports a required input whose variable is not written before.
+    """
     for node in branch.walk():
-        entry = case.flow.entry.get(node.path)
-        if entry is None:
+        state = context.flow_analysis.entry_states.get(node.path)
+        if state is None:
             continue
-        for reference in find_read_variables(node):
-            yield node, word_of(node), reference.name, reference.mark
-        for wire in case.find_wires(node, Direction.IN):
-            # What is surely not written yet is told as unwritten.
-            if entry.written is None or wire.variable in entry.written or not wire.port.is_required:
+        for reference in find_control_node_inputs(node):
+            yield node, get_type_name(node), reference.name, reference.mark
+        for wire in context.find_wires(node, Direction.IN):
+            if state.written is None or wire.variable in state.written or not wire.port.is_required:
                 yield node, str(wire), wire.variable, wire.mark
 
 
-def _uses(case: Case, branch: Node) -> dict[str, SkillNode]:
-    """Return the first user of every part of the cell below `branch`."""
+def _find_first_users(context: CheckContext, branch: Node) -> dict[str, SkillNode]:
+    """Return the first user of every part of the cell below `branch`, by the name of the part."""
     users: dict[str, SkillNode] = {}
-    on_wrist = case.cell is not None and any(c.mount == "wrist" for c in case.cell.cameras.values())
+    on_wrist = context.cell is not None and any(c.mount == "wrist" for c in context.cell.cameras.values())
     for node in branch.walk():
-        if not isinstance(node, SkillNode) or node.skill not in case.skills:
+        if not isinstance(node, SkillNode) or node.skill not in context.skills:
             continue
-        for resource in case.skills[node.skill].uses:
-            # A camera on the wrist sees from where the arm is: to look is to use the arm.
-            for used in ("arm", resource) if resource == "camera" and on_wrist else (resource,):
-                users.setdefault(used, node)
+        for resource in context.skills[node.skill].uses:
+            # The pose of a camera on the wrist depends on the arm, so its users use the arm, too.
+            for part in ("arm", resource) if resource == "camera" and on_wrist else (resource,):
+                users.setdefault(part, node)
     return users
 
 
-def _writes(case: Case, branch: Node) -> dict[str, tuple[str, Mark, str]]:
-    """Return the first writer of every variable below `branch`, its place, and how to call it otherwise."""
+def _find_first_writers(context: CheckContext, branch: Node) -> dict[str, tuple[str, Mark, str]]:
+    """Return by variable its first writer below `branch`: name, position, and a hint to rename the output."""
     writers: dict[str, tuple[str, Mark, str]] = {}
     for node in branch.walk():
-        for key, variable in find_written_variables(node):
-            hint = f"Write to another variable there, as {key.name}: other."
-            writers.setdefault(variable.name, (word_of(node), variable.mark, hint))
-        for wire in case.find_wires(node, Direction.OUT):
-            hint = f"Write to another variable there, as {wire.port.name}: $other."
+        for key, variable in find_control_node_outputs(node):
+            hint = f"Let {get_type_name(node)} write another variable: {key.name}: other."
+            writers.setdefault(variable.name, (get_type_name(node), variable.mark, hint))
+        for wire in context.find_wires(node, Direction.OUT):
+            hint = f"Let {wire.skill} write another variable: {wire.port.name}: $other."
             writers.setdefault(wire.variable, (wire.skill, wire.mark, hint))
     return writers

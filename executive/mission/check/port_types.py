@@ -1,4 +1,4 @@
-"""Checks of what the variables hold: does what one writes fit what the other reads?"""
+"""Checks that the types of the values of variables fit the inputs that read the variables."""
 
 from __future__ import annotations
 
@@ -6,29 +6,29 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from executive.mission.check.case import Case
-from executive.mission.findings import Finding, alternatives, error
+from executive.mission.check.context import CheckContext
+from executive.mission.descriptions import describe_value
+from executive.mission.findings import Finding, list_choices, make_error
+from executive.mission.model.conversion import find_input_problem
 from executive.mission.model.nodes import InnerNode, Node
-from executive.mission.model.paths import word_of
+from executive.mission.model.paths import get_type_name
 from executive.mission.model.port_types import describe_type, find_element_type, is_assignable
-from executive.mission.model.typed import find_input_problem
 from executive.mission.model.values import Literal, Reference
-from executive.mission.model.wiring import Wire, find_written_variables
+from executive.mission.model.wiring import Wire, find_control_node_outputs
 from executive.mission.source import Mark
-from executive.mission.words import describe
 from executive.skill import Direction, Port
 
 
 @dataclass(frozen=True)
 class Writer:
-    """Something that writes a variable.
+    """An output that writes a variable.
 
     Attributes:
-        name: What it is called in a sentence, for instance `Localize.targets`.
-        mark: Where it stands.
-        type: Type of what it writes.
-        refers: What a text names, or "".
-        values: The values themselves, each with its place, where they stand in the file; else None.
+        name: Name in messages: `Localize.targets`, or the keyword of a control node.
+        mark: Position of the node.
+        type: Type of the written values.
+        refers: What the written texts name, as `bin` or `item`; "" if they are no names.
+        values: Written values with their positions, if they are constants in the file; otherwise None.
     """
 
     name: str
@@ -38,44 +38,46 @@ class Writer:
     values: tuple[tuple[object, Mark], ...] | None = None
 
     def describe_for(self, mark: Mark) -> str:
-        """Return what it is and where, for who reads the file of `mark`."""
-        return f"{self.name} in {self.mark.place(mark.source)}"
+        """Return name and position of the writer, for a message at `mark`."""
+        return f"{self.name} in {self.mark.describe_place(mark.source)}"
 
 
-Loops = Mapping[str, Sequence[Writer]]
-"""What the loops around a node write to their variables."""
+WritersByVariable = Mapping[str, Sequence[Writer]]
 
 
-def check_port_types(case: Case) -> Iterator[Finding]:
-    """Find every input wired to a variable that may hold something else than it takes."""
-    written: dict[str, list[Writer]] = {}
-    for node in case.tree.walk():
-        for wire in case.find_wires(node, Direction.OUT):
+def check_port_types(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every input whose variable may have a value that does not fit the input."""
+    skill_writers: dict[str, list[Writer]] = {}
+    for node in context.tree.walk():
+        for wire in context.find_wires(node, Direction.OUT):
             writer = Writer(str(wire), node.mark, wire.port.type, wire.port.refers)
-            written.setdefault(wire.variable, []).append(writer)
+            skill_writers.setdefault(wire.variable, []).append(writer)
 
-    def walk(node: Node, loops: Loops) -> Iterator[Finding]:
-        for loop in _loops(node):
-            sources = loop.sources({**written, **loops})
-            yield from loop.no_lists(sources)
-            loops = {**loops, loop.variable: [element for s in sources for element in loop.elements(s)]}
-        for wire in case.find_wires(node, Direction.IN):
-            for writer in loops.get(wire.variable, written.get(wire.variable, ())):
-                yield from _misfits(case, wire, writer)
+    def walk(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
+        for loop in _find_element_loops(node):
+            list_writers = loop.find_list_writers({**skill_writers, **loop_writers})
+            yield from loop.check_lists(list_writers)
+            elements = [element for writer in list_writers for element in loop.make_element_writers(writer)]
+            loop_writers = {**loop_writers, loop.variable: elements}
+        for wire in context.find_wires(node, Direction.IN):
+            for writer in loop_writers.get(wire.variable, skill_writers.get(wire.variable, ())):
+                yield from _check_connection(context, wire, writer)
         for child in node.children:
-            yield from walk(child, loops)
+            yield from walk(child, loop_writers)
 
-    yield from walk(case.tree, {})
+    yield from walk(context.tree, {})
 
 
 @dataclass(frozen=True)
-class ElementType:
-    """A control node that writes the elements of a list to a variable.
+class ElementLoop:
+    """A control node that writes the elements of a list, one per iteration, to a variable.
 
     Attributes:
-        keyword: Its keyword.
-        key: Key of the list.
-        source: The list, or the variable that holds it.
+        keyword: Keyword of the control node.
+        mark: Position of the control node.
+        variable: Name of the variable.
+        key: Key that gives the list.
+        source: The list, or the variable that contains the list.
     """
 
     keyword: str
@@ -84,75 +86,82 @@ class ElementType:
     key: str
     source: Literal | Reference
 
-    def sources(self, writers: Loops) -> Sequence[Writer]:
-        """Return the possible lists: the one in the file, or those written to the variable."""
+    def find_list_writers(self, writers: WritersByVariable) -> Sequence[Writer]:
+        """Return the writers of the list; a list in the file has the control node itself as writer."""
         if isinstance(self.source, Literal):
-            listed = self.source.value, self.source.mark
-            return [Writer(self.keyword, self.mark, list[Any], "", (listed,))]
+            located_list = self.source.value, self.source.mark
+            return [Writer(self.keyword, self.mark, list[Any], "", (located_list,))]
         return writers.get(self.source.name, ())
 
-    def no_lists(self, sources: Iterable[Writer]) -> Iterator[Finding]:
-        """Find every source that is no list; one in the file has a check of its own."""
+    def check_lists(self, list_writers: Iterable[Writer]) -> Iterator[Finding]:
+        """Yield an error for each writer that does not write a list to the variable `source`.
+
+        The check of constants reports a value in the file that is not a list.
+        """
         if not isinstance(self.source, Reference):
             return
-        name, mark, what = self.source.name, self.source.mark, f"{self.keyword}.{self.key}"
-        for source in sources:
-            for value, place in source.values or ():
+        variable, mark, key = self.source.name, self.source.mark, f"{self.keyword}.{self.key}"
+        for writer in list_writers:
+            for value, value_mark in writer.values or ():
                 if not isinstance(value, list):
-                    message = f"{what} takes a list, but for ${name} stands {describe(value)} here"
-                    yield error(place, "port-type", message, f"It is read in {mark.place(place.source)}.")
-            if source.values is None and find_element_type(source.type) is None:
-                message = f"{what} takes a list, but ${name} holds {describe_type(source.type)}"
-                yield error(mark, "port-type", message, f"It is written by {source.describe_for(mark)}.")
+                    message = f"{key} takes a list, but ${variable} gets {describe_value(value)} here"
+                    hint = f"{key} reads ${variable} in {mark.describe_place(value_mark.source)}."
+                    yield make_error(value_mark, "port-type", message, hint)
+            if writer.values is None and find_element_type(writer.type) is None:
+                message = f"{key} takes a list, but ${variable} holds {describe_type(writer.type)}"
+                yield make_error(mark, "port-type", message, f"It is written by {writer.describe_for(mark)}.")
 
-    def elements(self, source: Writer) -> Iterator[Writer]:
-        """Yield the writers of the variable for a list."""
-        if source.values is not None:
+    def make_element_writers(self, list_writer: Writer) -> Iterator[Writer]:
+        """Yield the loop as the writer of the elements of a list."""
+        if list_writer.values is not None:
             literal = self.source if isinstance(self.source, Literal) else None
             values = [
-                (element, literal.element_mark(index) if literal else mark)
-                for value, mark in source.values
+                (element, literal.get_element_mark(index) if literal else mark)
+                for value, mark in list_writer.values
                 if isinstance(value, list)
                 for index, element in enumerate(value)
             ]
             yield Writer(self.keyword, self.mark, Any, "", tuple(values))
-        elif (element := find_element_type(source.type)) is not None:
-            yield Writer(self.keyword, self.mark, element, source.refers)
+        elif (element_type := find_element_type(list_writer.type)) is not None:
+            yield Writer(self.keyword, self.mark, element_type, list_writer.refers)
 
 
-def _loops(node: Node) -> Iterator[ElementType]:
-    for key, variable in find_written_variables(node):
+def _find_element_loops(node: Node) -> Iterator[ElementLoop]:
+    for key, variable in find_control_node_outputs(node):
         source = node.values.get(key.list_key) if isinstance(node, InnerNode) else None
         if isinstance(source, Literal | Reference):
-            yield ElementType(word_of(node), node.mark, variable.name, key.list_key, source)
+            yield ElementLoop(get_type_name(node), node.mark, variable.name, key.list_key, source)
 
 
-def _misfits(case: Case, wire: Wire, writer: Writer) -> Iterator[Finding]:
-    """Find what is wrong with wiring an input to what a writer writes."""
-    port, wanted = wire.port, f"{wire} takes {_describe_accepted(wire.port)}"
+def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iterator[Finding]:
+    """Yield an error for each value or type of a writer that does not fit the input `wire`."""
+    port, accepted = wire.port, f"{wire} takes {_describe_accepted_type(wire.port)}"
     for value, mark in writer.values or ():
-        known = case.names.get(port.refers)
+        names = context.cell_names_by_kind.get(port.refers)
         if find_input_problem(value, port):
-            message = f"{wanted}, but for ${wire.variable} stands {describe(value)} here"
-            yield error(mark, "port-type", message, f"It is read in {wire.mark.place(mark.source)}.")
-        elif known is not None and isinstance(value, str) and value not in known:
+            message = f"{accepted}, but ${wire.variable} gets {describe_value(value)} here"
+            hint = f"{wire} reads ${wire.variable} in {wire.mark.describe_place(mark.source)}."
+            yield make_error(mark, "port-type", message, hint)
+        elif names is not None and isinstance(value, str) and value not in names:
             message = f'the cell has no {port.refers} "{value}" for {wire}'
-            yield error(mark, f"unknown-{port.refers}", message, alternatives(value, known, f"{wire} takes"))
+            hint = list_choices(value, names, "Allowed names")
+            yield make_error(mark, f"unknown-{port.refers}", message, hint)
     if writer.values is not None:
         return
-    holds = ""
+    actual = ""
     if not is_assignable(writer.type, port.type):
-        holds = describe_type(writer.type)
+        actual = describe_type(writer.type)
     elif port.refers and writer.refers != port.refers:
-        holds = f"the name of {_a(writer.refers)}" if writer.refers else "any text"
-    if holds:
-        message = f"{wanted}, but ${wire.variable} holds {holds}"
-        yield error(wire.mark, "port-type", message, f"It is written by {writer.describe_for(wire.mark)}.")
+        actual = f"the name of {_add_article(writer.refers)}" if writer.refers else "any text"
+    if actual:
+        message = f"{accepted}, but ${wire.variable} holds {actual}"
+        hint = f"It is written by {writer.describe_for(wire.mark)}."
+        yield make_error(wire.mark, "port-type", message, hint)
 
 
-def _describe_accepted(port: Port) -> str:
-    return f"the name of {_a(port.refers)}" if port.refers else describe_type(port.type)
+def _describe_accepted_type(port: Port) -> str:
+    return f"the name of {_add_article(port.refers)}" if port.refers else describe_type(port.type)
 
 
-def _a(noun: str) -> str:
+def _add_article(noun: str) -> str:
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"

@@ -1,76 +1,79 @@
-"""Checks of the flow: nodes that can never run, and the state of the tool."""
+"""Checks of nodes that can never run, and of the state of the tool before each skill."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from executive.mission.check.case import Case
-from executive.mission.findings import Finding, error, warning
-from executive.mission.flow.analysis import Analysis
-from executive.mission.model.instance import inspection_instance, node_of
+from executive.mission.check.context import CheckContext
+from executive.mission.findings import Finding, make_error, make_warning
+from executive.mission.flow.analysis import FlowAnalysis
+from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode
-from executive.mission.model.paths import name_of
+from executive.mission.model.paths import get_path_name
 from executive.mission.source import Mark
 from executive.skill import EMPTY, HOLDING
 from executive.tree.flow import PossibleToolState
 from executive.tree.node import ControlNode
 
 
-def find_unreachable(case: Case) -> Iterator[Finding]:
-    """Find the first node of every part of the tree that can never run."""
-    yield from _unreachable(case.tree, case.flow)
+def find_unreachable(context: CheckContext) -> Iterator[Finding]:
+    """Yield a warning for the first child of every node that can never run."""
+    yield from _find_unreachable_below(context.tree, context.flow_analysis)
 
 
-def _unreachable(node: Node, flow: Analysis) -> Iterator[Finding]:
-    model = inspection_instance(node) if isinstance(node, InnerNode) else None
+def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]:
+    instance = make_inspection_instance(node) if isinstance(node, InnerNode) else None
     for child in node.children:
-        if child.path in flow.entry:
-            yield from _unreachable(child, flow)
-        elif model and (why := _explain_unreachable(model, child)):
+        if child.path in flow.entry_states:
+            yield from _find_unreachable_below(child, flow)
+        elif instance and (explanation := _explain_unreachable(instance, child)):
             is_list = isinstance(child, InnerNode) and child.is_list and not child.label
-            called = "this list" if is_list else name_of(child)
-            yield warning(child.mark, "unreachable", f"{called} can never run: {why}")
+            name = "this list" if is_list else get_path_name(child)
+            yield make_warning(child.mark, "unreachable", f"{name} can never run: {explanation}")
             return
 
 
-def _explain_unreachable(model: ControlNode, child: Node) -> str:
-    stand_in = next(one for key in model.keys for one in model.list_children(key) if node_of(one) is child)
-    return model.explain_unreachable(stand_in)
+def _explain_unreachable(instance: ControlNode, child: Node) -> str:
+    children = (each for key in instance.keys for each in instance.list_children(key))
+    return instance.explain_unreachable(next(each for each in children if get_mission_node(each) is child))
 
 
-def check_tool_states(case: Case) -> Iterator[Finding]:
-    """Find every skill that needs an empty tool where it may hold something, or the other way round."""
-    flow = case.flow
-    for path, entry in flow.entry.items():
+def check_tool_states(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every skill that may start with the tool in another state than it declares."""
+    flow = context.flow_analysis
+    for path, entry_state in flow.entry_states.items():
         node = flow.nodes[path]
-        if not isinstance(node, SkillNode) or node.skill not in case.skills:
+        if not isinstance(node, SkillNode) or node.skill not in context.skills:
             continue
-        before, use = case.skills[node.skill].tool_state[0], case.library_uses.get(path)
+        required_state = context.skills[node.skill].tool_state[0]
+        use = context.library_uses_by_path.get(path)
         mark = use.mark if use else node.mark
-        who = f'{node.skill} in the subtree "{use.name}"' if use else node.skill
-        if before is EMPTY and (possible := entry.find_tool_state(HOLDING)):
-            message = f"{who} needs an empty tool, but something may still be held here"
-            hint = f"{_since(flow, possible, mark)} Put it down on every way from there to here."
-            yield error(mark, "tool-state", message, hint)
-        if before is HOLDING and (possible := entry.find_tool_state(EMPTY)):
-            message = f"{who} needs something in the tool, but it may be empty here"
-            yield error(mark, "tool-state", message, _since(flow, possible, mark))
+        name = f'{node.skill} in the subtree "{use.name}"' if use else node.skill
+        if required_state is EMPTY and (tool := entry_state.find_tool_state(HOLDING)):
+            message = f"{name} needs an empty tool, but the tool may hold an object here"
+            hint = (
+                f"{_explain_tool_state(flow, tool, mark)} Put it down on every path from there to this node."
+            )
+            yield make_error(mark, "tool-state", message, hint)
+        if required_state is HOLDING and (tool := entry_state.find_tool_state(EMPTY)):
+            message = f"{name} needs an object in the tool, but the tool may be empty here"
+            yield make_error(mark, "tool-state", message, _explain_tool_state(flow, tool, mark))
 
 
-def check_tool_at_end(case: Case) -> Iterator[Finding]:
-    """Find out whether the mission may succeed with something in the tool."""
-    flow = case.flow
-    if flow.result.success and (possible := flow.result.success.find_tool_state(HOLDING)):
-        message = "the mission may end well with something still in the tool"
-        yield warning(case.tree.mark, "tool-state", message, _since(flow, possible, case.tree.mark))
+def check_tool_at_end(context: CheckContext) -> Iterator[Finding]:
+    """Yield a warning if the mission may succeed with an object in the tool."""
+    flow, mark = context.flow_analysis, context.tree.mark
+    if flow.result.success and (tool := flow.result.success.find_tool_state(HOLDING)):
+        message = "the mission may succeed with an object in the tool"
+        yield make_warning(mark, "tool-state", message, _explain_tool_state(flow, tool, mark))
 
 
-def _since(flow: Analysis, possible: PossibleToolState, mark: Mark) -> str:
-    """Return since when the tool may be so, and which failure led on from there."""
-    node = flow.nodes.get(possible.cause)
-    after = f", when {possible.handled_failure} is handled" if possible.handled_failure else ""
-    if node is None:
-        return f"Nothing has been grasped before{after}."
-    name = node.skill if isinstance(node, SkillNode) else "the node"
-    verb = "may hold something" if possible.tool is HOLDING else "may be empty"
-    return f"It {verb} since {name} in {node.mark.place(mark.source)}{after}."
+def _explain_tool_state(flow: FlowAnalysis, tool: PossibleToolState, mark: Mark) -> str:
+    """Return a sentence with the node that may have caused the state of the tool, for a message at `mark`."""
+    cause = flow.nodes.get(tool.cause)
+    after = f", when {tool.handled_failure} is handled" if tool.handled_failure else ""
+    if cause is None:
+        return f"No object has been grasped before{after}."
+    name = cause.skill if isinstance(cause, SkillNode) else "the node"
+    state = "may hold an object" if tool.tool is HOLDING else "may be empty"
+    return f"The tool {state} since {name} in {cause.mark.describe_place(mark.source)}{after}."

@@ -1,141 +1,145 @@
-"""Checks of single skills, their settings, and the names that a mission takes from its cell."""
+"""Checks of skills and their settings, of routes, and of names that must exist in the cell."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from executive.mission.check.case import Case
-from executive.mission.findings import Finding, alternatives, error, suggest
+from executive.mission.check.context import CheckContext
+from executive.mission.descriptions import describe_value
+from executive.mission.findings import Finding, find_similar_word, list_choices, make_error
+from executive.mission.model.conversion import WrongType, convert_value, find_input_problem
 from executive.mission.model.nodes import SkillNode
-from executive.mission.model.typed import WrongType, convert, find_input_problem
 from executive.mission.model.values import Literal
 from executive.mission.model.wiring import find_literals
 from executive.mission.source import Mark
-from executive.mission.words import describe
 from executive.skill import Direction, Param, Port
 
 
-def find_unknown_skills(case: Case) -> Iterator[Finding]:
-    """Find every skill that is not installed."""
-    for node in case.nodes():
-        if isinstance(node, SkillNode) and node.skill not in case.skills:
-            hint = alternatives(node.skill, case.skills, "Installed skills")
-            yield error(node.mark, "unknown-skill", f'there is no skill "{node.skill}"', hint)
+def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every skill that is not installed."""
+    for node in context.iterate_nodes():
+        if isinstance(node, SkillNode) and node.skill not in context.skills:
+            hint = list_choices(node.skill, context.skills, "Installed skills")
+            yield make_error(node.mark, "unknown-skill", f'there is no skill "{node.skill}"', hint)
 
 
-def check_settings(case: Case) -> Iterator[Finding]:
-    """Find every setting of a skill that is unknown, missing, or has a value that does not fit."""
-    for node, skill in case.known_skills():
-        known: dict[str, Param | Port] = {**skill.params, **skill.ports}
+def check_settings(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every setting of a skill that is unknown, missing, or has an invalid value."""
+    for node, skill in context.iterate_installed_skills():
+        declarations: dict[str, Param | Port] = {**skill.params, **skill.ports}
         for name, setting in node.settings.items():
-            if name not in known:
-                hint = alternatives(name, known, f"{node.skill} takes")
-                yield error(setting.key, "unknown-param", f'{node.skill} has no param or port "{name}"', hint)
+            if name not in declarations:
+                hint = list_choices(name, declarations, f"Params and ports of {node.skill}")
+                message = f'{node.skill} has no param or port "{name}"'
+                yield make_error(setting.name_mark, "unknown-param", message, hint)
             elif isinstance(setting.value, Literal):
-                yield from _check_value(case, node, known[name], setting.value)
-                yield from _find_unknown_names(case, node, known[name], setting.value)
+                yield from _check_value(context, node, declarations[name], setting.value)
+                yield from _find_unknown_names(context, node, declarations[name], setting.value)
             elif name in skill.params:
-                variable = f"${setting.value.name}"
-                message = (
-                    f"{node.skill}.{name} is a constant, and {variable} is neither param nor argument here"
-                )
-                hint = case.constant_hint(setting.value)
-                yield error(setting.value.mark, "unknown-param", message, hint)
+                rule, variable = f"{node.skill}.{name} must be a constant", f"${setting.value.name}"
+                message = f"{rule}, but {variable} is neither a param nor an argument"
+                hint = context.make_constant_hint(setting.value)
+                yield make_error(setting.value.mark, "unknown-param", message, hint)
         for param in skill.params.values():
             if param.is_required and param.name not in node.settings:
+                message = f'{node.skill} needs the param "{param.name}"'
                 hint = param.doc and f"{param.name}: {param.doc}."
-                yield error(node.mark, "missing-param", f'{node.skill} needs the param "{param.name}"', hint)
+                yield make_error(node.mark, "missing-param", message, hint)
 
 
-def _check_value(case: Case, node: SkillNode, declared: Param | Port, value: Literal) -> Iterator[Finding]:
-    """Yield a finding if a value does not fit the param or port that it is given to."""
-    name, code, hint, sentence = f"{node.skill}.{declared.name}", "wrong-type", "", ""
+def _check_value(
+    context: CheckContext, node: SkillNode, declared: Param | Port, value: Literal
+) -> Iterator[Finding]:
+    """Yield an error if a constant does not fit the param or port to which the mission assigns it."""
+    name, code, hint, problem = f"{node.skill}.{declared.name}", "wrong-type", "", ""
     if isinstance(declared, Param):
-        code, sentence = find_param_problem(declared, value.value)
+        code, problem = find_param_problem(declared, value.value)
     elif declared.direction is Direction.IN:
-        sentence, hint = find_input_problem(value.value, declared), case.variable_hint(value.value)
+        problem, hint = find_input_problem(value.value, declared), context.make_variable_hint(value.value)
     else:
-        sentence = f"{name} is an output: it takes the variable to write, as ${declared.name}"
+        message = f"{name} is an output: give it a variable, for example ${declared.name}"
         if value.origin:
-            sentence = f"{name} is an output and cannot write the constant {value.origin.split()[0]}"
-        yield error(value.reference_mark or value.mark, code, sentence)
+            message = f"{name} is an output and cannot write to the constant {value.origin.split()[0]}"
+        yield make_error(value.reference_mark or value.mark, code, message)
         return
-    if sentence:
-        yield error(value.mark, code, f"{name} {sentence}{value.origin_note}", hint)
+    if problem:
+        yield make_error(value.mark, code, f"{name} {problem}{value.origin_note}", hint)
 
 
 def _find_unknown_names(
-    case: Case, node: SkillNode, declared: Param | Port, value: Literal
+    context: CheckContext, node: SkillNode, declared: Param | Port, value: Literal
 ) -> Iterator[Finding]:
-    """Find every name of something that the cell does not have."""
-    if declared.refers not in case.names or value.value == declared.default:
+    """Yield an error for every name of a bin, class, pose or detector in a constant that the cell lacks."""
+    if declared.refers not in context.cell_names_by_kind or value.value == declared.default:
         return
     choices = declared.choices if isinstance(declared, Param) else None
-    words = [*case.names[declared.refers], *(choices or ())]
-    name, listed = f"{node.skill}.{declared.name}", isinstance(value.value, list)
-    for index, word in enumerate(value.value if isinstance(value.value, list) else [value.value]):
-        if isinstance(word, str) and word not in words:
-            message = f'the cell has no {declared.refers} "{word}" for {name}'
-            hint = case.variable_hint(word) or alternatives(word, words, f"{name} takes")
-            mark = value.element_mark(index) if listed else value.mark
-            yield error(mark, f"unknown-{declared.refers}", message, hint)
+    allowed_names = [*context.cell_names_by_kind[declared.refers], *(choices or ())]
+    is_list = isinstance(value.value, list)
+    for index, name in enumerate(value.value if isinstance(value.value, list) else [value.value]):
+        if isinstance(name, str) and name not in allowed_names:
+            message = f'the cell has no {declared.refers} "{name}" for {node.skill}.{declared.name}'
+            choices_hint = list_choices(name, allowed_names, "Allowed names")
+            hint = context.make_variable_hint(name) or choices_hint
+            mark = value.get_element_mark(index) if is_list else value.mark
+            yield make_error(mark, f"unknown-{declared.refers}", message, hint)
 
 
 def find_param_problem(param: Param, value: object) -> tuple[str, str]:
-    """Return code and sentence of a value that does not fit a param; the sentence is "" if it does."""
+    """Return the code of the error and its message after the name of the param; two texts "" if valid."""
     try:
-        converted = convert(value, param.type)
+        converted = convert_value(value, param.type)
     except WrongType as problem:
         return "wrong-type", str(problem)
     unit = f" {param.unit}" if param.unit else ""
     number = converted if isinstance(converted, int | float) else None
     if number is not None and param.ge is not None and number < param.ge:
-        return "out-of-range", f"must be at least {param.ge:g}{unit}, not {describe(value)}"
+        return "out-of-range", f"must be at least {param.ge:g}{unit}, not {describe_value(value)}"
     if number is not None and param.le is not None and number > param.le:
-        return "out-of-range", f"must be at most {param.le:g}{unit}, not {describe(value)}"
-    # Where a param names something of the cell, its choices are further words, checked with the cell.
+        return "out-of-range", f"must be at most {param.le:g}{unit}, not {describe_value(value)}"
+    # The choices of a param for names in the cell are additional values, which _find_unknown_names checks.
     if param.choices is not None and not param.refers and converted not in param.choices:
         allowed = " or ".join(
             f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in param.choices
         )
-        meant = suggest(value, map(str, param.choices)) if isinstance(value, str) else None
-        question = f' (did you mean "{meant}"?)' if meant else ""
-        return "wrong-value", f"must be {allowed}, not {describe(value)}{question}"
+        similar = find_similar_word(value, map(str, param.choices)) if isinstance(value, str) else None
+        question = f' (did you mean "{similar}"?)' if similar else ""
+        return "wrong-value", f"must be {allowed}, not {describe_value(value)}{question}"
     return "", ""
 
 
-def check_routes(case: Case) -> Iterator[Finding]:
-    """Find every route of an unknown class or to an unknown bin."""
-    if case.cell is None:
+def check_routes(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every route with an unknown class or bin."""
+    if context.cell is None:
         return
-    for route in case.mission.routes:
-        if route.label not in case.cell.objects:
-            hint = alternatives(route.label, case.cell.objects, "Its classes")
-            yield error(route.key, "unknown-class", f'the cell knows no class "{route.label}"', hint)
+    for route in context.mission.routes:
+        if route.label not in context.cell.objects:
+            hint = list_choices(route.label, context.cell.objects, "Classes of the cell")
+            message = f'the cell has no class "{route.label}"'
+            yield make_error(route.label_mark, "unknown-class", message, hint)
         for bin in route.bins:
-            if bin.name not in case.cell.bins:
-                hint = alternatives(bin.name, case.cell.bins, "Its bins")
-                yield error(bin.mark, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
+            if bin.name not in context.cell.bins:
+                hint = list_choices(bin.name, context.cell.bins, "Bins of the cell")
+                yield make_error(bin.mark, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
 
 
-def find_unseen_classes(case: Case) -> Iterator[Finding]:
-    """Find every class that the mission names and no detector's model knows."""
-    models = {name: labels for name, labels in case.labels.items() if labels is not None}
-    if len(models) < len(case.labels) or not models or case.cell is None:
-        # A detector whose classes are not known may know any.
+def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every class in the mission that no detector of the cell can detect."""
+    known = {name: classes for name, classes in context.classes_by_detector.items() if classes is not None}
+    if len(known) < len(context.classes_by_detector) or not known or context.cell is None:
+        # A detector with unknown classes may detect every class.
         return
-    for label, mark in _named_classes(case):
-        if label in case.cell.objects and not any(label in labels for labels in models.values()):
-            said = "; ".join(f"{name}: {', '.join(labels)}" for name, labels in models.items())
-            message = f'no detector of the cell can see the class "{label}"'
-            hint = f"Their models know {said}. `executive dataset` and `executive train` make another model."
-            yield error(mark, "unseen-class", message, hint)
+    for label, mark in _find_named_classes(context):
+        if label in context.cell.objects and not any(label in classes for classes in known.values()):
+            listed = "; ".join(f"{name}: {', '.join(classes)}" for name, classes in known.items())
+            message = f'no detector of the cell can detect the class "{label}"'
+            hint = f"Classes by detector: {listed}. Train another detector with `executive train`."
+            yield make_error(mark, "unseen-class", message, hint)
 
 
-def _named_classes(case: Case) -> Iterator[tuple[str, Mark]]:
-    """Yield every class in the routes and in the settings of skills, with its place."""
-    yield from ((route.label, route.key) for route in case.mission.routes)
-    for node, skill in case.known_skills():
+def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Mark]]:
+    """Yield every class in the routes and in the settings of skills, with its position."""
+    yield from ((route.label, route.label_mark) for route in context.mission.routes)
+    for node, skill in context.iterate_installed_skills():
         for name, value in find_literals(node):
             declared = skill.params.get(name) or skill.ports.get(name)
             if declared is not None and declared.refers == "class" and isinstance(value.value, str):

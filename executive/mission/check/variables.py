@@ -4,166 +4,176 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from executive.mission.check.case import Case
-from executive.mission.findings import Finding, alternatives, error, suggest, warning
+from executive.mission.check.context import CheckContext
+from executive.mission.findings import Finding, find_similar_word, list_choices, make_error, make_warning
 from executive.mission.model.nodes import Node, UseNode
-from executive.mission.model.paths import word_of
-from executive.mission.model.values import Named, Reference
+from executive.mission.model.paths import get_type_name
+from executive.mission.model.values import LocatedName, Reference
 from executive.mission.model.wiring import (
-    find_all_written_variables,
-    find_read_variables,
+    find_control_node_inputs,
+    find_control_node_outputs,
     find_wires,
     find_written_variables,
 )
 from executive.mission.source import Mark
 from executive.skill import Direction, Skill
 
-Read = tuple[Node, str, str, Mark]
-"""Node that reads, its input (`Approach.target`), the variable, and the position in the mission file."""
+Input = tuple[Node, str, str, Mark]
+"""Node that reads, name of the input (`Approach.target`), name of the variable, and its position."""
 
 
-def find_unwritten_inputs(case: Case) -> Iterator[Finding]:
-    """Find the inputs in the mission's own file whose variable is not written on every path to them."""
-    for _, what, variable, mark in _unwritten(case, libraries=False):
-        # In the file, a variable of a subtree has no prefix.
-        bare = variable.rpartition(".")[2]
-        if variable in case.written:
-            message = f"{what} reads ${bare}, which is not written on every path to this node"
-            yield error(mark, "unwritten", message, f"It is written by {_writers(case, variable, mark)}.")
+def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every input in the mission file that may read an unwritten variable."""
+    for _, input_name, variable, mark in _find_unwritten(context, in_libraries=False):
+        # In the expanded tree, a local variable of a subtree has the prefix `subtree.`.
+        name_in_file = variable.rpartition(".")[2]
+        message = f"{input_name} reads ${name_in_file}, which"
+        if variable in context.written_variables:
+            hint = f"It is written by {_describe_writers(context, variable, mark)}."
+            yield make_error(mark, "unwritten", f"{message} is not written on every path to this node", hint)
         else:
-            message = f"{what} reads ${bare}, which nothing writes"
-            yield error(mark, "unwritten", message, _who_could(case, variable))
+            hint = _make_unwritten_hint(context, variable)
+            yield make_error(mark, "unwritten", f"{message} no node writes", hint)
 
 
-def find_unwritten_library_inputs(case: Case) -> Iterator[Finding]:
-    """Find each use of a library's subtree that reads unwritten variables: one finding for all of them."""
-    lacking: dict[str, dict[str, str]] = {}
-    for node, what, variable, _ in _unwritten(case, libraries=True):
-        lacking.setdefault(case.library_uses[node.path].path, {}).setdefault(variable, what)
-    uses = {use.path: use for use in case.library_uses.values()}
-    for path, missing in lacking.items():
+def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every use of a library in which inputs may read unwritten variables."""
+    inputs_by_use: dict[str, dict[str, str]] = {}
+    for node, input_name, variable, _ in _find_unwritten(context, in_libraries=True):
+        path = context.library_uses_by_path[node.path].path
+        inputs_by_use.setdefault(path, {}).setdefault(variable, input_name)
+    uses = {use.path: use for use in context.library_uses_by_path.values()}
+    for path, inputs in inputs_by_use.items():
         use = uses[path]
-        names = " and ".join(f"${name} (for {what})" for name, what in sorted(missing.items()))
-        are = "is" if len(missing) == 1 else "are"
-        message = f'the subtree "{use.name}" needs {names}, which {are} not written on every way to here'
-        hints = [f"${name} is written by {_who(case, name, use.mark)}." for name in sorted(missing)]
-        yield error(use.mark, "unwritten", message, " ".join(hints))
+        names = " and ".join(f"${name} (for {reader})" for name, reader in sorted(inputs.items()))
+        message = f'the subtree "{use.name}" needs variables that may be unwritten at this node: {names}'
+        hints = [
+            f"${name} is written by {_suggest_writers(context, name, use.mark)}." for name in sorted(inputs)
+        ]
+        yield make_error(use.mark, "unwritten", message, " ".join(hints))
 
 
-def _unwritten(case: Case, libraries: bool) -> Iterator[Read]:
-    """Yield what reads an unwritten variable: where a library says so, or where the mission does."""
-    for node, what, variable, mark in _reads(case, case.tree):
-        entry = case.flow.entry.get(node.path)
-        if entry is None or entry.written is None or variable in entry.written:
+def _find_unwritten(context: CheckContext, in_libraries: bool) -> Iterator[Input]:
+    """Yield the inputs that may read an unwritten variable, either in libraries or in the mission file."""
+    mission_source = context.tree.mark.source
+    for node, input_name, variable, mark in _iterate_inputs(context, context.tree):
+        state = context.flow_analysis.entry_states.get(node.path)
+        if state is None or state.written is None or variable in state.written:
             continue
-        in_library = node.path in case.library_uses and mark.source is not case.tree.mark.source
-        if in_library is libraries:
-            yield node, what, variable, mark
+        is_in_library = node.path in context.library_uses_by_path and mark.source is not mission_source
+        if is_in_library is in_libraries:
+            yield node, input_name, variable, mark
 
 
-def find_unread_variables(case: Case) -> Iterator[Finding]:
-    """Find every variable that the mission names for an output and that nothing reads."""
-    read = {variable for _, _, variable, _ in _reads(case, case.tree, all_inputs=True)}
-    for node in case.tree.walk():
-        for _, variable in find_written_variables(node):
-            if variable.name not in read | set(case.mission.params):
-                message = f"nothing in this {word_of(node)} reads ${variable.name}"
-                yield warning(variable.mark, "unread", message, f"Write ${variable.name} where it is meant.")
-        for wire in case.find_wires(node, Direction.OUT):
-            if wire.explicit and wire.variable not in read:
-                message = f"{wire} writes ${wire.variable}, which nothing reads"
-                yield warning(wire.mark, "unread", message)
+def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
+    """Yield a warning for every variable that the mission names for an output and no node reads."""
+    read = {variable for _, _, variable, _ in _iterate_inputs(context, context.tree, with_optional=True)}
+    for node in context.tree.walk():
+        for _, variable in find_control_node_outputs(node):
+            if variable.name not in read | set(context.mission.params):
+                message = f"no node in this {get_type_name(node)} reads ${variable.name}"
+                hint = f"Write ${variable.name} where a node needs the value."
+                yield make_warning(variable.mark, "unread", message, hint)
+        for wire in context.find_wires(node, Direction.OUT):
+            if wire.is_explicit and wire.variable not in read:
+                message = f"{wire} writes ${wire.variable}, which no node reads"
+                yield make_warning(wire.mark, "unread", message)
         if not isinstance(node, UseNode):
             continue
         for setting in node.returns.values():
             name = setting.value.name if isinstance(setting.value, Reference) else ""
-            if name in node.returned and name not in read:
-                message = f"nothing reads ${name}, which the subtree returns here"
-                yield warning(setting.value.mark, "unread", message)
+            if name in node.returned_variables and name not in read:
+                message = f"the subtree returns ${name}, which no node reads"
+                yield make_warning(setting.value.mark, "unread", message)
 
 
-def find_overwritten_loop_variables(case: Case) -> Iterator[Finding]:
-    """Find every loop whose variable something else writes too: it is gone when the loop ends."""
-    writers = {
-        wire.variable: wire for node in case.tree.walk() for wire in case.find_wires(node, Direction.OUT)
-    }
+def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every loop variable that another node writes; the loop deletes it at its end."""
+    wires = [wire for node in context.tree.walk() for wire in context.find_wires(node, Direction.OUT)]
+    writers = {wire.variable: wire for wire in wires}
 
-    def walk(node: Node, around: Mapping[str, Named]) -> Iterator[Finding]:
-        for _, each in find_written_variables(node):
-            other = writers.get(each.name)
-            place = other.mark if other else around[each.name].mark if each.name in around else None
-            if place is not None:
-                word = word_of(node)
-                who = other or f"another {word}"
-                message = f"{word} writes ${each.name}, and so does {who} in {place.place(each.mark.source)}"
-                yield error(each.mark, "shadowed-variable", message, "Call the loop's variable otherwise.")
-            around = {**around, each.name: each}
+    def walk(node: Node, outer_variables: Mapping[str, LocatedName]) -> Iterator[Finding]:
+        for _, loop_variable in find_control_node_outputs(node):
+            name = loop_variable.name
+            skill_writer, outer = writers.get(name), outer_variables.get(name)
+            other_mark = skill_writer.mark if skill_writer else outer.mark if outer else None
+            if other_mark is not None:
+                keyword = get_type_name(node)
+                place = other_mark.describe_place(loop_variable.mark.source)
+                other = f"{skill_writer or f'another {keyword}'} in {place}"
+                message, hint = f"{keyword} writes ${name}, and so does {other}", "Rename the loop variable."
+                yield make_error(loop_variable.mark, "shadowed-variable", message, hint)
+            outer_variables = {**outer_variables, name: loop_variable}
         for child in node.children:
-            yield from walk(child, around)
+            yield from walk(child, outer_variables)
 
-    yield from walk(case.tree, {})
+    yield from walk(context.tree, {})
 
 
-def find_unwritten_returns(case: Case) -> Iterator[Finding]:
-    """Find every variable that a subtree says it `returns` and that it does not write before it succeeds."""
-    for use in case.tree.walk():
+def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
+    """Yield an error for every variable below `returns` that the subtree may not write before it succeeds."""
+    for use in context.tree.walk():
         if not isinstance(use, UseNode) or use.body is None:
             continue
-        subtree = case.mission.trees[use.name]
-        after = case.flow.bodies.get(use.path)
-        if after is None or after.written is None:
+        subtree = context.mission.trees[use.name]
+        end_state = context.flow_analysis.body_end_states.get(use.path)
+        if end_state is None or end_state.written is None:
             continue
-        written = find_all_written_variables(use.body, case.skills)
-        for (name, mark), variable in zip((subtree.returns or {}).items(), use.returned, strict=True):
+        written = find_written_variables(use.body, context.skills)
+        returns = (subtree.returns or {}).items()
+        for (name, mark), variable in zip(returns, use.returned_variables, strict=True):
+            message = f'the subtree "{use.name}" returns ${name}, which'
             if variable not in written:
-                message = f'the subtree "{use.name}" returns ${name}, which nothing in it writes'
-                shown = sorted(word.rpartition(".")[2] for word in written)
-                yield error(mark, "unwritten", message, alternatives(name, shown, "It writes"))
-            elif variable not in after.written:
-                message = f'the subtree "{use.name}" returns ${name}, which it does not write on every way'
-                hint = f"It is written by {_writers(case, variable, mark)}."
-                yield error(mark, "unwritten", message, hint)
+                names = sorted(each.rpartition(".")[2] for each in written)
+                hint = list_choices(name, names, "Variables that it writes")
+                yield make_error(mark, "unwritten", f"{message} no node in it writes", hint)
+            elif variable not in end_state.written:
+                hint = f"It is written by {_describe_writers(context, variable, mark)}."
+                yield make_error(mark, "unwritten", f"{message} it does not write on every path", hint)
 
 
-def _reads(case: Case, tree: Node, all_inputs: bool = False) -> Iterator[Read]:
-    """Yield everything that needs a variable; with `all_inputs` also what can do without it."""
+def _iterate_inputs(context: CheckContext, tree: Node, with_optional: bool = False) -> Iterator[Input]:
+    """Yield every input that is required or names its variable; `with_optional`: also the other inputs."""
     for node in tree.walk():
-        for reference in find_read_variables(node):
-            yield node, word_of(node), reference.name, reference.mark
-        for wire in case.find_wires(node, Direction.IN):
-            if all_inputs or wire.port.is_required or wire.explicit:
+        for reference in find_control_node_inputs(node):
+            yield node, get_type_name(node), reference.name, reference.mark
+        for wire in context.find_wires(node, Direction.IN):
+            if with_optional or wire.port.is_required or wire.is_explicit:
                 yield node, str(wire), wire.variable, wire.mark
 
 
-def _writers(case: Case, variable: str, mark: Mark) -> str:
-    """Return who writes a variable and where, the first in the file first, or ""."""
-    found: dict[str, None] = {}
-    for node, skill in sorted(case.known_skills(), key=lambda pair: pair[0].mark.line):
+def _describe_writers(context: CheckContext, variable: str, mark: Mark) -> str:
+    """Return the skills that write a variable, with positions: `Grasp in line 3 and Grasp in line 9`."""
+    writers: dict[str, None] = {}
+    for node, skill in sorted(context.iterate_installed_skills(), key=lambda pair: pair[0].mark.line):
         if any(wire.variable == variable for wire in find_wires(node, skill, Direction.OUT)):
-            found[f"{node.skill} in {node.mark.place(mark.source)}"] = None
-    return " and ".join(found) or "the loop around its body alone"
+            writers[f"{node.skill} in {node.mark.describe_place(mark.source)}"] = None
+    return " and ".join(writers) or "a loop, for the nodes in its body only"
 
 
-def _who(case: Case, variable: str, mark: Mark) -> str:
-    """Return who writes a variable: in this file, or which skills could."""
-    own = [part for part in _writers(case, variable, mark).split(" and ") if " in line " in part]
-    could = [name for name, skill in case.skills.items() if _writes(skill, variable)]
-    return " and ".join(own) or ", ".join(could) or "nothing"
+def _suggest_writers(context: CheckContext, variable: str, mark: Mark) -> str:
+    """Return the skills in the file of `mark` that write a variable; without any, the installed ones."""
+    all_writers = _describe_writers(context, variable, mark).split(" and ")
+    writers_in_file = [writer for writer in all_writers if " in line " in writer]
+    skills = [name for name, skill in context.skills.items() if _has_output(skill, variable)]
+    return " and ".join(writers_in_file) or ", ".join(skills) or "no skill"
 
 
-def _who_could(case: Case, variable: str) -> str:
-    keepers = sorted({name.rpartition(".")[0] for name in case.written if name.endswith(f".{variable}")})
-    if keepers:
-        return f'The subtree "{keepers[0]}" writes one of its own: add {variable} to what it returns.'
-    writers = [name for name, skill in case.skills.items() if _writes(skill, variable)]
-    if writers:
-        return f"It is written by: {', '.join(writers)}."
-    # What a subtree keeps to itself has a dot in its name.
-    known = sorted(name for name in case.written if "." not in name)
-    meant = suggest(variable, known)
-    listed = ", ".join(f"${name}" for name in known) or "none"
-    return (f'Did you mean "${meant}"? ' if meant else "") + f"Variables that are written: {listed}."
+def _make_unwritten_hint(context: CheckContext, variable: str) -> str:
+    """Return a hint for a variable that no node of the tree writes."""
+    local_names = [name for name in context.written_variables if name.endswith(f".{variable}")]
+    if local_names:
+        subtree = min(name.rpartition(".")[0] for name in local_names)
+        return f'The subtree "{subtree}" writes a local variable {variable}: add {variable} to its returns.'
+    skills = [name for name, skill in context.skills.items() if _has_output(skill, variable)]
+    if skills:
+        return f"It is written by: {', '.join(skills)}."
+    # Local variables of subtrees contain a dot.
+    global_names = sorted(name for name in context.written_variables if "." not in name)
+    similar = find_similar_word(variable, global_names)
+    listed = ", ".join(f"${name}" for name in global_names) or "none"
+    return (f'Did you mean "${similar}"? ' if similar else "") + f"Variables that are written: {listed}."
 
 
-def _writes(skill: type[Skill], name: str) -> bool:
+def _has_output(skill: type[Skill], name: str) -> bool:
     return name in skill.ports and skill.ports[name].direction is Direction.OUT

@@ -1,1 +1,1 @@
-"""An abstract run of the tree over every way it can go."""
+"""Abstract execution of the tree, and the failures that no node handles."""

@@ -1,6 +1,7 @@
-"""Abstract execution of the tree over every way it can go, for the checks to ask about.
+"""Abstract execution of the tree over all possible execution paths.
 
-Every node is entered with the facts that hold on all ways to it (`FlowState`) and returns its ends (`Flow`).
+Each node is entered with the facts that hold on all paths to it (`FlowState`) and returns its possible ends,
+with the facts after each of them (`Flow`).
 """
 
 from __future__ import annotations
@@ -8,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from executive.mission.findings import suggest
-from executive.mission.model.instance import inspection_instance, node_of
+from executive.mission.findings import find_similar_word
+from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.wiring import find_wires
 from executive.skill import Direction, Skill
@@ -28,68 +29,69 @@ from executive.tree.flow import (
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
 
-HALT = "halt"
-"""The key of `Skill.tool_left` for the state of the tool after a halt."""
+HALT_KEY = "halt"
+"""Key of `Skill.tool_left` for the state of the tool after a halt."""
 
 
-class Analysis:
-    """What can happen in a tree.
+class FlowAnalysis:
+    """Possible states and ends of every node of a tree.
 
     Args:
-        tree: The tree that runs, with paths.
+        tree: Expanded tree with paths.
         skills: Installed skills by name.
 
     Attributes:
         nodes: Every node by its path.
-        entry: Facts that hold where a node begins, by its path; a node that cannot be reached is not there.
-        flows: How a node may end, by its path; the failures are those of every entry.
-        bodies: Facts that hold after the body of a `use` succeeded, by the path of the use.
-        result: How the whole tree may end.
+        entry_states: Facts that hold at every start of a node, by its path; unreachable nodes are missing.
+        flows: Possible ends of a node after the last analysed entry, by its path.
+        body_end_states: Facts after each success of the body of a `use`, by the path of the use.
+        result: Possible ends of the whole tree.
     """
 
     def __init__(self, tree: Node, skills: Mapping[str, type[Skill]]) -> None:
         self.nodes = {node.path: node for node in tree.walk()}
-        self.entry: dict[str, FlowState] = {}
+        self.entry_states: dict[str, FlowState] = {}
         self.flows: dict[str, Flow] = {}
-        self.bodies: dict[str, FlowState | None] = {}
+        self.body_end_states: dict[str, FlowState | None] = {}
         self._skills = skills
-        self._known: dict[tuple[str, FlowState], Flow] = {}
-        self._models: dict[str, ControlNode] = {}
-        self.result = self._run(tree, INITIAL_STATE)
+        self._flows_by_entry: dict[tuple[str, FlowState], Flow] = {}
+        self._instances: dict[str, ControlNode] = {}
+        self.result = self._analyse(tree, INITIAL_STATE)
 
-    def skill(self, name: str) -> type[Skill] | None:
-        """Return the skill of this name, or the one that was probably meant."""
-        meant = name if name in self._skills else suggest(name, self._skills)
-        return self._skills[meant] if meant else None
+    def find_skill(self, name: str) -> type[Skill] | None:
+        """Return the skill with a name, otherwise the skill with the most similar name, or None."""
+        known = name if name in self._skills else find_similar_word(name, self._skills)
+        return self._skills[known] if known else None
 
-    def _run(self, node: Node, state: FlowState) -> Flow:
-        self.entry[node.path] = state.join(self.entry.get(node.path, state))
-        key = node.path, state
-        if key not in self._known:
-            flow = self._flow(node, state).with_label(node.label)
-            self._known[key] = self.flows[node.path] = flow
-        return self._known[key]
+    def _analyse(self, node: Node, state: FlowState) -> Flow:
+        """Return the possible ends of a node that is entered in a state; each such pair is computed once."""
+        self.entry_states[node.path] = state.join(self.entry_states.get(node.path, state))
+        entry = node.path, state
+        if entry not in self._flows_by_entry:
+            flow = self._compute_flow(node, state).with_label(node.label)
+            self._flows_by_entry[entry] = self.flows[node.path] = flow
+        return self._flows_by_entry[entry]
 
-    def _flow(self, node: Node, state: FlowState) -> Flow:
+    def _compute_flow(self, node: Node, state: FlowState) -> Flow:
         match node:
             case InnerNode():
-                if node.path not in self._models:
-                    self._models[node.path] = inspection_instance(node)
-                return self._models[node.path].compute_flow(self._enter, state)
+                if node.path not in self._instances:
+                    self._instances[node.path] = make_inspection_instance(node)
+                return self._instances[node.path].compute_flow(self._analyse_child, state)
             case SkillNode():
-                return self._skill(node, state)
+                return self._compute_skill_flow(node, state)
             case UseNode(body=Node() as body):
-                return self._use(node, body, state)
+                return self._compute_use_flow(node, body, state)
         for part in node.children:
-            # The states around the parts of an unknown node are not those that the author meant.
-            self._run(part, UNKNOWN)
+            # The states in which the mission would enter the parts of an unknown node are unknown, too.
+            self._analyse(part, UNKNOWN)
         return Flow(UNKNOWN, {PossibleFailure(UNKNOWN_NAME, UNKNOWN_NAME, node.path): UNKNOWN}, UNKNOWN)
 
-    def _enter(self, child: Child, state: FlowState) -> Flow:
-        return self._run(node_of(child), state)
+    def _analyse_child(self, child: Child, state: FlowState) -> Flow:
+        return self._analyse(get_mission_node(child), state)
 
-    def _skill(self, node: SkillNode, state: FlowState) -> Flow:
-        skill = self.skill(node.skill)
+    def _compute_skill_flow(self, node: SkillNode, state: FlowState) -> Flow:
+        skill = self.find_skill(node.skill)
         if skill is None:
             return Flow(UNKNOWN, {PossibleFailure(node.skill, UNKNOWN_NAME, node.path): UNKNOWN}, UNKNOWN)
         before, after = skill.tool_state
@@ -98,18 +100,20 @@ class Analysis:
         end = state.after_motion() if skill.moves else state
         success = end.with_variables(outputs).with_tools(get_tools_after_success(end.tools, after, node.path))
 
-        def end_after(reason: str) -> FlowState:
+        def compute_end_state(reason: str) -> FlowState:
             return end.with_tools(get_tools_after_failure(end.tools, skill.tool_left.get(reason), node.path))
 
         failures = {
-            PossibleFailure(node.skill, reason, node.path): end_after(reason) for reason in skill.reasons
+            PossibleFailure(node.skill, reason, node.path): compute_end_state(reason)
+            for reason in skill.reasons
         }
-        return Flow(success, failures, end_after(HALT))
+        return Flow(success, failures, compute_end_state(HALT_KEY))
 
-    def _use(self, node: UseNode, body: Node, state: FlowState) -> Flow:
-        flow = self._run(body, state)
-        # One use may be entered in several states: in a finally, in a loop.
-        self.bodies[node.path] = join_states((self.bodies.get(node.path), flow.success))
-        # A broken promise is one finding there, not one at every reader.
-        returned = flow.success and flow.success.with_variables(node.returned)
-        return replace(flow, success=returned)
+    def _compute_use_flow(self, node: UseNode, body: Node, state: FlowState) -> Flow:
+        flow = self._analyse(body, state)
+        # One use may be entered in several states, for example in a loop.
+        end_states = (self.body_end_states.get(node.path), flow.success)
+        self.body_end_states[node.path] = join_states(end_states)
+        # Returned variables count as written: if they are not, the error is reported at the subtree only.
+        success = flow.success and flow.success.with_variables(node.returned_variables)
+        return replace(flow, success=success)

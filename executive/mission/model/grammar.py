@@ -18,25 +18,25 @@ class GrammarKey:
             (any plain value), or a list or mapping of them: `words`, `values`, `variables`, `paths`,
             `params`, `routes`, `trees`, `args`.
         doc: Meaning of the key, one sentence.
-        required: True if the key is mandatory.
+        is_required: True if the key is mandatory.
     """
 
     kind: str
     doc: str
-    required: bool = False
+    is_required: bool = False
 
 
 LABEL_PATTERN = "[a-z_][a-z0-9_]*"
 """Regular expression that every label matches."""
 
-AS = GrammarKey("label", "Label of the node, for references in `on`, `until` and `catch`.")
+LABEL_KEY = GrammarKey("label", "Label of the node, for references in `on`, `until` and `catch`.")
 """The key `as` beside the keyword of any node."""
 
-SEQUENCE = "sequence"
+SEQUENCE_KEYWORD = "sequence"
 """Keyword of the control node that a bare list stands for."""
 
-USE = "use"
-"""Word before the name of a subtree."""
+USE_KEYWORD = "use"
+"""Keyword before the name of a subtree."""
 
 USE_SIBLINGS: Mapping[str, GrammarKey] = {
     "with": GrammarKey("values", "Values of the subtree's arguments."),
@@ -52,34 +52,36 @@ KEYWORD_HINTS: Mapping[str, str] = {
 }
 """Hints for words that are used as keywords by mistake; control nodes declare further ones."""
 
-MISSION: Mapping[str, GrammarKey] = {
-    "mission": GrammarKey("word", "Name of the mission.", required=True),
+MISSION_KEYS: Mapping[str, GrammarKey] = {
+    "mission": GrammarKey("word", "Name of the mission.", is_required=True),
     "description": GrammarKey("text", "Purpose of the mission, one sentence."),
-    "cell": GrammarKey("text", "The cell file, below this file's folder, or a shipped one.", required=True),
+    "cell": GrammarKey(
+        "text", "The cell file, below this file's folder, or a shipped one.", is_required=True
+    ),
     "library": GrammarKey("paths", "Files with subtrees, below this file's folder, or shipped ones."),
     "params": GrammarKey("params", "Constants, written `$name`; `--set name=value` gives another value."),
     "routes": GrammarKey("routes", "For every class the bin it goes to, or a list of bins."),
-    "tree": GrammarKey("node", "Root node of the tree.", required=True),
+    "tree": GrammarKey("node", "Root node of the tree.", is_required=True),
     "trees": GrammarKey("trees", "Subtrees by name."),
 }
 """The keys of a mission file."""
 
-LIBRARY: Mapping[str, GrammarKey] = {
-    "library": GrammarKey("word", "Name of the library.", required=True),
+LIBRARY_KEYS: Mapping[str, GrammarKey] = {
+    "library": GrammarKey("word", "Name of the library.", is_required=True),
     "description": GrammarKey("text", "Content of the library, one sentence."),
-    "trees": GrammarKey("trees", "Subtrees by name.", required=True),
+    "trees": GrammarKey("trees", "Subtrees by name.", is_required=True),
 }
 """The keys of a library file."""
 
-SUBTREE: Mapping[str, GrammarKey] = {
+SUBTREE_KEYS: Mapping[str, GrammarKey] = {
     "doc": GrammarKey("text", "Purpose of the subtree, one sentence."),
     "args": GrammarKey("args", "Arguments of the subtree: a list of names, or names with defaults."),
     "returns": GrammarKey("words", "Variables that the caller gets; all other variables are then local."),
-    "do": GrammarKey("node", "Root node of the subtree.", required=True),
+    "do": GrammarKey("node", "Root node of the subtree.", is_required=True),
 }
 """The keys of a subtree."""
 
-PARAM: Mapping[str, GrammarKey] = {
+PARAM_KEYS: Mapping[str, GrammarKey] = {
     "default": GrammarKey("value", "Default value; a param without a default must be set with `--set`."),
     "type": GrammarKey(
         "word", "text, integer, number, boolean or list; by default the type of the default value."

@@ -1,4 +1,4 @@
-"""Instances of control nodes, made from the nodes of a mission."""
+"""Construction of control nodes from the nodes of a mission, for the built tree and for inspection."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.cell.protocols import Clock
-from executive.mission.model.nodes import InnerNode, Node, Part, SectionNode, nodes_of
-from executive.mission.model.typed import WrongType, read_constant
-from executive.mission.model.values import FailureName, Literal, Named
+from executive.mission.model.conversion import WrongType, convert_constant
+from executive.mission.model.nodes import InnerNode, KeyValue, Node, SectionNode, list_nodes
+from executive.mission.model.values import FailureName, Literal, LocatedName
 from executive.tree.blackboard import Blackboard
 from executive.tree.keys import Child, Key, Kind, VariableName
 from executive.tree.node import ControlNode, NodeContext
 
 BuildChild = Callable[[Node], Child]
-"""Function that returns a child for a node of the mission."""
+"""Function that returns the child of a control node for a node of the mission."""
 
 
 class StandIn(Behaviour):
-    """Child of an instance that never runs: it stands for a node of the mission.
+    """Child of an inspection instance: it represents a node of the mission and is never executed.
 
     Attributes:
-        node: The node.
+        node: Node of the mission.
     """
 
     def __init__(self, node: Node) -> None:
@@ -34,80 +34,84 @@ class StandIn(Behaviour):
         self.node = node
 
     def update(self) -> Status:
-        """Do nothing."""
+        """Return INVALID, because the child is never executed."""
         return Status.INVALID
 
 
-def node_of(child: Child) -> Node:
-    """Return the node for which a child of an instance stands."""
+def get_mission_node(child: Child) -> Node:
+    """Return the node of the mission that a child of an inspection instance represents."""
     assert isinstance(child, StandIn)
     return child.node
 
 
-def inspection_instance(node: InnerNode) -> ControlNode:
-    """Return an instance that never runs: it answers questions about its node. Its children are `StandIn`s.
+def make_inspection_instance(node: InnerNode) -> ControlNode:
+    """Return the control node of a node of the mission for checks and diagnosis; its children are `StandIn`s.
 
-    A wrong constant, about which another check complains, is replaced by a default or by a large number.
+    An invalid constant, which the check of constants reports, is replaced by a placeholder.
     """
     context = NodeContext(node.path, cast("Clock", None), Blackboard(), node.label)
     return make_instance(node, context, StandIn)
 
 
-def make_instance(node: InnerNode, context: NodeContext, build: BuildChild) -> ControlNode:
-    """Return the control node that a node of the mission describes; `build` makes its children."""
-    return node.kind(context, **_values(node, build))
+def make_instance(node: InnerNode, context: NodeContext, build_child: BuildChild) -> ControlNode:
+    """Return the control node of a node of the mission, with the children that `build_child` returns."""
+    return node.declaring_class(context, **_make_attributes(node, build_child))
 
 
 def has_valid_constants(node: InnerNode) -> bool:
-    """Return True if all constants of a node have values that fit."""
-    for key in node.kind.keys.values():
-        part = node.values.get(key.name)
-        value = part.value if isinstance(part, Literal) else None
-        if key.kind is Kind.CONSTANT and (part is not None or key.is_required):
+    """Return True if the values of all constants of a node are valid."""
+    for key in node.declaring_class.keys.values():
+        given = node.values.get(key.name)
+        value = given.value if isinstance(given, Literal) else None
+        if key.kind is Kind.CONSTANT and (given is not None or key.is_required):
             try:
-                read_constant(key, value, find_upper_bound(node, key))
+                convert_constant(key, value, find_upper_bound(node, key))
             except WrongType:
                 return False
     return True
 
 
 def find_upper_bound(owner: InnerNode | SectionNode, key: Key) -> int | None:
-    """Return the largest allowed number of a constant, if it counts nodes under another key."""
-    return len(nodes_of(owner.values[key.max_key])) if key.max_key in owner.values else None
+    """Return the upper bound of a constant: the number of nodes under `max_key`; None for no bound."""
+    return len(list_nodes(owner.values[key.max_key])) if key.max_key in owner.values else None
 
 
-def _values(owner: InnerNode | SectionNode, build: BuildChild) -> Mapping[str, object]:
-    keys = (key for key in owner.kind.keys.values() if key.is_required or key.name in owner.values)
-    return {key.attribute: _value(owner, key, owner.values.get(key.name), build) for key in keys}
+def _make_attributes(owner: InnerNode | SectionNode, build_child: BuildChild) -> Mapping[str, object]:
+    """Return the values of the attributes of a control node or section, by attribute."""
+    keys = (key for key in owner.declaring_class.keys.values() if key.is_required or key.name in owner.values)
+    return {
+        key.attribute: _make_attribute(owner, key, owner.values.get(key.name), build_child) for key in keys
+    }
 
 
-def _value(owner: InnerNode | SectionNode, key: Key, part: Part | None, build: BuildChild) -> object:
-    """Return the value of an attribute."""
-    if isinstance(part, Node):
-        return build(part)
-    if isinstance(part, SectionNode):
-        return part.kind(**_values(part, build))
-    if isinstance(part, tuple):
+def _make_attribute(
+    owner: InnerNode | SectionNode, key: Key, value: KeyValue | None, build_child: BuildChild
+) -> object:
+    if isinstance(value, Node):
+        return build_child(value)
+    if isinstance(value, SectionNode):
+        return value.declaring_class(**_make_attributes(value, build_child))
+    if isinstance(value, tuple):
         return tuple(
-            item if isinstance(item, FailureName) else _value(owner, key, item, build) for item in part
+            item if isinstance(item, FailureName) else _make_attribute(owner, key, item, build_child)
+            for item in value
         )
-    if isinstance(part, Named):
-        return VariableName(part.name)
+    if isinstance(value, LocatedName):
+        return VariableName(value.name)
     if key.kind is Kind.ELEMENTS:
-        elements = part.value if isinstance(part, Literal) else None
-        return tuple(elements) if isinstance(elements, list) else VariableName(getattr(part, "name", ""))
+        elements = value.value if isinstance(value, Literal) else None
+        return tuple(elements) if isinstance(elements, list) else VariableName(getattr(value, "name", ""))
     if key.kind is not Kind.CONSTANT:
         return ()
+    constant = value.value if isinstance(value, Literal) else None
     try:
-        return read_constant(
-            key, part.value if isinstance(part, Literal) else None, find_upper_bound(owner, key)
-        )
+        return convert_constant(key, constant, find_upper_bound(owner, key))
     except WrongType:
-        return _placeholder(key)
+        return _make_placeholder(key)
 
 
-def _placeholder(key: Key) -> object:
-    """Return a value instead of a wrong constant: the default, or a very large number."""
+def _make_placeholder(key: Key) -> object:
+    """Return a value for an invalid constant: a very large number, the default, or the first valid value."""
     if key.value_type in (int, float):
         return sys.maxsize if key.value_type is int else math.inf
     if not key.is_required:

@@ -1,4 +1,4 @@
-"""A mission as typed values: what its file says, before anything is looked up or checked."""
+"""Content of mission and library files as typed values, before expansion and checks."""
 
 from __future__ import annotations
 
@@ -8,13 +8,18 @@ from dataclasses import dataclass, field
 from pydantic import JsonValue
 
 from executive.mission.model.nodes import Node
-from executive.mission.model.values import Literal, Named, Value
+from executive.mission.model.values import Literal, LocatedName, Value
 from executive.mission.source import Mark
 
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of a subtree; without a default, a value or a variable, every `use` must give it."""
+    """An argument of a subtree.
+
+    Attributes:
+        mark: Position of the name.
+        default: Default value or variable; None if every `use` must give the argument.
+    """
 
     mark: Mark
     default: Value | None
@@ -25,10 +30,10 @@ class Subtree:
     """A named tree under `trees`.
 
     Attributes:
-        mark: Its name in the file.
-        returns: Variables that it writes for others, each with its place; its other variables are then
-            its own. None where it shares all variables with what is around it.
-        library: Name of the library it comes from, or "" for one of the mission's own.
+        mark: Position of the name.
+        returns: Variables that the caller gets, with their positions; all other variables are then local.
+            None if the subtree shares all variables with the caller.
+        library: Name of the library that defines the subtree; "" if the mission file defines it.
     """
 
     name: str
@@ -42,7 +47,7 @@ class Subtree:
 
 @dataclass(frozen=True)
 class Library:
-    """A file of subtrees."""
+    """Content of a library file: its subtrees by name."""
 
     name: str
     trees: Mapping[str, Subtree]
@@ -53,11 +58,11 @@ class MissionParam:
     """A constant of the mission.
 
     Attributes:
-        mark: Its name in the file.
-        value: What it is in this run: the default, or what was given beside the file.
-        type: `text`, `integer`, `number`, `boolean` or `list`; "" where the file does not say.
-        minimum, maximum: Bounds, inclusive, or None.
-        choices: Values it may have, or None for any.
+        mark: Position of the name.
+        value: Value in this run: the value of `--set`, otherwise the default.
+        type: `text`, `integer`, `number`, `boolean` or `list`; "" if unknown.
+        minimum, maximum: Inclusive bounds, or None.
+        choices: Allowed values, or None if all values are allowed.
     """
 
     mark: Mark
@@ -71,31 +76,37 @@ class MissionParam:
 
 @dataclass(frozen=True)
 class Route:
-    """Where objects of a class go: to any of the bins."""
+    """Class of objects, with its permitted bins.
+
+    Attributes:
+        label: Name of the class.
+        label_mark: Position of the class.
+        bins: Names of the bins; each may receive the objects.
+    """
 
     label: str
-    key: Mark
-    bins: tuple[Named, ...]
+    label_mark: Mark
+    bins: tuple[LocatedName, ...]
 
 
 @dataclass(frozen=True)
 class Mission:
-    """A whole mission file.
+    """Content of a mission file.
 
     Attributes:
-        name: Key `mission`.
-        cell: Path of the cell file as written, below the mission's folder.
-        libraries: Paths of library files as written.
-        params: The mission's constants, overrides applied.
-        tree: The tree as written; None where it could not be read.
-        trees: The subtrees by name, those of the libraries included once they are read.
-        is_complete: False where a library or a subtree could not be read, so that there may be more of them.
+        name: Value of the key `mission`.
+        cell: Path of the cell file, relative to the folder of the mission.
+        libraries: Paths of the library files, relative to the folder of the mission.
+        params: Constants by name, with the values of `--set`.
+        tree: Root node of the tree; None if the key is missing.
+        trees: Subtrees of the mission and of its libraries, by name.
+        is_complete: False if a library could not be read, so that `trees` may lack subtrees.
     """
 
     name: str
     description: str
-    cell: Named
-    libraries: tuple[Named, ...] = ()
+    cell: LocatedName
+    libraries: tuple[LocatedName, ...] = ()
     params: Mapping[str, MissionParam] = field(default_factory=dict)
     routes: tuple[Route, ...] = ()
     tree: Node | None = None

@@ -1,4 +1,4 @@
-"""Nodes of the tree of a mission, as the file says them."""
+"""Nodes of the tree of a mission, as read from the file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
-from executive.mission.model.values import FailureName, Named, Setting, Value
+from executive.mission.model.values import FailureName, LocatedName, Setting, Value
 from executive.mission.source import Mark
 from executive.tree.keys import Key, KeyOwner
 from executive.tree.node import ControlNode
@@ -15,12 +15,12 @@ from executive.tree.node import ControlNode
 
 @dataclass(frozen=True)
 class Node:
-    """Base of everything a tree is made of.
+    """Base class of the nodes.
 
     Attributes:
-        mark: Place of the word that names the node in the file.
+        mark: Position of the skill, keyword or subtree name of the node; for a bare list, of the list.
         label: Value of `as:`, or "".
-        label_mark: Place of the label.
+        label_mark: Position of the label, or None.
         path: Unique path from the root of the expanded tree; "" before expansion.
     """
 
@@ -31,11 +31,11 @@ class Node:
 
     @property
     def children(self) -> tuple[Node, ...]:
-        """The nodes directly inside this one, in the order of their keys."""
+        """The children of the node, in the order of the keys that its class declares."""
         return ()
 
     def walk(self) -> Iterator[Node]:
-        """Yield this node and every node below it, top to bottom."""
+        """Yield this node and every node below it, parents before children."""
         yield self
         for child in self.children:
             yield from child.walk()
@@ -43,44 +43,48 @@ class Node:
 
 @dataclass(frozen=True)
 class SkillNode(Node):
-    """A skill and what the mission sets of it.
+    """A node that runs a skill.
 
     Attributes:
-        names: Variables of ports that the mission does not wire and that have another name than the port.
+        skill: Name of the skill.
+        settings: Values of params and ports in the mission, by name.
+        variables_by_port: Variables of ports without setting; by default a port has a variable of its name.
     """
 
     skill: str
     settings: Mapping[str, Setting]
-    names: Mapping[str, str] = field(default_factory=dict)
+    variables_by_port: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class UnknownNode(Node):
-    """A node that could not be read; a finding says why.
+    """A node that could not be read; a finding states the reason.
 
     Attributes:
-        parts: The nodes that could be read of it.
+        parts: Nodes below it that could be read.
     """
 
     parts: tuple[Node, ...] = ()
 
     @property
     def children(self) -> tuple[Node, ...]:
-        """The parts."""
+        """The nodes in `parts`."""
         return self.parts
 
 
 @dataclass(frozen=True)
 class SectionNode:
-    """A mapping below a key of a control node: the values of its keys.
+    """A mapping below a key of a control node, such as `backoff` of `retry`.
 
     Attributes:
-        kind: Class that declares the keys.
+        declaring_class: Class that declares the keys.
+        mark: Position of the mapping.
+        values: Values of the given keys.
     """
 
-    kind: type[KeyOwner]
+    declaring_class: type[KeyOwner]
     mark: Mark
-    values: Mapping[str, Part]
+    values: Mapping[str, KeyValue]
 
 
 @dataclass(frozen=True)
@@ -88,59 +92,62 @@ class InnerNode(Node):
     """A control node.
 
     Attributes:
-        kind: Its class.
-        values: Values of its keys; a key that is missing in the file is missing here.
-        is_list: True for a bare list, which has no word.
+        declaring_class: Class of the control node, which declares the keys.
+        values: Values of the given keys.
+        is_list: True for a bare list, which is a sequence without keyword.
     """
 
-    kind: type[ControlNode]
-    values: Mapping[str, Part]
+    declaring_class: type[ControlNode]
+    values: Mapping[str, KeyValue]
     is_list: bool = False
 
     @cached_property
     def children(self) -> tuple[Node, ...]:
-        """The nodes under its keys, those in sections included."""
-        return tuple(node for _, value in iterate_parts(self) for node in nodes_of(value))
+        """The nodes in the values of the keys, also in sections."""
+        return tuple(node for _, value in iterate_key_values(self) for node in list_nodes(value))
 
 
 @dataclass(frozen=True)
 class UseNode(Node):
-    """A subtree by name.
+    """A use of a subtree.
 
     Attributes:
-        arguments: Values of its arguments.
-        returns: Other names for the variables it returns.
-        returned: The variables it returns, as they are called here.
-        body: The subtree with the arguments put in; None until the mission is expanded.
+        name: Name of the subtree.
+        arguments: Values of the arguments, by name.
+        returns: Variables of the caller for returned variables, by the name in the subtree.
+        returned_variables: Variables of the caller that the subtree returns; () before expansion.
+        body: Expanded subtree; None before expansion.
     """
 
     name: str
     arguments: Mapping[str, Setting]
     returns: Mapping[str, Setting] = field(default_factory=dict)
-    returned: tuple[str, ...] = ()
+    returned_variables: tuple[str, ...] = ()
     body: Node | None = None
 
     @property
     def children(self) -> tuple[Node, ...]:
-        """The body."""
+        """The body as the only child; no children before expansion."""
         return () if self.body is None else (self.body,)
 
 
-Part: TypeAlias = "Value | Named | Node | SectionNode | tuple[Node | FailureName | SectionNode, ...]"
+KeyValue: TypeAlias = (
+    "Value | LocatedName | Node | SectionNode | tuple[Node | FailureName | SectionNode, ...]"
+)
 """Value of a key of a control node."""
 
 
-def iterate_parts(of: InnerNode | SectionNode) -> Iterator[tuple[Key, Part]]:
-    """Yield the keys that are given, in the order of their declaration, with their values."""
-    for name, key in of.kind.keys.items():
-        if name in of.values:
-            yield key, of.values[name]
+def iterate_key_values(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, KeyValue]]:
+    """Yield the given keys with their values, in the order of the declarations."""
+    for name, key in owner.declaring_class.keys.items():
+        if name in owner.values:
+            yield key, owner.values[name]
 
 
-def nodes_of(part: Part) -> list[Node]:
-    """Return the nodes in the value of a key."""
-    if isinstance(part, SectionNode):
-        return [node for _, value in iterate_parts(part) for node in nodes_of(value)]
-    if isinstance(part, tuple):
-        return [node for item in part if not isinstance(item, FailureName) for node in nodes_of(item)]
-    return [part] if isinstance(part, Node) else []
+def list_nodes(value: KeyValue) -> list[Node]:
+    """Return the nodes in the value of a key, without their descendants."""
+    if isinstance(value, SectionNode):
+        return [node for _, inner in iterate_key_values(value) for node in list_nodes(inner)]
+    if isinstance(value, tuple):
+        return [node for item in value if not isinstance(item, FailureName) for node in list_nodes(item)]
+    return [value] if isinstance(value, Node) else []

@@ -1,7 +1,7 @@
 """Unique, readable paths of the nodes of the expanded tree.
 
-A path names the nodes on the way: `tree/repeat/do/2:try/retry/do/Grasp`. A skill has its name or label; in a
-list, control nodes and names that occur twice have a number.
+A path contains the names of all ancestors: `tree/repeat/do/2:try/retry/do/Grasp`. The name of a node is its
+label, skill, subtree or keyword. In a list, control nodes without label and duplicate names get an index.
 """
 
 from __future__ import annotations
@@ -11,50 +11,51 @@ from dataclasses import replace
 
 from executive.mission.model.nodes import (
     InnerNode,
+    KeyValue,
     Node,
-    Part,
     SectionNode,
     SkillNode,
     UnknownNode,
     UseNode,
-    iterate_parts,
+    iterate_key_values,
 )
 from executive.tree.keys import Kind
 
 
-def with_paths(root: Node) -> Node:
-    """Return the tree with the path of every node set."""
+def assign_paths(root: Node) -> Node:
+    """Return the tree with the paths of all nodes."""
     return _assign_path(root, "", "tree")
 
 
-def name_of(node: Node) -> str:
-    """Return the name of a node in paths."""
-    return node.label or word_of(node)
+def get_path_name(node: Node) -> str:
+    """Return the name of a node in paths: its label, otherwise its skill, subtree or keyword."""
+    return node.label or get_type_name(node)
 
 
-def word_of(node: Node) -> str:
-    """Return the name of the skill or subtree, or the keyword of the control node."""
+def get_type_name(node: Node) -> str:
+    """Return the name of the skill or subtree, the keyword of the control node, or "unknown"."""
     match node:
         case SkillNode():
             return node.skill
         case UseNode():
             return node.name
         case InnerNode():
-            return node.kind.keyword
+            return node.declaring_class.keyword
     return "unknown"
 
 
 def _assign_path(node: Node, parent: str, slot: str, name: str | None = None) -> Node:
-    """Return the node as it stands in `slot` of `parent`, or there under another name.
+    """Return the node with its path and the paths of its descendants.
 
-    A bare list is the slot itself; any other node adds its own name to the path.
+    `parent` is the path of the parent, and `slot` the key of the parent that contains the node, or "". By
+    default, `name` is the name of the node, and a bare list has no name.
     """
     path = _join(parent, slot)
     if name is not None or not _is_list(node):
-        path = _join(path, name or name_of(node))
+        path = _join(path, name or get_path_name(node))
     match node:
         case InnerNode():
-            return replace(node, path=path, values=_parts(node, path))
+            return replace(node, path=path, values=_assign_value_paths(node, path))
         case UseNode(body=Node() as body):
             return replace(node, path=path, body=_assign_path(body, path, "do" if node.label else ""))
         case UnknownNode():
@@ -62,39 +63,44 @@ def _assign_path(node: Node, parent: str, slot: str, name: str | None = None) ->
     return replace(node, path=path)
 
 
-def _parts(owner: InnerNode | SectionNode, path: str, prefix: str = "") -> dict[str, Part]:
-    """Return the values of an owner with their paths; `prefix` is the slot of a section in its node."""
-    placed: dict[str, Part] = {}
-    for key, value in iterate_parts(owner):
-        # The only child of a section has the name of the section.
-        name = prefix if prefix and key.name == "do" else _join(prefix, key.name)
+def _assign_value_paths(
+    owner: InnerNode | SectionNode, path: str, section_slot: str = ""
+) -> dict[str, KeyValue]:
+    """Return the values of the keys with paths; `path` is the path of the control node.
+
+    `section_slot` is the key of the control node that contains the section `owner`, or "".
+    """
+    values: dict[str, KeyValue] = {}
+    for key, value in iterate_key_values(owner):
+        # The child of a section under `do` has the slot of the section.
+        slot = section_slot if section_slot and key.name == "do" else _join(section_slot, key.name)
         if isinstance(value, Node):
-            value = _assign_path(value, path, name if key.is_in_path or _is_list(value) else "")
+            value = _assign_path(value, path, slot if key.is_in_path or _is_list(value) else "")
         elif isinstance(value, SectionNode):
-            value = replace(value, values=_parts(value, path, name))
+            value = replace(value, values=_assign_value_paths(value, path, slot))
         elif isinstance(value, tuple) and key.kind is Kind.NODES:
             value = _assign_list_paths(tuple(item for item in value if isinstance(item, Node)), path)
         elif isinstance(value, tuple):
             value = tuple(
-                replace(item, values=_parts(item, path, f"{name}/{index}"))
+                replace(item, values=_assign_value_paths(item, path, f"{slot}/{index}"))
                 if isinstance(item, SectionNode)
                 else item
                 for index, item in enumerate(value, 1)
             )
-        placed[key.name] = value
-    return placed
+        values[key.name] = value
+    return values
 
 
 def _assign_list_paths(items: tuple[Node, ...], parent: str) -> tuple[Node, ...]:
-    """Return the nodes of a list, named so that no two have the same path."""
-    names = [name_of(node) for node in items]
-    count = Counter(names)
-    placed = []
+    """Return the nodes of a list with unique paths."""
+    names = [get_path_name(node) for node in items]
+    counts = Counter(names)
+    nodes = []
     for index, (node, name) in enumerate(zip(items, names, strict=True), 1):
-        named = bool(node.label) or isinstance(node, SkillNode | UseNode)
-        unique = name if named and count[name] == 1 else f"{index}:{name}"
-        placed.append(_assign_path(node, parent, "", unique))
-    return tuple(placed)
+        has_own_name = bool(node.label) or isinstance(node, SkillNode | UseNode)
+        unique_name = name if has_own_name and counts[name] == 1 else f"{index}:{name}"
+        nodes.append(_assign_path(node, parent, "", unique_name))
+    return tuple(nodes)
 
 
 def _is_list(node: Node) -> bool:

@@ -1,4 +1,4 @@
-"""Types of ports: which fit each other, and what they are called."""
+"""Types of ports: assignability, types of list elements, and descriptions for messages."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import types
 from collections.abc import Sequence
 from typing import Any, NoReturn, Union, get_args, get_origin
 
-_WORDS = {
+_PHRASES_BY_TYPE = {
     str: "a text",
     int: "a whole number",
     float: "a number",
@@ -15,41 +15,43 @@ _WORDS = {
 }
 
 
-def is_assignable(given: object, wanted: object) -> bool:
-    """Tell whether every value of the type `given` is one of the type `wanted`."""
-    if given is Any or wanted is Any or given == wanted or given is NoReturn:
+def is_assignable(source: object, target: object) -> bool:
+    """Return True if a variable of the type `target` may get every value of the type `source`."""
+    if source is Any or target is Any or source == target or source is NoReturn:
         return True
-    if _is_union(given):
-        return all(is_assignable(part, wanted) for part in get_args(given))
-    if _is_union(wanted):
-        return any(is_assignable(given, part) for part in get_args(wanted))
-    if given is int and wanted is float:
+    if _is_union(source):
+        return all(is_assignable(part, target) for part in get_args(source))
+    if _is_union(target):
+        return any(is_assignable(source, part) for part in get_args(target))
+    if source is int and target is float:
         return True
-    if not issubclass(_class_of(given), _class_of(wanted)):
+    if not issubclass(_get_class(source), _get_class(target)):
         return False
-    inner = zip(get_args(given), get_args(wanted), strict=False)
-    return all(is_assignable(one, other) for one, other in inner if ... not in (one, other))
+    arguments = zip(get_args(source), get_args(target), strict=False)
+    return all(is_assignable(one, other) for one, other in arguments if ... not in (one, other))
 
 
-def find_element_type(listed: object) -> object:
-    """Return the type of the elements of a list type, or None where it is no list."""
-    if listed is Any:
+def find_element_type(declared: object) -> object:
+    """Return the type of the elements of a list or tuple type, or None for other types."""
+    if declared is Any:
         return Any
-    if not issubclass(_class_of(listed), Sequence) or _class_of(listed) is str:
+    if not issubclass(_get_class(declared), Sequence) or _get_class(declared) is str:
         return None
-    arguments = [argument for argument in get_args(listed) if argument is not ...]
-    return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - made of as many as there are
+    arguments = [argument for argument in get_args(declared) if argument is not ...]
+    return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - the number of types varies
 
 
 def describe_type(declared: object) -> str:
-    """Return what values of a type are called in a sentence."""
-    if declared in _WORDS:
-        return _WORDS[declared]
+    """Return a description of the values of a type, for a sentence: `a list of Target`."""
+    if declared in _PHRASES_BY_TYPE:
+        return _PHRASES_BY_TYPE[declared]
     if _is_union(declared):
         return " or ".join(describe_type(part) for part in get_args(declared))
-    element = find_element_type(declared)
-    if element is not None and declared is not object:
-        return "a list" if element is Any else f"a list of {describe_type(element).removeprefix('a ')}"
+    element_type = find_element_type(declared)
+    if element_type is not None and declared is not object:
+        if element_type is Any:
+            return "a list"
+        return f"a list of {describe_type(element_type).removeprefix('a ')}"
     return getattr(declared, "__name__", str(declared))
 
 
@@ -57,6 +59,7 @@ def _is_union(declared: object) -> bool:
     return get_origin(declared) in (Union, types.UnionType)
 
 
-def _class_of(declared: object) -> type:
+def _get_class(declared: object) -> type:
+    """Return the class of a type without its arguments; `object` for a type that is no class."""
     origin = get_origin(declared) or declared
     return origin if isinstance(origin, type) else object

@@ -1,4 +1,4 @@
-"""The smallest pieces of a mission: values, references and words, each with its place."""
+"""Values, references to variables, and names in a mission file, each with its position."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from executive.tree.failure import Reason
 
 @dataclass(frozen=True)
 class Literal:
-    """A value written in the file.
+    """A constant value.
 
     Attributes:
-        value: Plain value: nothing, truth value, number, text, list or mapping.
-        mark: Where it stands.
-        origin: How the reader sees it where that is not the value itself, for instance `$attempts`.
-        used: Where `$attempts` stands, if it stands for this value; else None.
-        elements: Where the elements stand, if it is a list written in the file.
+        value: Plain value: None, boolean, number, string, list or mapping.
+        mark: Position of the value.
+        origin: For the value of a param or an argument: its reference, `$attempts in line 12`; otherwise "".
+        reference_mark: For the value of a param or an argument: position of the reference; otherwise None.
+        element_marks: Positions of the elements, if the value is a list.
     """
 
     value: JsonValue
     mark: Mark
     origin: str = ""
     reference_mark: Mark | None = None
-    elements: tuple[Mark, ...] = ()
+    element_marks: tuple[Mark, ...] = ()
 
     @property
     def origin_note(self) -> str:
-        """The origin in brackets, to follow a sentence about the value, or ""."""
-        return f" (it is {self.origin})" if self.origin else ""
+        """The origin in brackets, for the end of a sentence about the value, or ""."""
+        return f" (value of {self.origin})" if self.origin else ""
 
-    def element_mark(self, index: int) -> Mark:
-        """Return where an element of the list stands, or the list where that is not known."""
-        return self.elements[index] if index < len(self.elements) else self.mark
+    def get_element_mark(self, index: int) -> Mark:
+        """Return the position of an element of the list, or of the list if it is unknown."""
+        return self.element_marks[index] if index < len(self.element_marks) else self.mark
 
 
 @dataclass(frozen=True)
 class Reference:
-    """`$name`: a param of the mission, an argument of the subtree, or a variable of the run."""
+    """`$name`: a param, an argument or a variable before expansion, and a variable after expansion."""
 
     name: str
     mark: Mark
@@ -50,8 +50,8 @@ Value = Literal | Reference
 
 
 @dataclass(frozen=True)
-class Named:
-    """A word at its place: a bin in a route, a library's file, a loop's variable."""
+class LocatedName:
+    """A name and its position: a bin in a route, the path of a library, the variable of a loop."""
 
     name: str
     mark: Mark
@@ -59,14 +59,14 @@ class Named:
 
 @dataclass(frozen=True)
 class Setting:
-    """`key: value` inside a skill: a param, an input or an output."""
+    """`name: value` below a skill, `with` or `returns`: the value, and the position of the name."""
 
-    key: Mark
+    name_mark: Mark
     value: Value
 
 
 @dataclass(frozen=True)
 class FailureName(Reason):
-    """`Skill.reason` or `label.reason` in an `on`, `catch` or `until`, with its place."""
+    """`Skill.reason` or `label.reason` below `on` or `until`, with its position."""
 
     mark: Mark

@@ -1,1 +1,1 @@
-"""Parsers from YAML nodes to the typed model, with findings for malformed input."""
+"""Parsers from YAML nodes to the typed content of mission, library and cell files."""

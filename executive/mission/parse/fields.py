@@ -1,4 +1,4 @@
-"""Reader for the keys of one mapping of a mission file, which collects findings."""
+"""Reading of values from the mappings of a mission file, with findings for malformed values."""
 
 from __future__ import annotations
 
@@ -8,166 +8,177 @@ from dataclasses import replace
 
 from pydantic import JsonValue
 
-from executive.mission.findings import Finding, alternatives, error
+from executive.mission.findings import Finding, list_choices, make_error
 from executive.mission.model.values import FailureName, Literal, Reference, Setting, Value
 from executive.mission.source import Mark
-from executive.mission.text.yaml_text import Mapping, Node, Scalar, YamlSequence, plain, scalars
-from executive.mission.words import describe
+from executive.mission.text.yaml_text import (
+    YamlMapping,
+    YamlNode,
+    YamlScalar,
+    YamlSequence,
+    describe_node,
+    iterate_scalars,
+    to_python_value,
+)
 
-NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_DOLLAR = re.compile(r"^\$|\$(?=[A-Za-z_])")
-_MATCH = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\.([A-Za-z_][A-Za-z0-9_]*)")
+NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+"""Names of params, arguments, variables and subtrees."""
+_REFERENCE_START = re.compile(r"^\$|\$(?=[A-Za-z_])")
+"""A `$` that starts a reference, or looks like the start of a reference."""
+_FAILURE_PATTERN = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\.([A-Za-z_][A-Za-z0-9_]*)")
+"""`Skill.reason` or `label.reason`."""
 
 
 class Fields:
-    """The keys of one mapping.
+    """Reader of one mapping; reports unknown keys at construction.
 
     Attributes:
         owner: Name of the owner of the mapping in messages.
-        mark: Place of the owner, for findings about missing keys.
-        findings: Receives the findings.
+        mark: Position of the owner, for findings about missing keys.
+        findings: List to which findings are added.
     """
 
     def __init__(
-        self, owner: str, mark: Mark, node: Node, known: Iterable[str], findings: list[Finding]
+        self, owner: str, mark: Mark, node: YamlNode, known: Iterable[str], findings: list[Finding]
     ) -> None:
         self.owner, self.mark, self.findings = owner, mark, findings
-        self._node = node if isinstance(node, Mapping) else None
+        self._node = node if isinstance(node, YamlMapping) else None
         known = list(known)
         if self._node is None:
-            message = f"{owner} takes a mapping, not {describe(plain(node))}"
-            self._refuse(node.mark, "wrong-type", message, f"It takes: {', '.join(known)}.")
+            message = f"{owner} must be a mapping, not {describe_node(node)}"
+            self._add_error(node.mark, "wrong-type", message, f"Its keys: {', '.join(known)}.")
             return
         for entry in self._node.entries:
             if entry.key.text not in known:
-                hint = alternatives(entry.key.text, known, "It takes")
+                hint = list_choices(entry.key.text, known, "Allowed keys")
                 message = f'{owner} has no key "{entry.key.text}"'
-                self._refuse(entry.key.mark, "unknown-key", message, hint)
+                self._add_error(entry.key.mark, "unknown-key", message, hint)
 
     @property
     def is_mapping(self) -> bool:
         """True if the node is a mapping."""
         return self._node is not None
 
-    def get(self, key: str) -> Node | None:
+    def get(self, key: str) -> YamlNode | None:
         """Return the value of `key`, or None."""
         return self._node.get(key) if self._node else None
 
-    def key_mark(self, key: str) -> Mark:
-        """Return the place of `key`, or of the owner if the key is missing."""
-        entry = self._node.entry(key) if self._node else None
+    def get_key_mark(self, key: str) -> Mark:
+        """Return the position of `key`, or of the owner if the key is missing."""
+        entry = self._node.get_entry(key) if self._node else None
         return entry.key.mark if entry else self.mark
 
-    def value_mark(self, key: str) -> Mark:
-        """Return the place of the value of `key`, or of the owner if the key is missing."""
+    def get_value_mark(self, key: str) -> Mark:
+        """Return the position of the value of `key`, or of the owner if the key is missing."""
         node = self.get(key)
         return node.mark if node else self.mark
 
-    def require(self, key: str) -> Node | None:
-        """Return the value of `key`, or None after adding a finding."""
+    def require(self, key: str) -> YamlNode | None:
+        """Return the value of `key`; if the key is missing, add an error and return None."""
         node = self.get(key)
         if node is None and self.is_mapping:
-            self._refuse(self.mark, "missing-key", f'{self.owner} needs the key "{key}"')
+            self._add_error(self.mark, "missing-key", f'{self.owner} needs the key "{key}"')
         return node
 
-    def text(self, key: str, default: str = "") -> str:
-        """Return the text of `key`, or `default`."""
+    def read_text(self, key: str) -> str:
+        """Return the text of `key`; "" if it is missing or, after adding an error, if it is no text."""
         node = self.get(key)
         if node is None:
-            return default
-        if isinstance(node, Scalar) and node.value is not None:
+            return ""
+        if isinstance(node, YamlScalar) and node.value is not None:
             return node.text
-        return self._refuse_type(node, f"{self.owner}.{key} must be a text", default)
+        message = f"{self._name(key)} must be a text, not {describe_node(node)}"
+        self._add_error(node.mark, "wrong-type", message)
+        return ""
 
-    def value(self, key: str) -> Value | None:
-        """Return the value or `$reference` of `key`, or None if it is missing or invalid."""
-        node = self.get(key)
-        return None if node is None else value_of(node, self.findings)
-
-    def failure_names(self, key: str) -> tuple[FailureName, ...]:
-        """Return the names of failures under `key`, a single `Skill.reason` or a list."""
+    def read_failure_names(self, key: str) -> tuple[FailureName, ...]:
+        """Return the valid failure names in the list or single value of `key`; add errors for others."""
         node = self.get(key)
         if node is None:
             return ()
-        found = []
+        names = []
         if isinstance(node, YamlSequence) and not node.items:
-            hint = f'For every failure leave out "{key}".'
-            self._refuse(node.mark, "empty-list", f"{self.owner}.{key} names no failure", hint)
-        for item in self.items(key):
-            written = item.text if isinstance(item, Scalar) else ""
-            if form := _MATCH.fullmatch(written):
-                found.append(FailureName(form[1], form[2], item.mark))
+            hint = f'To match every failure, delete "{key}".'
+            self._add_error(node.mark, "empty-list", f"{self._name(key)} names no failure", hint)
+        for item in self.list_items(key):
+            text = item.text if isinstance(item, YamlScalar) else ""
+            if parts := _FAILURE_PATTERN.fullmatch(text):
+                names.append(FailureName(parts[1], parts[2], item.mark))
             else:
-                shown = f'"{written}"' if written else describe(plain(item))
-                message = f"{self.owner}.{key} names failures as Skill.reason or label.reason, not {shown}"
-                self._refuse(item.mark, "bad-match", message)
-        return tuple(found)
+                given = f'"{text}"' if text else describe_node(item)
+                message = f"{self._name(key)} must name failures as Skill.reason or label.reason, not {given}"
+                self._add_error(item.mark, "bad-match", message)
+        return tuple(names)
 
-    def items(self, key: str) -> tuple[Node, ...]:
-        """Return the items of the list under `key`; a single value counts as a list of one."""
+    def list_items(self, key: str) -> tuple[YamlNode, ...]:
+        """Return the items of the list under `key`; a single value counts as a list with one item."""
         node = self.get(key)
         if isinstance(node, YamlSequence):
             return node.items
         return () if node is None else (node,)
 
-    def mapping(self, key: str, read: Callable[[str, Mark, Node], None]) -> None:
-        """Call `read(name, place of the name, value)` for every entry of the mapping under `key`."""
+    def read_entries(self, key: str, read_entry: Callable[[str, Mark, YamlNode], None]) -> None:
+        """Call `read_entry` with name, position of the name, and value of each entry of the mapping `key`."""
         node = self.get(key)
-        if isinstance(node, Mapping):
+        if isinstance(node, YamlMapping):
             for entry in node.entries:
-                read(entry.key.text, entry.key.mark, entry.value)
-        elif node is not None and not (isinstance(node, Scalar) and node.value is None):
-            self._refuse_type(node, f"{self.owner}.{key} must be a mapping", "")
+                read_entry(entry.key.text, entry.key.mark, entry.value)
+        elif node is not None and not (isinstance(node, YamlScalar) and node.value is None):
+            message = f"{self._name(key)} must be a mapping, not {describe_node(node)}"
+            self._add_error(node.mark, "wrong-type", message)
 
-    def _refuse_type(self, node: Node, sentence: str, default: str) -> str:
-        self._refuse(node.mark, "wrong-type", f"{sentence}, not {describe(plain(node))}")
-        return default
+    def _name(self, key: str) -> str:
+        """Return the name of a key in messages: `retry.on`, or `params of the mission`."""
+        return f"{key} of {self.owner}" if " " in self.owner else f"{self.owner}.{key}"
 
-    def _refuse(self, mark: Mark, code: str, message: str, hint: str = "") -> None:
-        self.findings.append(error(mark, code, message, hint))
+    def _add_error(self, mark: Mark, code: str, message: str, hint: str = "") -> None:
+        self.findings.append(make_error(mark, code, message, hint))
 
 
-def settings_of(node: Node, owner: str, findings: list[Finding], example: str = "name") -> dict[str, Setting]:
-    """Return the values of a mapping; an empty value is an empty mapping.
+def read_settings(
+    node: YamlNode, owner: str, findings: list[Finding], example_key: str = "name"
+) -> dict[str, Setting]:
+    """Return the values of a mapping by name; an empty value counts as an empty mapping.
 
-    `example` is a key that the hint suggests for a value without a key.
+    `owner` is the skill or key with the mapping. If a single value takes the place of the mapping, the hint
+    contains `example_key`.
     """
-    if isinstance(node, Scalar) and node.value is None:
+    if isinstance(node, YamlScalar) and node.value is None:
         return {}
-    if not isinstance(node, Mapping):
-        message = f"{owner} takes a mapping of names to values, not {describe(plain(node))}"
-        hint = f"Write it as {owner}: {{{example}: {node.text}}}." if isinstance(node, Scalar) else ""
-        findings.append(error(node.mark, "wrong-type", message, hint))
+    if not isinstance(node, YamlMapping):
+        message = f"the value of {owner} must be a mapping of names to values, not {describe_node(node)}"
+        hint = f"Write {owner}: {{{example_key}: {node.text}}}." if isinstance(node, YamlScalar) else ""
+        findings.append(make_error(node.mark, "wrong-type", message, hint))
         return {}
-    values = [(entry.key, value_of(entry.value, findings)) for entry in node.entries]
+    values = [(entry.key, read_value(entry.value, findings)) for entry in node.entries]
     return {key.text: Setting(key.mark, value) for key, value in values if value is not None}
 
 
-def value_of(node: Node, findings: list[Finding]) -> Value | None:
-    """Return a value, in which `$name` is a reference and `$$` is `$`; None if a `$` is misplaced."""
-    if isinstance(node, Scalar) and isinstance(node.value, str) and node.value.startswith("$"):
+def read_value(node: YamlNode, findings: list[Finding]) -> Value | None:
+    """Return a reference for `$name`, or a constant in which `$$` is `$`; None after errors."""
+    if isinstance(node, YamlScalar) and isinstance(node.value, str) and node.value.startswith("$"):
         name = node.value[1:]
-        if NAME.fullmatch(name):
+        if NAME_PATTERN.fullmatch(name):
             return Reference(name, node.mark)
-    misplaced = list(_find_misplaced_dollars(node))
-    findings += misplaced
-    literal = literal_of(node)
-    return None if misplaced else replace(literal, value=_unescape(literal.value))
+    errors = list(_find_misplaced_dollars(node))
+    findings += errors
+    literal = make_literal(node)
+    return None if errors else replace(literal, value=_unescape(literal.value))
 
 
-def literal_of(node: Node) -> Literal:
-    """Return a node as a value with its place and the places of its elements."""
-    elements = tuple(item.mark for item in node.items) if isinstance(node, YamlSequence) else ()
-    return Literal(plain(node), node.mark, elements=elements)
+def make_literal(node: YamlNode) -> Literal:
+    """Return a node as a constant with its position and the positions of its elements."""
+    element_marks = tuple(item.mark for item in node.items) if isinstance(node, YamlSequence) else ()
+    return Literal(to_python_value(node), node.mark, element_marks=element_marks)
 
 
-def _find_misplaced_dollars(node: Node) -> Iterator[Finding]:
-    """Yield a finding for each `$` in the wrong form, or inside a text, list or mapping."""
-    for scalar in scalars(node):
-        if isinstance(scalar.value, str) and _DOLLAR.search(scalar.value.replace("$$", "")):
-            message = f'"{scalar.text}" is no reference: only a whole value can be one, as in key: $name'
-            hint = f'For the text itself write "{scalar.text.replace("$", "$$")}".'
-            yield error(scalar.mark, "bad-reference", message, hint)
+def _find_misplaced_dollars(node: YamlNode) -> Iterator[Finding]:
+    """Yield an error for each text with a `$` that is neither `$$` nor the start of a whole value `$name`."""
+    for scalar in iterate_scalars(node):
+        if isinstance(scalar.value, str) and _REFERENCE_START.search(scalar.value.replace("$$", "")):
+            message = f'"{scalar.text}" is no reference: a reference is a whole value, as in key: $name'
+            hint = f'For the character $, write $$: "{scalar.text.replace("$", "$$")}".'
+            yield make_error(scalar.mark, "bad-reference", message, hint)
 
 
 def _unescape(value: JsonValue) -> JsonValue:

@@ -3,164 +3,167 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from collections.abc import Mapping as Mapped
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from executive.mission.findings import Finding, error
+from executive.mission.findings import Finding, make_error
 from executive.mission.model import grammar
 from executive.mission.model.mission import Argument, Library, Mission, Route, Subtree
-from executive.mission.model.values import Named
-from executive.mission.parse.fields import NAME, Fields, value_of
+from executive.mission.model.values import LocatedName
+from executive.mission.parse.fields import NAME_PATTERN, Fields, read_value
 from executive.mission.parse.nodes import NodeParser, Skills
 from executive.mission.parse.params import parse_params
 from executive.mission.source import Mark
-from executive.mission.text.yaml_text import Mapping, Node, Scalar, YamlSequence, plain
-from executive.mission.words import describe
+from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, describe_node
 from executive.tree.registry import ControlNodes
 
-_MISSION_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
+_MISSION_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
 def parse_mission(
-    root: Node, overrides: Mapped[str, str], skills: Skills, control: ControlNodes
+    root: YamlNode, overrides: Mapping[str, str], skills: Skills, node_classes: ControlNodes
 ) -> tuple[Mission, list[Finding]]:
-    """Return the readable content of a mission file, and the findings."""
+    """Return the content of a mission file, without unreadable parts, and the findings."""
     findings: list[Finding] = []
     start = replace(root.mark, length=1)
-    fields = Fields("the mission", start, root, grammar.MISSION, findings)
+    fields = Fields("the mission", start, root, grammar.MISSION_KEYS, findings)
     for key in ("mission", "cell", "tree"):
         fields.require(key)
-    parser = NodeParser(findings, skills, control)
+    parser = NodeParser(findings, skills, node_classes)
     tree = fields.get("tree")
     mission = Mission(
         name=_read_name(fields),
-        description=fields.text("description"),
+        description=fields.read_text("description"),
         cell=_read_cell(fields),
         libraries=_read_names(
-            fields.items("library"), "library takes the path of a file or a list of them", findings
+            fields.list_items("library"), "library must be the path of a file or a list of paths", findings
         ),
         params=parse_params(fields, overrides),
         routes=_read_routes(fields),
-        tree=None if tree is None else parser.node(tree, fields.key_mark("tree")),
+        tree=None if tree is None else parser.read_node(tree, fields.get_key_mark("tree")),
         trees=_read_trees(fields, parser),
     )
     return mission, findings
 
 
 def _read_name(fields: Fields) -> str:
-    name = fields.text("mission")
-    if isinstance(fields.get("mission"), Scalar) and not _MISSION_NAME.fullmatch(name):
-        message = f'a mission is named by letters, digits, "_" and "-", at most 64, not "{name}"'
-        fields.findings.append(error(fields.value_mark("mission"), "bad-name", message))
+    name = fields.read_text("mission")
+    if isinstance(fields.get("mission"), YamlScalar) and not _MISSION_NAME_PATTERN.fullmatch(name):
+        message = f'"{name}" is no valid name of a mission'
+        hint = 'Use at most 64 letters, digits, "_" and "-", and begin with a letter.'
+        fields.findings.append(make_error(fields.get_value_mark("mission"), "bad-name", message, hint))
     return name
 
 
-def _read_cell(fields: Fields) -> Named:
-    cell = Named(fields.text("cell"), fields.value_mark("cell"))
-    if isinstance(fields.get("cell"), Scalar) and not cell.name:
-        fields.findings.append(error(cell.mark, "bad-name", "cell names no file"))
+def _read_cell(fields: Fields) -> LocatedName:
+    cell = LocatedName(fields.read_text("cell"), fields.get_value_mark("cell"))
+    if isinstance(fields.get("cell"), YamlScalar) and not cell.name:
+        fields.findings.append(make_error(cell.mark, "bad-name", "cell must be the path of a cell file"))
     return cell
 
 
 def _read_routes(fields: Fields) -> tuple[Route, ...]:
     routes: list[Route] = []
 
-    def read(label: str, mark: Mark, node: Node) -> None:
+    def read_route(label: str, mark: Mark, node: YamlNode) -> None:
         items = node.items if isinstance(node, YamlSequence) else (node,)
         if not items:
-            fields.findings.append(error(node.mark, "empty-list", "a route needs at least one bin"))
-        bins = _read_names(items, "a route names a bin or a list of bins", fields.findings)
+            fields.findings.append(make_error(node.mark, "empty-list", "a route needs at least one bin"))
+        bins = _read_names(items, "a route must be a bin or a list of bins", fields.findings)
         routes.append(Route(label, mark, bins))
 
-    fields.mapping("routes", read)
+    fields.read_entries("routes", read_route)
     return tuple(routes)
 
 
-def _read_names(items: Iterable[Node], takes: str, findings: list[Finding]) -> tuple[Named, ...]:
-    """Return the texts of a list; for other items, add a finding that starts with `takes`."""
-    named = []
+def _read_names(items: Iterable[YamlNode], rule: str, findings: list[Finding]) -> tuple[LocatedName, ...]:
+    """Return the texts in a list; for each other item, add an error whose message begins with `rule`."""
+    names = []
     for item in items:
-        if isinstance(item, Scalar) and isinstance(item.value, str):
-            named.append(Named(item.text, item.mark))
+        if isinstance(item, YamlScalar) and isinstance(item.value, str):
+            names.append(LocatedName(item.text, item.mark))
         else:
-            findings.append(error(item.mark, "wrong-type", f"{takes}, not {describe(plain(item))}"))
-    return tuple(named)
+            findings.append(make_error(item.mark, "wrong-type", f"{rule}, not {describe_node(item)}"))
+    return tuple(names)
 
 
-def parse_library(root: Node, skills: Skills, control: ControlNodes) -> tuple[Library, list[Finding]]:
-    """Return the readable content of a library file, and the findings."""
+def parse_library(
+    root: YamlNode, skills: Skills, node_classes: ControlNodes
+) -> tuple[Library, list[Finding]]:
+    """Return the content of a library file, without unreadable parts, and the findings."""
     findings: list[Finding] = []
     start = replace(root.mark, length=1)
-    fields = Fields("the library", start, root, grammar.LIBRARY, findings)
+    fields = Fields("the library", start, root, grammar.LIBRARY_KEYS, findings)
     for key in ("library", "trees"):
         fields.require(key)
-    name = fields.text("library")
-    return Library(
-        name, _read_trees(fields, NodeParser(findings, skills, control), name or "library")
-    ), findings
+    name = fields.read_text("library")
+    parser = NodeParser(findings, skills, node_classes)
+    return Library(name, _read_trees(fields, parser, name or "library")), findings
 
 
 def _read_trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
-    """Return the subtrees under the key `trees`; `library` is the name of their library."""
+    """Return the subtrees below `trees`; `library` is the name of their library, "" for the mission file."""
     trees: dict[str, Subtree] = {}
 
-    def read(name: str, mark: Mark, node: Node) -> None:
-        if not NAME.fullmatch(name):
-            parser.refuse(mark, "bad-name", f'a subtree is named by letters, digits and "_", not "{name}"')
-        if isinstance(node, Mapping) and set(grammar.SUBTREE) & set(node.keys):
-            whole = node.get("do") is not None
-            if not whole:
-                parser.refuse(mark, "missing-key", f'the subtree "{name}" needs the key "do"')
-            trees[name] = _read_subtree(
-                name, mark, node, parser if whole else parser.make_silent_parser(), library
-            )
+    def read_tree(name: str, mark: Mark, node: YamlNode) -> None:
+        if not NAME_PATTERN.fullmatch(name):
+            message = f'"{name}" is no valid name of a subtree'
+            hint = 'Use letters, digits and "_", and begin with no digit.'
+            parser.add_error(mark, "bad-name", message, hint)
+        if isinstance(node, YamlMapping) and set(grammar.SUBTREE_KEYS) & set(node.keys):
+            has_body = node.get("do") is not None
+            if not has_body:
+                parser.add_error(mark, "missing-key", f'the subtree "{name}" needs the key "do"')
+            subtree_parser = parser if has_body else parser.make_silent_parser()
+            trees[name] = _read_subtree(name, mark, node, subtree_parser, library)
         else:
-            trees[name] = Subtree(name, mark, "", {}, None, parser.node(node, mark), library)
+            trees[name] = Subtree(name, mark, "", {}, None, parser.read_node(node, mark), library)
 
-    fields.mapping("trees", read)
+    fields.read_entries("trees", read_tree)
     return trees
 
 
-def _read_subtree(name: str, mark: Mark, node: Mapping, parser: NodeParser, library: str) -> Subtree:
-    fields = Fields(f'the subtree "{name}"', mark, node, grammar.SUBTREE, parser.findings)
+def _read_subtree(name: str, mark: Mark, node: YamlMapping, parser: NodeParser, library: str) -> Subtree:
+    fields = Fields(f'the subtree "{name}"', mark, node, grammar.SUBTREE_KEYS, parser.findings)
     args: dict[str, Argument] = {}
 
-    def read(argument: str, where: Mark, value: Node) -> None:
-        if not NAME.fullmatch(argument):
-            hint = "Write the bare name; inside, its value is $name."
-            parser.refuse(where, "bad-name", f'"{argument}" cannot name an argument', hint)
+    def read_argument(argument: str, argument_mark: Mark, value: YamlNode) -> None:
+        if not NAME_PATTERN.fullmatch(argument):
+            hint = "Write the name without $; in the subtree, $name is the value."
+            message = f'"{argument}" is no valid name of an argument'
+            parser.add_error(argument_mark, "bad-name", message, hint)
             argument = argument.removeprefix("$")
         if argument in args:
-            first = args[argument].mark.line
-            message = f'the argument "{argument}" stands here twice; the first is in line {first}'
-            parser.refuse(where, "duplicate-key", message)
-        required = isinstance(value, Scalar) and value.value is None
-        args[argument] = Argument(where, None if required else value_of(value, parser.findings))
+            first_line = args[argument].mark.line
+            message = f'the argument "{argument}" occurs twice; the first is in line {first_line}'
+            parser.add_error(argument_mark, "duplicate-key", message)
+        is_required = isinstance(value, YamlScalar) and value.value is None
+        default = None if is_required else read_value(value, parser.findings)
+        args[argument] = Argument(argument_mark, default)
 
     if isinstance(fields.get("args"), YamlSequence):
-        for item in fields.items("args"):
-            if isinstance(item, Scalar):
-                read(item.text, item.mark, Scalar(item.mark, None, ""))
+        for item in fields.list_items("args"):
+            if isinstance(item, YamlScalar):
+                read_argument(item.text, item.mark, YamlScalar(item.mark, None, ""))
             else:
-                parser.refuse(
-                    item.mark, "wrong-type", "an argument in a list is a name; for a default write a mapping"
-                )
+                message = "a list of arguments contains names only; for defaults, write a mapping"
+                parser.add_error(item.mark, "wrong-type", message)
     else:
-        fields.mapping("args", read)
-    body = parser.node(fields.get("do"), fields.key_mark("do"))
-    return Subtree(name, mark, fields.text("doc"), args, _read_returns(fields, parser), body, library)
+        fields.read_entries("args", read_argument)
+    body = parser.read_node(fields.get("do"), fields.get_key_mark("do"))
+    return Subtree(name, mark, fields.read_text("doc"), args, _read_returns(fields, parser), body, library)
 
 
 def _read_returns(fields: Fields, parser: NodeParser) -> dict[str, Mark] | None:
-    """Return the names under `returns` with their places, or None where the key is missing."""
+    """Return the names below `returns` with their positions, or None if the key is missing."""
     if fields.get("returns") is None:
         return None
     names: dict[str, Mark] = {}
-    for item in fields.items("returns"):
-        written = item.text.removeprefix("$") if isinstance(item, Scalar) else ""
-        if NAME.fullmatch(written):
-            names[written] = item.mark
+    for item in fields.list_items("returns"):
+        name = item.text.removeprefix("$") if isinstance(item, YamlScalar) else ""
+        if NAME_PATTERN.fullmatch(name):
+            names[name] = item.mark
         else:
-            parser.refuse(item.mark, "bad-name", "returns takes the names of variables, as [targets]")
+            message = "returns must be a list of names of variables, for example [targets]"
+            parser.add_error(item.mark, "bad-name", message)
     return names

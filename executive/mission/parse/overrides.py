@@ -2,85 +2,90 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping as Mapped
+from collections.abc import Mapping
 from dataclasses import replace
 
 from executive.cell.config import CellConfig
-from executive.mission.findings import Finding, alternatives, error
+from executive.mission.findings import Finding, list_choices, make_error
 from executive.mission.source import Mark, Source
-from executive.mission.text.yaml_text import Entry, Mapping, Node, Scalar, parse_yaml
+from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, parse_yaml
 
-CELL = "cell."
+CELL_PREFIX = "cell."
+"""Start of the keys of overrides for the cell."""
 
 
-def override_source(key: str, value: str) -> Source:
-    """Return the source of an override, for findings."""
+def make_override_source(key: str, value: str) -> Source:
+    """Return the source text of an override, for the positions of findings."""
     return Source("--set", f"{key}={value}")
 
 
-def override_node(key: str, value: str, as_text: bool = False) -> tuple[Node | None, list[Finding]]:
-    """Return the value of an override as a node, or None, and the findings."""
-    source = override_source(key, value)
-    whole = source.mark(1, len(key) + 2, max(1, len(value)))
-    if as_text:
-        return Scalar(whole, value, value), []
+def parse_override(key: str, value: str, is_text: bool = False) -> tuple[YamlNode | None, list[Finding]]:
+    """Return the value of an override as a YAML node, or None if it is invalid, and the findings.
+
+    With `is_text`, the value is a text and no YAML.
+    """
+    source = make_override_source(key, value)
+    mark = source.make_mark(1, len(key) + 2, max(1, len(value)))
+    if is_text:
+        return YamlScalar(mark, value, value), []
     if not value.strip():
-        return Scalar(whole, None, value), []
-    # Blanks replace the key, so that the columns of findings are correct.
+        return YamlScalar(mark, None, value), []
+    # Blanks replace `key=`, so that the columns of findings are correct.
     padded = Source("--set", " " * (len(key) + 1) + value)
-    root, findings = parse_yaml(padded)
-    shown = [replace(finding, excerpt=source.text) for finding in findings]
-    return (_move(root, whole) if root else None), shown
+    root, yaml_findings = parse_yaml(padded)
+    findings = [replace(finding, excerpt=source.text) for finding in yaml_findings]
+    return (_move(root, mark) if root else None), findings
 
 
-def override_cell(root: Node, overrides: Mapped[str, str]) -> tuple[Node, list[Finding]]:
-    """Return the nodes of a cell file with the values of all overrides `cell.<key>.<key>=value`."""
+def override_cell(root: YamlNode, overrides: Mapping[str, str]) -> tuple[YamlNode, list[Finding]]:
+    """Return the YAML tree of a cell file after all overrides `cell.<key>.<key>=value`, and the findings."""
     findings: list[Finding] = []
     for key, value in overrides.items():
-        if not key.startswith(CELL):
+        if not key.startswith(CELL_PREFIX):
             continue
-        node, override_findings = override_node(key, value)
+        node, override_findings = parse_override(key, value)
         findings += override_findings
-        path = key.removeprefix(CELL).split(".")
-        if node is not None and _is_known(root, path, node, findings):
+        path = key.removeprefix(CELL_PREFIX).split(".")
+        if node is not None and _has_section(root, path, node, findings):
             root = _set_value(root, path, node, findings)
     return root, findings
 
 
-def _is_known(root: Node, path: list[str], value: Node, findings: list[Finding]) -> bool:
-    """Return True if the cell has the section at the start of `path`; otherwise add a finding."""
-    written = root.keys if isinstance(root, Mapping) else ()
-    if len(path) == 1 or path[0] in (*written, *CellConfig.model_fields):
+def _has_section(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> bool:
+    """Return True if `path` has one key or starts with a section of cell files; otherwise add an error."""
+    keys = root.keys if isinstance(root, YamlMapping) else ()
+    if len(path) == 1 or path[0] in (*keys, *CellConfig.model_fields):
         return True
-    hint = alternatives(path[0], CellConfig.model_fields, "It has")
-    findings.append(error(value.mark, "unknown-key", f'the cell has no key "{path[0]}"', hint))
+    hint = list_choices(path[0], CellConfig.model_fields, "Keys of the cell")
+    findings.append(make_error(value.mark, "unknown-key", f'the cell has no key "{path[0]}"', hint))
     return False
 
 
-def _set_value(root: Node, path: list[str], value: Node, findings: list[Finding]) -> Node:
+def _set_value(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> YamlNode:
+    """Return the tree with `value` at `path`; unchanged, with an error, if `path` leads into a value."""
     first, *rest = path
-    if not isinstance(root, Mapping):
-        message = f'there is no key "{first}" there: the value above it is no mapping'
-        findings.append(error(value.mark, "unknown-key", message))
+    if not isinstance(root, YamlMapping):
+        message = f'there is no key "{first}", because the value of the section above is no mapping'
+        findings.append(make_error(value.mark, "unknown-key", message))
         return root
-    entry = root.entry(first)
+    entry = root.get_entry(first)
     if entry is None:
-        # The file leaves the key at its default. Validation rejects unknown keys later.
+        # The file omits the key, so that its default applies; validation reports an unknown key.
         for key in reversed(rest):
-            value = Mapping(value.mark, (Entry(Scalar(value.mark, key, key), value),))
-        return replace(root, entries=(*root.entries, Entry(Scalar(value.mark, first, first), value)))
+            value = YamlMapping(value.mark, (YamlEntry(YamlScalar(value.mark, key, key), value),))
+        return replace(root, entries=(*root.entries, YamlEntry(YamlScalar(value.mark, first, first), value)))
     if rest:
-        changed = Entry(entry.key, _set_value(entry.value, rest, value, findings))
+        changed = YamlEntry(entry.key, _set_value(entry.value, rest, value, findings))
     else:
-        changed = Entry(replace(entry.key, mark=value.mark), value)
+        changed = YamlEntry(replace(entry.key, mark=value.mark), value)
     return replace(root, entries=tuple(changed if e is entry else e for e in root.entries))
 
 
-def _move(node: Node, mark: Mark) -> Node:
-    """Return the node with `mark` as the place of all its parts."""
-    if isinstance(node, Scalar):
+def _move(node: YamlNode, mark: Mark) -> YamlNode:
+    """Return the node with `mark` as the position of all its parts."""
+    if isinstance(node, YamlScalar):
         return replace(node, mark=mark)
-    if isinstance(node, Mapping):
-        moved = tuple(Entry(replace(e.key, mark=mark), _move(e.value, mark)) for e in node.entries)
+    if isinstance(node, YamlMapping):
+        moved = tuple(YamlEntry(replace(e.key, mark=mark), _move(e.value, mark)) for e in node.entries)
         return replace(node, mark=mark, entries=moved)
     return replace(node, mark=mark, items=tuple(_move(item, mark) for item in node.items))

@@ -1,4 +1,4 @@
-"""Reader of a mission file with its libraries and its cell file."""
+"""Reading of a mission file, its libraries and its cell file."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 from executive.cell.config import CellConfig
 from executive.errors import InputError
-from executive.mission.findings import Finding, MissionError, error, in_file_order
+from executive.mission.findings import Finding, MissionError, make_error, sort_findings
 from executive.mission.model.mission import Mission, Subtree
-from executive.mission.model.values import Named
+from executive.mission.model.values import LocatedName
 from executive.mission.parse.cell_file import CellFile, read_cell
 from executive.mission.parse.mission_file import parse_library, parse_mission
 from executive.mission.parse.nodes import Skills
 from executive.mission.source import Source
-from executive.mission.text.files import below, read_source
+from executive.mission.text.files import find_file_below, read_source
 from executive.mission.text.yaml_text import parse_yaml
 from executive.tree.registry import ControlNodes
 
@@ -30,7 +30,7 @@ class MissionFiles:
         libraries: Text of each library file by its path as written in the mission.
         cell: Content of the cell file, or None if it cannot be read.
         cell_path: Path of the cell file, or None if it cannot be read.
-        findings: Errors in the form of the files.
+        findings: Errors of the parsers.
     """
 
     source: Source
@@ -42,11 +42,11 @@ class MissionFiles:
 
 
 @dataclass(frozen=True)
-class GivenCell:
+class RecordedCell:
     """Cell of a recorded run, which replaces the cell file.
 
     Attributes:
-        config: Content of the cell file, merged with bases and overrides.
+        config: Content of the cell file in the recorded run, merged with its bases and overrides.
         path: Path of the cell file in the recorded run.
     """
 
@@ -58,10 +58,10 @@ def read_mission(
     file: Path,
     overrides: Mapping[str, str],
     skills: Skills,
-    control: ControlNodes,
-    given: GivenCell | None = None,
+    node_classes: ControlNodes,
+    recorded_cell: RecordedCell | None = None,
 ) -> MissionFiles:
-    """Return the content of a mission file and of its files; a `given` cell replaces the cell file.
+    """Return the content of a mission file, its libraries, and its cell file or the recorded cell.
 
     Raises:
         MissionError: The mission file is not valid YAML.
@@ -70,76 +70,73 @@ def read_mission(
     source = read_source(file)
     root, findings = parse_yaml(source)
     if root is None:
-        raise MissionError(in_file_order(findings, source.path))
-    mission, malformed = parse_mission(root, overrides, skills, control)
-    findings += malformed
+        raise MissionError(sort_findings(findings, source.path))
+    mission, mission_findings = parse_mission(root, overrides, skills, node_classes)
+    findings += mission_findings
     trees: dict[str, Subtree] = dict(mission.trees)
-    read = {
-        named.name: _add_library(named, file.parent, skills, control, trees, findings)
-        for named in mission.libraries
+    texts = {
+        reference.name: _add_library(reference, file.parent, skills, node_classes, trees, findings)
+        for reference in mission.libraries
     }
-    texts = {name: text for name, text in read.items() if text is not None}
-    is_complete = len(texts) == len(read)
+    libraries = {name: text for name, text in texts.items() if text is not None}
+    mission = replace(mission, trees=trees, is_complete=len(libraries) == len(texts))
     cell_path: Path | None
     cell: CellFile | None
-    if given is None:
+    if recorded_cell is None:
         cell_path, cell = _read_cell_file(mission.cell, file.parent, overrides, findings)
     else:
-        cell_path, cell = given.path, CellFile(given.config, Source(str(given.path), ""), None, ())
-    return MissionFiles(
-        source,
-        replace(mission, trees=trees, is_complete=is_complete),
-        texts,
-        cell,
-        cell_path,
-        tuple(findings),
-    )
+        cell_path = recorded_cell.path
+        cell = CellFile(recorded_cell.config, Source(str(cell_path), ""), None, ())
+    return MissionFiles(source, mission, libraries, cell, cell_path, tuple(findings))
 
 
 def _add_library(
-    named: Named,
+    reference: LocatedName,
     folder: Path,
     skills: Skills,
-    control: ControlNodes,
+    node_classes: ControlNodes,
     trees: dict[str, Subtree],
     findings: list[Finding],
 ) -> str | None:
-    """Add the subtrees of a library to `trees` and return its text, or None if it cannot be read."""
+    """Add the subtrees of a library to `trees` and return its text, or None if it cannot be read.
+
+    `reference` is the path of the library, relative to `folder`.
+    """
     try:
-        source = read_source(below(folder, named.name))
+        source = read_source(find_file_below(folder, reference.name))
     except InputError as problem:
-        findings.append(error(named.mark, "no-library", str(problem)))
+        findings.append(make_error(reference.mark, "no-library", str(problem)))
         return None
     root, yaml_findings = parse_yaml(source)
     findings += yaml_findings
     if root is None:
         return None
-    library, malformed = parse_library(root, skills, control)
-    findings += malformed
+    library, library_findings = parse_library(root, skills, node_classes)
+    findings += library_findings
     for name, subtree in library.trees.items():
         if name not in trees:
             trees[name] = subtree
             continue
-        # The finding lies in the mission file: at its subtree, or at its list of libraries.
-        other, is_in_mission = trees[name], not trees[name].library
-        mark, place = (other.mark, subtree.mark) if is_in_mission else (named.mark, other.mark)
-        message = f'there are two subtrees "{name}"; the other is in {place.place(mark.source)}'
-        hint = "Rename one of them." if is_in_mission else "Leave one of the libraries out."
-        findings.append(error(mark, "duplicate-tree", message, hint))
+        # The position of the error is in the mission file: its subtree, or the path of the library.
+        first, is_in_mission = trees[name], not trees[name].library
+        mark, other_mark = (first.mark, subtree.mark) if is_in_mission else (reference.mark, first.mark)
+        message = f'there are two subtrees "{name}"; the other is in {other_mark.describe_place(mark.source)}'
+        hint = "Rename one of them." if is_in_mission else "Delete one of the libraries from the list."
+        findings.append(make_error(mark, "duplicate-tree", message, hint))
     return source.text
 
 
 def _read_cell_file(
-    named: Named, folder: Path, overrides: Mapping[str, str], findings: list[Finding]
+    reference: LocatedName, folder: Path, overrides: Mapping[str, str], findings: list[Finding]
 ) -> tuple[Path | None, CellFile | None]:
-    """Return path and content of the cell file of a mission, and add its errors to `findings`."""
-    if not named.name:
+    """Return path and content of a cell file, or None for both; add its errors to `findings`."""
+    if not reference.name:
         return None, None
     try:
-        path = below(folder, named.name)
+        path = find_file_below(folder, reference.name)
         cell = read_cell(path, overrides)
     except InputError as problem:
-        findings.append(error(named.mark, "no-cell", str(problem)))
+        findings.append(make_error(reference.mark, "no-cell", str(problem)))
         return None, None
     findings += cell.findings
     return path, cell

@@ -1,4 +1,4 @@
-"""JSON Schema of mission and library files, from the grammar and the installed skills."""
+"""JSON Schema of mission and library files, from the grammar, installed skills and control nodes."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import TypeAlias
 from executive.mission.model import grammar
 from executive.mission.model.grammar import GrammarKey
 from executive.mission.parse.control import find_inner_keys, find_shorthand_key
-from executive.mission.parse.fields import NAME
+from executive.mission.parse.fields import NAME_PATTERN
 from executive.mission.parse.params import TYPES
 from executive.mission.schema.types import (
-    ALTERNATIVE,
     DIALECT,
+    NO_ARRAY_ITEM,
     REFERENCE,
     Json,
-    failures,
-    or_reference,
-    settings,
-    words,
+    allow_reference,
+    list_failures,
+    make_name_schemas,
+    make_settings_schema,
 )
 from executive.skill import Skill
 from executive.tree.keys import Key, Kind
@@ -28,82 +28,87 @@ from executive.tree.registry import ControlNodes
 
 Skills: TypeAlias = Mapping[str, type[Skill]]
 
-_NAME = NAME.pattern
+_NAME = NAME_PATTERN.pattern
 
 
-def mission_schema(skills: Skills, control: ControlNodes) -> Json:
+def make_mission_schema(skills: Skills, node_classes: ControlNodes) -> Json:
     """Return the schema of a mission file that may use these skills and control nodes.
 
-    Its definition `library` is that of library files.
+    Its definition `library` is the schema of a library file.
     """
-    return _file("A mission", grammar.MISSION, skills, control)
+    return _make_file_schema("A mission", grammar.MISSION_KEYS, skills, node_classes)
 
 
-def library_schema(skills: Skills, control: ControlNodes) -> Json:
+def make_library_schema(skills: Skills, node_classes: ControlNodes) -> Json:
     """Return the schema of a library file whose subtrees may use these skills and control nodes."""
-    return _file("A library", grammar.LIBRARY, skills, control)
+    return _make_file_schema("A library", grammar.LIBRARY_KEYS, skills, node_classes)
 
 
-def _file(title: str, keys: Mapping[str, GrammarKey], skills: Skills, control: ControlNodes) -> Json:
-    forms = {word: _form(kind) for word, kind in control.items()}
-    forms[grammar.USE] = {"title": grammar.USE, "description": "A subtree by its name.", **_KINDS["word"]}
+def _make_file_schema(
+    title: str, keys: Mapping[str, GrammarKey], skills: Skills, node_classes: ControlNodes
+) -> Json:
+    control_nodes = {word: _make_control_node_schema(node_class) for word, node_class in node_classes.items()}
+    use = {"title": grammar.USE_KEYWORD, "description": "A subtree by its name.", **_SCHEMAS_BY_KIND["word"]}
+    subtree = {"title": "A subtree", **_make_mapping_schema(grammar.SUBTREE_KEYS)}
     return {
         "$schema": DIALECT,
         "title": title,
-        **_mapping(keys),
+        **_make_mapping_schema(keys),
         "definitions": {
-            "node": _node(skills, control),
-            "tree": {"anyOf": [_ref("node"), {"title": "A subtree", **_mapping(grammar.SUBTREE)}]},
-            "param": _param(),
-            "library": _mapping(grammar.LIBRARY),
-            "reasons": _reasons(skills),
+            "node": _make_node_schema(skills, node_classes),
+            "tree": {"anyOf": [_refer("node"), subtree]},
+            "param": _make_param_schema(),
+            "library": _make_mapping_schema(grammar.LIBRARY_KEYS),
+            "reasons": _make_reasons_schema(skills),
             "label": {"type": "string", "pattern": f"^{grammar.LABEL_PATTERN}$"},
             "reference": {"title": "$name", "type": "string", "pattern": rf"^\${_NAME}$"},
-            **{name: settings(name, skill) for name, skill in skills.items()},
-            **forms,
+            **{name: make_settings_schema(name, skill) for name, skill in skills.items()},
+            **control_nodes,
+            grammar.USE_KEYWORD: use,
         },
     }
 
 
-def _node(skills: Skills, control: ControlNodes) -> Json:
-    """Return the schema of a node: a word, a list, or a mapping with one head and its siblings.
+def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Json:
+    """Return the schema of a node: a word, a list, or a mapping with one head and its sibling keys.
 
-    The head selects the schema of a mapping, without alternatives, so that an editor marks the invalid key
-    and completes the valid keys.
+    The head is the skill or keyword. It selects the schema of the mapping by `dependencies`: unlike with
+    alternatives, an editor can then mark each invalid key and complete the valid keys.
     """
-    label: Json = {**_ref("label"), "description": grammar.AS.doc}
-    heads = [*skills, *control, grammar.USE]
-    bodiless = [
-        {"const": word, "title": word, "description": _sentence(kind), **ALTERNATIVE}
-        for word, kind in control.items()
-        if (bare := find_shorthand_key(kind)) is not None and not bare.is_required
+    label: Json = {**_refer("label"), "description": grammar.LABEL_KEY.doc}
+    heads = [*skills, *node_classes, grammar.USE_KEYWORD]
+    nodes_without_body = [
+        {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ARRAY_ITEM}
+        for word, node_class in node_classes.items()
+        if (shorthand := find_shorthand_key(node_class)) is not None and not shorthand.is_required
     ]
-    siblings: dict[str, Json] = {grammar.USE: _properties(grammar.USE_SIBLINGS)}
-    demands: dict[str, Json] = {}
-    for word, kind in control.items():
-        beside = {name: key for name, key in kind.keys.items() if key.is_sibling}
-        siblings[word] = {name: _key(key) for name, key in beside.items()}
-        demands[word] = _any_of(kind.any_of) if set(kind.any_of) & set(beside) else {}
+    siblings: dict[str, Json] = {grammar.USE_KEYWORD: _make_properties(grammar.USE_SIBLINGS)}
+    requirements: dict[str, Json] = {}
+    for word, node_class in node_classes.items():
+        keys = {name: key for name, key in node_class.keys.items() if key.is_sibling}
+        siblings[word] = {name: _make_key_schema(key) for name, key in keys.items()}
+        any_of = node_class.any_of
+        requirements[word] = _require_any_of(any_of) if set(any_of) & set(keys) else {}
     return {
         "title": "A node",
         "anyOf": [
-            *words(skills),
-            *bodiless,
-            {"type": "array", "items": _ref("node"), **ALTERNATIVE},
-            {"type": "object", **ALTERNATIVE},
+            *make_name_schemas(skills),
+            *nodes_without_body,
+            {"type": "array", "items": _refer("node"), **NO_ARRAY_ITEM},
+            {"type": "object", **NO_ARRAY_ITEM},
         ],
         "minItems": 1,
         "dependencies": {
             head: {
-                "properties": {head: _ref(head), "as": label, **siblings.get(head, {})},
+                "properties": {head: _refer(head), "as": label, **siblings.get(head, {})},
                 "additionalProperties": False,
-                **demands.get(head, {}),
+                **requirements.get(head, {}),
             }
             for head in heads
         },
         "if": {"anyOf": [{"required": [head]} for head in heads]},
         "else": {
-            "properties": {**{head: _ref(head) for head in heads}, "as": label},
+            "properties": {**{head: _refer(head) for head in heads}, "as": label},
             "additionalProperties": False,
             "minProperties": 1,
             "dependencies": {"as": {"minProperties": 2}},
@@ -111,95 +116,100 @@ def _node(skills: Skills, control: ControlNodes) -> Json:
     }
 
 
-def _form(kind: type[ControlNode]) -> Json:
-    """Return the schema of the value under the keyword of a control node."""
-    bare, inner = find_shorthand_key(kind), find_inner_keys(kind)
-    shapes = [_value_of(bare)] if bare else []
-    if inner:
-        demand = _any_of(kind.any_of) if set(kind.any_of) <= set(inner) else {}
-        shapes.append({**_object(inner), **demand})
-    whole = shapes[0] if len(shapes) == 1 else {"anyOf": shapes}
-    return {"title": kind.keyword, "description": _sentence(kind), **whole}
+def _make_control_node_schema(node_class: type[ControlNode]) -> Json:
+    """Return the schema of the value of the keyword of a control node."""
+    shorthand, inner_keys = find_shorthand_key(node_class), find_inner_keys(node_class)
+    alternatives = [_make_value_schema(shorthand)] if shorthand else []
+    if inner_keys:
+        any_of = node_class.any_of
+        requirement = _require_any_of(any_of) if set(any_of) <= set(inner_keys) else {}
+        alternatives.append({**_make_section_schema(inner_keys), **requirement})
+    value = alternatives[0] if len(alternatives) == 1 else {"anyOf": alternatives}
+    return {"title": node_class.keyword, "description": _get_first_line(node_class), **value}
 
 
-def _sentence(kind: type[ControlNode]) -> str:
-    return (inspect.getdoc(kind) or "").partition("\n")[0]
+def _get_first_line(node_class: type[ControlNode]) -> str:
+    """Return the first line of the docstring of a control node."""
+    return (inspect.getdoc(node_class) or "").partition("\n")[0]
 
 
-def _object(keys: Mapping[str, Key]) -> Json:
+def _make_section_schema(keys: Mapping[str, Key]) -> Json:
     return {
         "type": "object",
-        "properties": {name: _key(key) for name, key in keys.items()},
+        "properties": {name: _make_key_schema(key) for name, key in keys.items()},
         "required": [name for name, key in keys.items() if key.is_required],
         "additionalProperties": False,
     }
 
 
-def _key(key: Key) -> Json:
-    return {"description": key.doc, **_value_of(key)}
+def _make_key_schema(key: Key) -> Json:
+    return {"description": key.doc, **_make_value_schema(key)}
 
 
-def _value_of(key: Key) -> Json:
+def _make_value_schema(key: Key) -> Json:
     """Return the schema of the value of a key of a control node."""
     match key.kind:
         case Kind.NODE:
-            is_needed = key.is_required or not key.is_shorthand
-            return _ref("node") if is_needed else {"allOf": [{"anyOf": [_ref("node"), {"type": "null"}]}]}
+            node = _refer("node")
+            may_be_empty = key.is_shorthand and not key.is_required
+            return {"allOf": [{"anyOf": [node, {"type": "null"}]}]} if may_be_empty else node
         case Kind.NODES:
-            return _KINDS["nodes"]
+            return _SCHEMAS_BY_KIND["nodes"]
         case Kind.REASONS:
-            return _ref("reasons")
+            return _refer("reasons")
         case Kind.VARIABLE:
-            return _KINDS["word"]
+            return _SCHEMAS_BY_KIND["word"]
         case Kind.ELEMENTS:
-            return _KINDS["list"]
+            return _SCHEMAS_BY_KIND["list"]
         case Kind.SECTIONS:
-            section = _object(key.section.keys)
+            section = _make_section_schema(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}
         case Kind.SECTION:
-            section, bare = _object(key.section.keys), find_shorthand_key(key.section)
-            if bare is None:
+            section, shorthand = _make_section_schema(key.section.keys), find_shorthand_key(key.section)
+            if shorthand is None:
                 return section
-            written = bare.make_validator().json_schema()
-            return or_reference({**section, **written, "type": [written["type"], "object"]})
-    written = key.make_validator().json_schema()
-    return or_reference(*written.get("anyOf", [written]))
+            value = shorthand.make_validator().json_schema()
+            return allow_reference({**section, **value, "type": [value["type"], "object"]})
+    constant = key.make_validator().json_schema()
+    return allow_reference(*constant.get("anyOf", [constant]))
 
 
-def _any_of(keys: Sequence[str]) -> Json:
+def _require_any_of(keys: Sequence[str]) -> Json:
     """Return the schema that requires at least one of these keys."""
     return {"anyOf": [{"required": [key]} for key in keys]} if keys else {}
 
 
-def _reasons(skills: Skills) -> Json:
-    one = [
-        {"title": "Skill.reason", "enum": failures(skills)},
+def _make_reasons_schema(skills: Skills) -> Json:
+    """Return the schema of one reason, or of a list of reasons."""
+    reason = [
+        {"title": "Skill.reason", "enum": list_failures(skills)},
         {"title": "label.reason", "type": "string", "pattern": rf"^{grammar.LABEL_PATTERN}\.{_NAME}$"},
     ]
-    several = {"title": "list", "type": "array", "items": {"anyOf": one}, "minItems": 1}
-    return {"anyOf": [*one, several]}
+    reasons = {"title": "list", "type": "array", "items": {"anyOf": reason}, "minItems": 1}
+    return {"anyOf": [*reason, reasons]}
 
 
-def _param() -> Json:
-    declared = _mapping(grammar.PARAM)
-    declared["properties"]["type"]["enum"] = list(TYPES)
-    return {**declared, "type": ["object", "array", "string", "number", "boolean", "null"]}
+def _make_param_schema() -> Json:
+    declaration = _make_mapping_schema(grammar.PARAM_KEYS)
+    declaration["properties"]["type"]["enum"] = list(TYPES)
+    return {**declaration, "type": ["object", "array", "string", "number", "boolean", "null"]}
 
 
-def _mapping(keys: Mapping[str, GrammarKey]) -> Json:
+def _make_mapping_schema(keys: Mapping[str, GrammarKey]) -> Json:
     return {
         "type": "object",
-        "properties": _properties(keys),
-        "required": [name for name, key in keys.items() if key.required],
+        "properties": _make_properties(keys),
+        "required": [name for name, key in keys.items() if key.is_required],
         "additionalProperties": False,
     }
 
 
-def _properties(keys: Mapping[str, GrammarKey]) -> Json:
-    return {name: {"description": key.doc, **_KINDS[key.kind]} for name, key in keys.items()}
+def _make_properties(keys: Mapping[str, GrammarKey]) -> Json:
+    return {name: {"description": key.doc, **_SCHEMAS_BY_KIND[key.kind]} for name, key in keys.items()}
 
 
-def _ref(name: str) -> Json:
+def _refer(name: str) -> Json:
+    """Return the schema that refers to the definition with a name."""
     return {"$ref": f"#/definitions/{name}"}
 
 
@@ -212,27 +222,28 @@ def _map_names_to(value: Json) -> Json:
     }
 
 
-def _one_or_several(text: Json) -> Json:
+def _allow_list(text: Json) -> Json:
+    """Return the schema of a text with the schema `text`, or of a list of such texts."""
     return {**text, "type": ["string", "array"], "items": {"type": "string", **text}, "minItems": 1}
 
 
 _WORD: Json = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
 
-_KINDS: Mapping[str, Json] = {
-    "node": _ref("node"),
-    "nodes": {"type": "array", "items": _ref("node"), "minItems": 1},
+_SCHEMAS_BY_KIND: Mapping[str, Json] = {
+    "node": _refer("node"),
+    "nodes": {"type": "array", "items": _refer("node"), "minItems": 1},
     "number": {"type": "number"},
     "text": {"type": ["string", "number", "boolean"]},
     "word": {"type": "string", **_WORD},
-    "words": {**_one_or_several({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
-    "list": or_reference({"type": "array"}),
+    "words": {**_allow_list({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
+    "list": allow_reference({"type": "array"}),
     "value": {},
     "values": _map_names_to({}),
     "variables": _map_names_to(REFERENCE),
-    "paths": _one_or_several({}),
-    "params": _map_names_to(_ref("param")),
-    "routes": {"type": ["object", "null"], "additionalProperties": _one_or_several({})},
-    "trees": _map_names_to(_ref("tree")),
+    "paths": _allow_list({}),
+    "params": _map_names_to(_refer("param")),
+    "routes": {"type": ["object", "null"], "additionalProperties": _allow_list({})},
+    "trees": _map_names_to(_refer("tree")),
     "args": {**_map_names_to({}), "type": ["object", "array", "null"], "items": {"type": "string", **_WORD}},
 }
-"""Content of a key, by its kind."""
+"""Schema of the value of a key, by `GrammarKey.kind`."""

@@ -1,1 +1,1 @@
-"""Files and their YAML text, with the places of all values."""
+"""Search for files, and parsing of their YAML text to nodes with positions."""

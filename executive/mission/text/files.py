@@ -1,4 +1,4 @@
-"""Search for the files of a mission: in its folder and among the shipped files."""
+"""Search for the files of a mission in its folder and among the shipped files."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from pathlib import Path, PurePosixPath
 import executive
 from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
-from executive.mission.findings import alternatives
+from executive.mission.findings import list_choices
 from executive.mission.source import Source
 
 _MAX_FILE_SIZE = 1_000_000
 """Maximum size of a mission or cell file [byte]."""
 
 
-def shipped_folder() -> Path:
+def get_shipped_folder() -> Path:
     """Return the folder of the shipped missions, in a wheel or in a checkout."""
     package = Path(executive.__file__).parent
     installed = package / "shipped"
     return installed if installed.is_dir() else package.parent / "missions"
 
 
-def shipped_missions() -> list[str]:
+def list_shipped_missions() -> list[str]:
     """Return the names of the shipped missions."""
-    return sorted(path.stem for path in shipped_folder().glob("*.yaml"))
+    return sorted(path.stem for path in get_shipped_folder().glob("*.yaml"))
 
 
 def find_mission(name: str | Path) -> Path:
@@ -39,44 +39,44 @@ def find_mission(name: str | Path) -> Path:
     if os.path.isfile(path):
         return path
     if os.path.isdir(path):
-        raise InputError(f'"{name}" is a folder; name one of its files')
+        raise InputError(f'"{name}" is a folder; give the path of one of its files')
     if os.path.lexists(path):
         raise InputError(f'"{name}" is {_describe_kind(path)}, not a file')
-    bare = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
-    if len(bare.parts) == 1 and os.path.isfile(shipped := shipped_folder() / f"{bare}.yaml"):
+    stem = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
+    if len(stem.parts) == 1 and os.path.isfile(shipped := get_shipped_folder() / f"{stem}.yaml"):
         return shipped
-    hint = alternatives(str(bare), shipped_missions(), "Shipped missions")
-    raise InputError(f'there is no mission file "{name}", and no shipped mission of that name. {hint}')
+    hint = list_choices(str(stem), list_shipped_missions(), "Shipped missions")
+    raise InputError(f'there is no mission file and no shipped mission "{name}". {hint}')
 
 
-def below(folder: Path, reference: str, shipped: Sequence[str] = ("",)) -> Path:
-    """Return the file `reference` below `folder`, or else below one of the `shipped` folders.
+def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[str] = ("",)) -> Path:
+    """Return the file with the relative path `reference` in `folder`, or else in the shipped subfolders.
 
     Raises:
         InputError: The reference leaves the folder, or the file does not exist.
     """
     if is_outside_path(reference):
         raise InputError(
-            f'"{reference}" is not below the folder of the file that names it; '
+            f'"{reference}" is outside the folder of the file that names it; '
             'give a relative path without ".."'
         )
-    bases = (folder, *(shipped_folder() / part for part in shipped))
-    for base in bases:
-        path = base / reference
+    roots = (folder, *(get_shipped_folder() / subfolder for subfolder in shipped_subfolders))
+    for root in roots:
+        path = root / reference
         if os.path.isfile(path):
-            if has_outside_link(base, reference):
-                raise InputError(f'"{reference}" is a link to a file outside of {base}')
+            if has_outside_link(root, reference):
+                raise InputError(f'"{reference}" is a link to a file outside {root}')
             return path
         if os.path.lexists(path):
-            raise InputError(f'"{reference}" in {_shorten_path(base)} is {_describe_kind(path)}, not a file')
-    folders = [
-        (base, base / PurePosixPath(reference).parent)
-        for base in bases
-        if os.path.isdir(base / PurePosixPath(reference).parent)
+            raise InputError(f'"{reference}" in {_shorten_path(root)} is {_describe_kind(path)}, not a file')
+    parents = [
+        (root, root / PurePosixPath(reference).parent)
+        for root in roots
+        if os.path.isdir(root / PurePosixPath(reference).parent)
     ]
-    known = {p.relative_to(base).as_posix() for base, folder in folders for p in folder.glob("*.yaml")}
-    hint = alternatives(reference, sorted(known), "There are")
-    searched = " or ".join(dict.fromkeys(map(_shorten_path, bases)))
+    known = {p.relative_to(root).as_posix() for root, parent in parents for p in parent.glob("*.yaml")}
+    hint = list_choices(reference, sorted(known), "Existing files")
+    searched = " or ".join(dict.fromkeys(map(_shorten_path, roots)))
     raise InputError(f'there is no file "{reference}" in {searched}. {hint}')
 
 
@@ -91,13 +91,13 @@ def read_source(path: Path) -> Source:
             raise InputError(f"{path} is {_describe_kind(path)}, not a file")
         if path.stat().st_size > _MAX_FILE_SIZE:
             raise InputError(
-                f"{path} is larger than {_MAX_FILE_SIZE} bytes; it cannot be a mission or a cell"
+                f"{path} is larger than {_MAX_FILE_SIZE} bytes, the maximum size of a mission or a cell"
             )
         return Source(_shorten_path(path), path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"there is no file {path}") from None
     except UnicodeDecodeError as problem:
-        raise InputError(f"{path} is not UTF-8 text: byte {problem.start} does not fit") from None
+        raise InputError(f"{path} is not UTF-8 text: byte {problem.start} is invalid") from None
     except OSError as problem:
         raise InputError(f"{path} cannot be read: {problem.strerror}") from None
 
@@ -110,9 +110,9 @@ def _describe_kind(path: str | Path) -> str:
 
 
 def _shorten_path(path: Path) -> str:
-    """Return the path relative to the working directory if it lies below."""
+    """Return the path relative to the working directory, or unchanged if it is outside this directory."""
     try:
-        here = Path.cwd()
+        cwd = Path.cwd()
     except FileNotFoundError:  # The working directory was deleted.
         return str(path)
-    return str(path.relative_to(here)) if path.is_absolute() and path.is_relative_to(here) else str(path)
+    return str(path.relative_to(cwd)) if path.is_absolute() and path.is_relative_to(cwd) else str(path)

@@ -1,6 +1,6 @@
 """Values of plain YAML scalars by the core schema of YAML 1.2.2 (section 10.3.2).
 
-PyYAML follows YAML 1.1, where `no` is false, `1e-3` a text, `12:30` the number 750 and `010` eight.
+PyYAML implements YAML 1.1, in which `no` is false, `1e-3` a text, `12:30` the number 750 and `010` eight.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _INFINITE = re.compile(r"[-+]?\.(inf|Inf|INF)")
 _NAN = frozenset({".nan", ".NaN", ".NAN"})
 _MAX_NUMBER_LENGTH = 300
+"""Maximum number of characters of a number; a longer scalar is a text."""
 
 ScalarValue = None | bool | int | float | str
 
 
-def core_value(text: str) -> ScalarValue:
+def convert_scalar(text: str) -> ScalarValue:
     """Return the value of a plain scalar: None, a boolean, a number, or the text itself."""
     if text in _NULL:
         return None
@@ -32,9 +33,9 @@ def core_value(text: str) -> ScalarValue:
     if text[0] not in "+-.0123456789" or len(text) > _MAX_NUMBER_LENGTH:
         return text
     if _INTEGER.fullmatch(text):
-        return _limit_integer(int(text))
+        return _convert_large_integer(int(text))
     if _PREFIXED_INTEGER.fullmatch(text):
-        return _limit_integer(int(text, base=0))
+        return _convert_large_integer(int(text, base=0))
     if _FLOAT.fullmatch(text):
         return float(text)
     if _INFINITE.fullmatch(text):
@@ -42,7 +43,7 @@ def core_value(text: str) -> ScalarValue:
     return float("nan") if text in _NAN else text
 
 
-def _limit_integer(number: int) -> int | float:
+def _convert_large_integer(number: int) -> int | float:
     """Return an integer of at most 64 bits unchanged, and a larger integer as a float, as in JSON."""
     if -(2**63) <= number < 2**63:
         return number

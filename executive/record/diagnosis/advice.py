@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from executive.errors import Unavailable
-from executive.mission.model.instance import node_of
+from executive.mission.model.instance import get_mission_node
 from executive.mission.model.nodes import InnerNode
 from executive.mission.model.values import Literal
 from executive.record.diagnosis.failed_run import FailedRun
@@ -87,7 +87,7 @@ def _list_changes(run: FailedRun) -> Iterator[str]:
 
 def _format_advice(run: FailedRun, entry: FailurePathNode, advice: Advice) -> str:
     """Return advice with the place of the change: option `--set` for a param, else the line of the node."""
-    changed_node = node_of(advice.child) if advice.child else entry.node
+    changed_node = get_mission_node(advice.child) if advice.child else entry.node
     value = entry.node.values.get(advice.key) if isinstance(entry.node, InnerNode) else None
     params = run.loaded.mission.params.items() if isinstance(value, Literal) else ()
     name = next((name for name, param in params if param.value.mark == getattr(value, "mark", None)), "")

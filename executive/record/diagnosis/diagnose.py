@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from executive.events import RunEnded
 from executive.mission.model.nodes import Node, SkillNode
-from executive.mission.model.paths import name_of
+from executive.mission.model.paths import get_path_name
 from executive.record.diagnosis.advice import give_advice
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
 from executive.record.diagnosis.failed_run import FailedRun, describe_cause
@@ -108,7 +108,7 @@ def _make_deciding_node(run: FailedRun) -> DecidingNode | None:
     node = run.deciding_node
     if node is None:
         return None
-    name = run.name_skill(node.path) if isinstance(node, SkillNode) else name_of(node)
+    name = run.name_skill(node.path) if isinstance(node, SkillNode) else get_path_name(node)
     return DecidingNode(node.path, name, _format_place(node))
 
 

@@ -63,7 +63,7 @@ class FailedRun:
 
     def format_place(self, node: Node) -> str:
         """Return the line of a node in its file, with the file if this is not the mission file."""
-        return node.mark.place(self.loaded.tree.mark.source)
+        return node.mark.describe_place(self.loaded.tree.mark.source)
 
 
 def describe_cause(run: FailedRun) -> str:

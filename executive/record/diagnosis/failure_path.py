@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from executive.mission.model.instance import inspection_instance, node_of
+from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, UseNode
-from executive.mission.model.paths import name_of
+from executive.mission.model.paths import get_path_name
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 from executive.tree.failure import Reason
@@ -37,7 +37,7 @@ class FailurePathNode:
     @property
     def name(self) -> str:
         """Name of the node with its subtree: `look: retry`."""
-        name = name_of(self.node)
+        name = get_path_name(self.node)
         return f"{self.subtree}: {name}" if self.subtree else name
 
     @property
@@ -68,7 +68,7 @@ def trace_failure(tree: Node, timeline: Timeline, origin: str, failure: str) -> 
         node = nodes[index]
         child = nodes[index + 1] if index + 1 < len(nodes) else None
         subtree = next((use.name for use in reversed(nodes[:index]) if isinstance(use, UseNode)), "")
-        model = inspection_instance(node) if isinstance(node, InnerNode) else None
+        model = make_inspection_instance(node) if isinstance(node, InnerNode) else None
         reasons = frozenset(Reason(name, reason) for name in names)
         propagated = _make_propagated_failure(timeline, node, model, child, reasons)
         failure_path.append(FailurePathNode(node, subtree, model, propagated))
@@ -84,11 +84,11 @@ def _make_propagated_failure(
     children = [child for key in model.keys for child in model.list_children(key)] if model else []
 
     def has_failed(child: Child) -> bool:
-        last = timeline.nodes.get(node_of(child).path)
+        last = timeline.nodes.get(get_mission_node(child).path)
         return last is not None and last.number > activation.number and last.status == "FAILURE"
 
     return PropagatedFailure(
-        next((each for each in children if node_of(each) is child), None),
+        next((each for each in children if get_mission_node(each) is child), None),
         activation.reason, reasons, activation.handled_counts, activation.message_by_reason,
         activation.last_handled, activation.choice, activation.end - activation.start, has_failed,
     )  # fmt: skip

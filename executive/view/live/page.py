@@ -20,7 +20,7 @@ from executive.cell.frame import Frame, FrameCaptured
 from executive.cell.visuals import Visuals
 from executive.errors import InputError
 from executive.events import FrameSearched, InputRead, TimedEvent
-from executive.mission.outline import outline
+from executive.mission.outline import make_outline
 from executive.processes import build_command
 from executive.record.result import Result
 from executive.run.run import Run
@@ -104,7 +104,7 @@ class LivePage:
 
     def open(self, run: Run) -> None:
         """Show the tree and the scene of a run, and start to send the state of the run."""
-        nodes = outline(run.root)
+        nodes = make_outline(run.root)
         mission = run.mission
         self._run = run
         with self._record_errors():

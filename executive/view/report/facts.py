@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from executive.mission.text.files import shipped_folder
+from executive.mission.text.files import get_shipped_folder
 from executive.record.diagnosis.text import make_resume_command
 from executive.record.journal import find_end, find_start, read_journal
 from executive.record.recorded_mission import read_tree
@@ -62,7 +62,7 @@ class ReportFacts:
         self.pictures = collect_pictures(directory.pictures, [item.item for item in items])
         self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
-        mission = file.stem if file.parent == shipped_folder() else str(file)
+        mission = file.stem if file.parent == get_shipped_folder() else str(file)
         options = mission, self.start.seed, self.start.overrides
         self.repeat_command = format_repeat_command(*options, self.requests, directory.scene)
         self.resume_command = "" if self.status in FINAL_STATUSES else make_resume_command(str(path))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TextIO
 
 from executive import events
-from executive.mission.outline import outline
+from executive.mission.outline import make_outline
 from executive.record.timeline.timeline import Timeline
 from executive.view.tree.outline import find_skill_names
 
@@ -33,7 +33,7 @@ class LineView:
 
     def open(self, run: Run) -> None:
         """Store the names of the nodes of a run."""
-        nodes = outline(run.root)
+        nodes = make_outline(run.root)
         self._names_by_path = {node.path: node.name for node in nodes}
         self._skill_names_by_path = find_skill_names(nodes)
 

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from executive.errors import escape_control_characters
 from executive.events import OperatorAsked, RequestGiven, TimedEvent
-from executive.mission.outline import OutlineNode, outline
+from executive.mission.outline import OutlineNode, make_outline
 from executive.record.timeline.timeline import Timeline
 from executive.run.run import Run
 from executive.run.run_control import RunControl
@@ -58,7 +58,7 @@ class TerminalView:
 
     def open(self, run: Run) -> None:
         """Show the view of a run, and start to read keys that control the run."""
-        self._nodes = outline(run.root)
+        self._nodes = make_outline(run.root)
         self._control = run.control
         if self._keyboard is not None:
             self._key_reader = KeyReader(self._keyboard, run.control)

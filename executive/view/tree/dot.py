@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from executive.mission.outline import OutlineNode, children
+from executive.mission.outline import OutlineNode, list_child_indices
 from executive.tree.node import ControlNode
 from executive.view.text import replace_invalid_characters
 from executive.view.tree.card import make_card
@@ -12,7 +12,7 @@ from executive.view.tree.card import make_card
 
 def draw_dot(nodes: Sequence[OutlineNode], name: str) -> str:
     """Return a tree as the text of a Graphviz digraph with the name `name`; each subtree is a cluster."""
-    child_lists = children(nodes)
+    child_lists = list_child_indices(nodes)
     lines = [
         f"digraph {_quote(name)} {{",
         '  ordering=out; nodesep=0.15; fontname="sans-serif"; fontsize=11;',

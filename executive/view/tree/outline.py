@@ -5,8 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Collection, Iterator, Sequence
 
-from executive.mission.model.grammar import USE
-from executive.mission.outline import Connection, OutlineNode, children
+from executive.mission.model.grammar import USE_KEYWORD
+from executive.mission.outline import Connection, OutlineNode, list_child_indices
 
 MAX_LINE_LENGTH = 100
 """Maximum length of a line [characters]."""
@@ -24,7 +24,9 @@ def draw_outline(nodes: Sequence[OutlineNode], *, ports: bool = False, reasons: 
         reasons: True to write the failure reasons of a skill and of a handler below the node.
     """
     lines = []
-    for node, prefix, node_children in zip(nodes, draw_line_prefixes(nodes), children(nodes), strict=True):
+    for node, prefix, node_children in zip(
+        nodes, draw_line_prefixes(nodes), list_child_indices(nodes), strict=True
+    ):
         margin = prefix.replace("├─", "│ ").replace("└─", "  ") + ("│  " if node_children else "   ")
         detail = f"  ({node.detail})" if node.detail else ""
         lines += _wrap_line(f"{node.name}{detail}", prefix, margin)
@@ -64,7 +66,7 @@ def draw_line_prefixes(nodes: Sequence[OutlineNode]) -> list[str]:
 
 def find_skill_names(nodes: Sequence[OutlineNode]) -> dict[str, str]:
     """Return the names of the skills by path, each without the key of its parent (`recover: Grasp`)."""
-    leaves = (node for node, below in zip(nodes, children(nodes), strict=True) if not below)
+    leaves = (node for node, below in zip(nodes, list_child_indices(nodes), strict=True) if not below)
     return {node.path: node.name.rpartition(": ")[2] for node in leaves}
 
 
@@ -139,6 +141,6 @@ def _make_use(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
     """Return a node with the name of a subtree, which replaces the subtree whose first node is `node`."""
     outer = node.subtrees[: node.subtrees.index(subtree)]
     return OutlineNode(
-        node.path, node.name, node.depth, detail, USE, subtree, node.slot, node.when, outer, symbol="…",
-        shape="ellipse",
+        node.path, node.name, node.depth, detail, USE_KEYWORD, subtree, node.slot, node.when, outer,
+        symbol="…", shape="ellipse",
     )  # fmt: skip

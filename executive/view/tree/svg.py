@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from executive.mission.outline import OutlineNode, children
+from executive.mission.outline import OutlineNode, list_child_indices
 from executive.view.text import fit_text, measure_text, render_template
 from executive.view.tree.card import MAX_LINE_LENGTH, Card, make_card
 from executive.view.tree.layout import FRAME_PADDING, Layout, NodeSize, compute_layout
@@ -49,7 +49,7 @@ def draw_svg(nodes: Sequence[OutlineNode], name: str, notes: Mapping[str, NodeNo
         name: Name of the mission, for the title.
         notes: Results of nodes, by path of the node.
     """
-    child_lists = children(nodes)
+    child_lists = list_child_indices(nodes)
     parents = {child: parent for parent, child_list in enumerate(child_lists) for child in child_list}
     cards = [make_card(node) for node in nodes]
     node_notes = [notes.get(node.path, NodeNote()) for node in nodes]

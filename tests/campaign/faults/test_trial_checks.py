@@ -21,14 +21,14 @@ from executive.campaign.faults.trial_checks import (
 from executive.cell.frame import FrameCaptured
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, RunEnded
-from executive.mission.flow.endings import Ending
+from executive.mission.flow.unhandled_failures import UnhandledFailure
 from executive.testing.faults.world_access import TrueObject
 
 BUG = PlannedFault(
     "tree/Grasp", "Grasp", "", "raises", "first", "", skill_faults=(SkillFault("tree/Grasp", "raises"),)
 )
 MISS = PlannedFault("tree/Grasp", "Grasp", "", "missed", "first", "", is_failure_reason=True)
-ENDINGS = (Ending("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
+ENDINGS = (UnhandledFailure("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "skipped": 0, "lost": 0, "phantom": 0}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
 

@@ -13,7 +13,7 @@ from executive.cell.json_values import to_json
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import Event, FaultInjected, RequestGiven, RunResumed
-from executive.mission.text.files import shipped_folder
+from executive.mission.text.files import get_shipped_folder
 from executive.plugins import discover
 from executive.record.journal_format import encode_event
 from executive.record.recorded_run import RecordOptions
@@ -89,7 +89,7 @@ def test_a_result_that_is_none_tells_nothing(failed, copy, content):
 def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(done, copy):
     run = copy(done)
     start, *others = (run / "journal.jsonl").read_text().splitlines()
-    shipped = json.loads(start) | {"file": str(shipped_folder() / "sort_fruit.yaml"), "overrides": {}}
+    shipped = json.loads(start) | {"file": str(get_shipped_folder() / "sort_fruit.yaml"), "overrides": {}}
     (run / "journal.jsonl").write_text("\n".join([json.dumps(shipped), *others]) + "\n")
     append(run, 420, RequestGiven("apple"))
     append(run, 432, FaultInjected("object removed", "", "", "", []))

@@ -14,7 +14,7 @@ from py_trees.behaviour import Behaviour
 from rich.console import Console
 
 from executive.events import BranchChosen, NodeEnded, NodeStarted, TimedEvent
-from executive.mission.outline import outline
+from executive.mission.outline import make_outline
 from executive.record.result import Result
 from executive.run.run_control import RunControl
 from executive.view.terminal.lines import LineView
@@ -50,7 +50,7 @@ def failed(node: str, clock: float = 1.0, **fields) -> TimedEvent:
 
 
 def test_skills_are_the_leaves_and_what_rests_is_folded():
-    nodes = outline(TREE)
+    nodes = make_outline(TREE)
     leaves = {"tree/sort/repeat/Detect": "Detect", GRASP: "Grasp", "tree/sort/Release": "Release"}
     assert find_skill_names(nodes) == leaves
     assert [node.path for node in select_running(nodes, set())] == ["tree/sort"]

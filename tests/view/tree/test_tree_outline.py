@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from py_trees.behaviour import Behaviour
 
-from executive.mission.outline import Connection, OutlineNode, children, outline
+from executive.mission.outline import Connection, OutlineNode, list_child_indices, make_outline
 from executive.skill import In, Metres, Out, Skill, param, port
 from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Reason
@@ -65,7 +65,7 @@ def tree() -> Behaviour:
 
 
 def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
-    (node,) = outline(pick("tree/Pick"))
+    (node,) = make_outline(pick("tree/Pick"))
     assert (node.kind, node.title, node.skill, node.doc) == ("skill", "Pick", "Pick", "Take something.")
     assert node.params == {"height": 0.2}
     assert node.reads == (Connection("seen", "seen", True), Connection("only", "item", False))
@@ -74,23 +74,23 @@ def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
 
 
 def test_every_node_knows_its_children_what_it_is_to_its_parent_and_which_subtree_begins_with_it():
-    nodes = outline(tree())
+    nodes = make_outline(tree())
     look, taken = ("sequence", ("look",)), ("", "Pick", ())
     assert [(node.slot, node.title, node.subtrees) for node in nodes] == [
         ("", "try", ()), ("do", "retry", ()), ("recover", *look), taken, ("do", "Pick", ()),
         ("catch 1", *look), taken, ("finally", *look), taken,
     ]  # fmt: skip
-    assert children(nodes) == [[1, 5, 7], [2, 4], [3], [], [], [6], [], [8], []]
+    assert list_child_indices(nodes) == [[1, 5, 7], [2, 4], [3], [], [], [6], [], [8], []]
 
 
 def test_a_node_knows_after_which_failures_it_runs():
     catch = [Catch(on=MISSED, do=look("tree/try/catch/1/look"))]
     root = TryCatch(make_site("tree/try"), do=pick("tree/try/Pick"), catch=catch)
-    assert [node.when for node in outline(root)] == ["", "", "on Pick.missed", ""]
+    assert [node.when for node in make_outline(root)] == ["", "", "on Pick.missed", ""]
 
 
 def test_ports_and_reasons_stand_below_the_skill():
-    nodes = outline(Sequence(make_site("tree"), do=[pick("tree/Pick"), pick("tree/other", "other")]))
+    nodes = make_outline(Sequence(make_site("tree"), do=[pick("tree/Pick"), pick("tree/other", "other")]))
     assert draw_outline(nodes, ports=True, reasons=True).splitlines() == [
         "tree",
         "├─ Pick  (height: 0.2, only: $item, held: $thing)",
@@ -118,14 +118,14 @@ def test_long_lines_are_wrapped_under_their_node():
     body = pick("tree/retry/do/Pick", wiring=wiring)
     on = [Reason("Pick", reason) for reason in ("missed", "blocked", "unreachable", "dropped", "slipped")]
     root = Retry(make_site("tree/retry"), attempts=3, on=on, do=body)
-    lines = draw_outline(outline(root), ports=True).splitlines()
+    lines = draw_outline(make_outline(root), ports=True).splitlines()
     assert max(map(len, lines)) <= MAX_LINE_LENGTH
     assert lines[1] == "│    Pick.slipped)"
     assert lines[-1].startswith("        ") and lines[-1].endswith("b")
 
 
 def test_a_folded_tree_shows_every_subtree_once():
-    nodes = outline(tree())
+    nodes = make_outline(tree())
     shown = fold_subtrees(nodes)
     assert draw_outline(shown).splitlines() == [
         "try",
@@ -145,6 +145,6 @@ def test_a_folded_tree_shows_every_subtree_once():
 def test_a_folded_subtree_stays_within_those_around_it():
     first, second = look("tree/1:look"), look("tree/2:wide/look")
     shown = fold_subtrees(
-        outline(Sequence(make_site("tree"), do=[first, in_subtree(second, "wide", "look")]))
+        make_outline(Sequence(make_site("tree"), do=[first, in_subtree(second, "wide", "look")]))
     )
     assert [(node.title, node.subtrees) for node in shown[2:]] == [("Pick", ()), ("look", ("wide",))]

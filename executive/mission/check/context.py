@@ -1,0 +1,118 @@
+"""Input of the checks: the mission, the installed skills and control nodes, and the cell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from executive.cell.config import CellConfig
+from executive.cell.protocols import MinTimes
+from executive.mission.findings import list_choices
+from executive.mission.flow.analysis import FlowAnalysis
+from executive.mission.model.mission import Mission
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
+from executive.mission.model.values import Reference
+from executive.mission.model.wiring import Wire, find_wires, find_written_variables
+from executive.skill import Direction, Skill
+from executive.tree.registry import ControlNodes
+
+
+@dataclass(frozen=True)
+class CheckContext:
+    """A mission to check, with everything that the checks need.
+
+    Attributes:
+        mission: Content of the mission file, before expansion.
+        tree: Expanded tree with paths; an `UnknownNode` if the tree could not be expanded.
+        unused_subtrees: Expanded subtrees that the tree does not use.
+        skills: Installed skills by name.
+        node_classes: Installed control nodes by keyword.
+        cell: Content of the cell file, or None if the file has errors.
+        classes_by_detector: Classes that each detector of the cell can detect; None for unknown classes.
+        min_times: Lower bounds of the times of actions in the cell, or None if unknown.
+    """
+
+    mission: Mission
+    tree: Node
+    unused_subtrees: tuple[Node, ...]
+    skills: Mapping[str, type[Skill]]
+    node_classes: ControlNodes
+    cell: CellConfig | None
+    classes_by_detector: Mapping[str, tuple[str, ...] | None]
+    min_times: MinTimes | None
+
+    @cached_property
+    def flow_analysis(self) -> FlowAnalysis:
+        """Possible states and failures of every node of the tree."""
+        return FlowAnalysis(self.tree, self.skills)
+
+    @cached_property
+    def written_variables(self) -> set[str]:
+        """Variables that a node of the tree may write."""
+        return find_written_variables(self.tree, self.skills)
+
+    def iterate_nodes(self) -> Iterator[Node]:
+        """Yield every node of the tree and of the unused subtrees."""
+        for root in (self.tree, *self.unused_subtrees):
+            yield from root.walk()
+
+    def iterate_control_nodes(self) -> Iterator[InnerNode]:
+        """Yield every control node of the tree and of the unused subtrees."""
+        return (node for node in self.iterate_nodes() if isinstance(node, InnerNode))
+
+    def iterate_installed_skills(self) -> Iterator[tuple[SkillNode, type[Skill]]]:
+        """Yield every node of an installed skill, with the skill."""
+        for node in self.iterate_nodes():
+            if isinstance(node, SkillNode) and node.skill in self.skills:
+                yield node, self.skills[node.skill]
+
+    @cached_property
+    def cell_names_by_kind(self) -> Mapping[str, list[str]]:
+        """Names of the bins, detectors, poses and classes of the cell; no kinds if the cell is None."""
+        if self.cell is None:
+            return {}
+        return {
+            "bin": list(self.cell.bins),
+            "detector": list(self.cell.detectors),
+            "pose": list(self.cell.arm.poses_deg),
+            "class": list(self.cell.objects),
+        }
+
+    @cached_property
+    def library_uses_by_path(self) -> Mapping[str, UseNode]:
+        """By the path of each node in a library: the `use` in the mission file that contains the node."""
+        uses: dict[str, UseNode] = {}
+
+        def walk(node: Node, use: UseNode | None) -> None:
+            if node.mark.source is mission_source:
+                use = node if isinstance(node, UseNode) else None
+            elif use is not None:
+                uses[node.path] = use
+            for child in node.children:
+                walk(child, use)
+
+        mission_source = self.tree.mark.source
+        walk(self.tree, None)
+        return uses
+
+    def make_constant_hint(self, reference: Reference) -> str:
+        """Return the hint for a reference that must be a param or an argument, but is a variable."""
+        params = self.mission.params
+        if reference.name in params:
+            return (
+                f"A library cannot use params: declare {reference.name} below args of the subtree, "
+                "and give its value with `with`."
+            )
+        names = [f"${name}" for name in params]
+        return list_choices(f"${reference.name}", names, "Params of the mission")
+
+    def make_variable_hint(self, value: object) -> str:
+        """Return the hint for a constant that is the name of a variable without `$`; "" for other values."""
+        is_variable = isinstance(value, str) and value in self.written_variables
+        return f"For the variable, write ${value}." if is_variable else ""
+
+    def find_wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
+        """Yield the connections of the node's ports; none if the node runs no installed skill."""
+        if isinstance(node, SkillNode) and node.skill in self.skills:
+            yield from find_wires(node, self.skills[node.skill], direction)
