@@ -14,7 +14,7 @@ from executive.testing.substitutes import make_raising, make_raising_when_halted
 
 Occasion = Literal["first", "middle", "late", "lasting"]
 """Occasion of a fault: first activation or start of the run, middle, near the end, or repeatedly."""
-INJECTED_FAILURE_MESSAGE = "failure injected by the campaign"
+INJECTED_MESSAGE = "failure injected by the campaign"
 """Message of a skill that the campaign lets fail without a cause in the cell."""
 
 
@@ -117,6 +117,6 @@ def _make_failing(skill: type[Skill], reason: str) -> type[Skill]:
                 return
             if (item := cell.ledger.find_held_item()) is not None:
                 detect_and_record_drop(cell, item)
-        raise self.failure(reason, INJECTED_FAILURE_MESSAGE)
+        raise self.failure(reason, INJECTED_MESSAGE)
 
     return make_substitute(skill, "Failing", run)

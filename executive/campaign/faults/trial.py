@@ -11,12 +11,7 @@ from typing import Any
 
 from executive.campaign.end_checks import check_arm_at_rest, check_held_item, check_journal
 from executive.campaign.faults import trial_checks
-from executive.campaign.faults.fault import (
-    INJECTED_FAILURE_MESSAGE,
-    InjectedError,
-    PlannedFault,
-    make_substitutes,
-)
+from executive.campaign.faults.fault import INJECTED_MESSAGE, InjectedError, PlannedFault, make_substitutes
 from executive.campaign.faults.fault_list import list_skill_nodes
 from executive.campaign.faults.nominal_run import ActivationRecorder, NominalRun
 from executive.campaign.mission_under_test import MissionUnderTest
@@ -168,5 +163,5 @@ class _TrialRun:
         failures = [end for end in node_ends if (end.status, end.reason) == ("FAILURE", fault.kind)]
         messages = [end.message for end in failures]
         return not fault.is_failure_reason or any(
-            not fault.skill_faults or message == INJECTED_FAILURE_MESSAGE for message in messages
+            not fault.skill_faults or message == INJECTED_MESSAGE for message in messages
         )

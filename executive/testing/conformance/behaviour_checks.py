@@ -14,9 +14,9 @@ from executive.skill import ANY, EMPTY, HOLDING, ToolState
 from executive.testing.conformance.declaration_checks import HALT
 from executive.testing.conformance.situations import ArrangementFailed
 from executive.testing.conformance.skill_runs import SkillRuns, TickNotReturned
-from executive.testing.conformance.skill_test_run import MAX_TIME, SkillTestRun, has_equal_pickle
+from executive.testing.conformance.skill_test_run import MAX_RUN_TIME, SkillTestRun, has_equal_pickle
 
-MAX_TICK_TIME = 0.05
+MAX_TICK_DURATION = 0.05
 """Maximum computing time of a tick [s]."""
 
 _ACTIONS = ("arm.start", "arm.stop", "tool.open", "tool.close", "camera.capture")
@@ -51,7 +51,7 @@ def terminates(runs: SkillRuns) -> Iterator[str]:
     for test_run in runs.complete_runs:
         if test_run.status == "RUNNING":
             yield (
-                f"{test_run.description} {runs.name} was still running after {MAX_TIME:g} s. "
+                f"{test_run.description} {runs.name} was still running after {MAX_RUN_TIME:g} s. "
                 "Limit the duration of each wait, and fail with a reason when it expires."
             )
 
@@ -147,11 +147,11 @@ def is_deterministic(runs: SkillRuns) -> Iterator[str]:
 def has_short_ticks(runs: SkillRuns) -> Iterator[str]:
     """No tick computes for longer than 50 ms in the faster of two equal runs."""
     for _, first, second in runs.repeated_runs:
-        tick_times = list(map(min, first.tick_times, second.tick_times))
-        longest = max(tick_times, default=0.0)
-        if longest > MAX_TICK_TIME:
+        durations = list(map(min, first.tick_durations, second.tick_durations))
+        longest = max(durations, default=0.0)
+        if longest > MAX_TICK_DURATION:
             yield (
-                f"{first.description} tick {tick_times.index(longest)} computed for {longest * 1000:.0f} ms, "
+                f"{first.description} tick {durations.index(longest)} computed for {longest * 1000:.0f} ms, "
                 "which blocks the arm. Distribute the work over ticks with yield, or do it in a detector."
             )
 

@@ -13,10 +13,7 @@ from executive.testing.conformance.situations import Arrange, NotTestable, Skill
 from executive.testing.conformance.skill_runs import SkillRuns
 
 Rule = Callable[[SkillRuns], Iterator[str]]
-"""Function that yields one text per violation of a rule: place, problem and correction.
-
-The docstring of the function states the rule.
-"""
+"""Function whose docstring states a rule; yields one text per violation: place, problem, correction."""
 
 RULES: tuple[Rule, ...] = tuple(
     rule

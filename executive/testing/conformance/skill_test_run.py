@@ -26,12 +26,12 @@ from executive.testing.conformance.source_code import find_skill_line
 from executive.testing.faults import FaultyCell, during
 from executive.tree.skill_run import SkillRun
 
-MAX_TIME = 60.0
+MAX_RUN_TIME = 60.0
 """Maximum duration of a skill on the run's clock [s]; no skill needs as long on the fake cell."""
 STUCK_TIMEOUT = 10.0
 """Wall time without a new tick after which a tick counts as stuck [s]."""
 PROGRESS_CHECKS = 2
-"""Number of timer signals within `STUCK_TIMEOUT`: a suspended machine wakes up with only one of them."""
+"""Number of checks for a new tick within `STUCK_TIMEOUT`; a suspended machine delays only one of them."""
 _OBSERVED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "localizer", "operator")
 
 
@@ -62,14 +62,14 @@ class SkillTestRun:
 
     Attributes:
         description: Situation and fault, as the beginning of a sentence.
-        status: `SUCCESS`; `FAILURE`; `HALTED`; `RUNNING`: no end within `MAX_TIME`; `STUCK`: a tick did not
-            return; `FAULT`: the skill raised an exception or violated its declarations.
+        status: `SUCCESS`; `FAILURE`; `HALTED`; `RUNNING`: no end within `MAX_RUN_TIME`; `STUCK`: a tick did
+            not return; `FAULT`: the skill raised an exception or violated its declarations.
         reason: Reason of a failure, or "".
         message: Message of a failure or fault, or duration and place of a stuck tick.
         ticks: Number of complete control steps.
         outputs: Values of the output ports by name, after success.
         calls: All calls of parts of the cell, in order.
-        tick_times: Computing time of each tick [s].
+        tick_durations: Computing time of each tick [s].
         changed_names: Names of the params and inputs whose values the skill changed.
         holds_before: True if the tool held an object at the start.
         holds_after: True if the tool holds an object at the end.
@@ -94,7 +94,7 @@ class SkillTestRun:
         self.reason = self.message = ""
         self.ticks, self._skill, self._halt_at = 0, skill, halt_at
         self.outputs: Mapping[str, Any] = {}
-        self.calls, self.tick_times = list[Call](), list[float]()
+        self.calls, self.tick_durations = list[Call](), list[float]()
         self.holds_before = fake.tool.holding
         observed_cell = intercept(cell.cell, self._record_call, _OBSERVED_ROLES)
         try:
@@ -134,7 +134,7 @@ class SkillTestRun:
         skill = self._skill
         run: SkillRun | None = None
         try:
-            while self.ticks < MAX_TIME / STEP:
+            while self.ticks < MAX_RUN_TIME / STEP:
                 if run is not None and self.ticks == self._halt_at:
                     run.halt()
                     return "HALTED"
@@ -143,7 +143,7 @@ class SkillTestRun:
                 start = perf_counter()
                 run = run or SkillRun(skill(**values), observed_cell)
                 has_succeeded = run.step()
-                self.tick_times.append(perf_counter() - start)
+                self.tick_durations.append(perf_counter() - start)
                 if has_succeeded:
                     self.outputs = run.read_outputs()
                     return "SUCCESS"

@@ -158,9 +158,7 @@ class Occurrence:
 
 
 def validate_fraction(fraction: float | None) -> float:
-    """Return the fraction of a motion after which a fault occurs; 0 if `fraction` is None.
-
-    With 0 the fault occurs at once, also if the arm is at rest.
+    """Return the fraction of a motion after which a fault occurs; 0 (at once, also at rest) for None.
 
     Raises:
         InputError: The fraction is not between 0 and 1, both excluded.

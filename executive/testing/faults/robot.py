@@ -155,12 +155,7 @@ def _raise_no_depth(proceed: Callable[[], Any], occurrence: Occurrence) -> Any:
 
 @dataclass(frozen=True)
 class FailingPlanning:
-    """A planning that takes the usual time and finds no motion; implements `Planning`.
-
-    Attributes:
-        planning: The planning without a fault, which determines the planning time.
-        is_blocked: True: `result` raises Blocked. False: Unreachable.
-    """
+    """A planning that takes as long as `planning`, and then finds no motion; implements `Planning`."""
 
     planning: Planning
     is_blocked: bool
