@@ -68,7 +68,7 @@ class Fallback(ControlNode):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return a text with the failures of all other children."""
         others = ", ".join(f"{reason} ({message})" for reason, message in failure.last_messages.items())
-        return f"all {len(self.do)} choices failed" + (f"; the others with {others}" if others else "")
+        return f"all {len(self.do)} choices failed" + (f"; the others failed with {others}" if others else "")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
         """Yield all children except the first, each with its number in a text."""

@@ -187,7 +187,7 @@ class Parallel(ControlNode):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return a text with the number of children that must succeed, and the other failures."""
         if self._has_lead:
-            return "ends as its first child, the lead, ends"
+            return "ends with the status of its first child, the lead"
         count = len(self.do)
         texts = {"all": f"all {count}", "any": f"one of its {count}"}
         required = texts.get(str(self.wait_for), f"{self.wait_for} of its {count}")

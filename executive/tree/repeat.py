@@ -82,4 +82,4 @@ class Repeat(Loop):
         del failure
         if self.until:
             return f"succeeds only with {format_reasons(self.until)}"
-        return f"a failure ends it before its {self.times} iterations are complete"
+        return f"a failure ends the loop before its {self.times} iterations are complete"

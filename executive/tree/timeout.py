@@ -79,7 +79,7 @@ class Timeout(ControlNode):
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return a text with the duration of the body and the limit."""
-        return f"limits only the time: {failure.duration:.2f} of {self.seconds:g} s had passed"
+        return f"handles no failures; {failure.duration:.2f} of {self.seconds:g} s had passed"
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield the advice to increase the limit after a timeout."""

@@ -39,7 +39,7 @@ class TryCatch(ControlNode):
     keyword_hints: ClassVar = dict.fromkeys(("if", "else"), "To handle a failure, write try and catch.")
     symbol = "↯"
     any_of = ("catch", "finally")
-    remedy = "put a try with a catch for it around"
+    remedy = "add a try with a catch for this failure around"
 
     do: Child = key(shorthand=True, in_path=False, doc="Body.")
     catch: tuple[Catch, ...] = key(
@@ -137,7 +137,7 @@ class TryCatch(ControlNode):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return a text with the failures that the node catches, or with the failed handler or `finally`."""
         if failure.child is self.finally_:
-            return "its finally failed"
+            return "the child finally failed"
         if failure.child is not self.do:
             caught = failure.last_handled
             return f"caught {caught} ({failure.last_messages.get(caught, '')}), but the handler failed"
@@ -147,7 +147,7 @@ class TryCatch(ControlNode):
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield the advice to add a handler for a failure of the body."""
         if failure.child is self.do:
-            yield Advice("catch it in the try")
+            yield Advice("catch this failure in the try")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
         """Yield the handlers and `finally`, each after its name in reports."""

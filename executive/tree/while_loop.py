@@ -80,4 +80,4 @@ class While(Loop):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return a text with the rule for failures of the body."""
         del failure
-        return "a failure of its body ends it"
+        return "a failure of the body ends the loop"

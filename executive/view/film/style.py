@@ -21,6 +21,7 @@ _LINE_WIDTH = 0.17
 """Width of the lines of a mark [fraction of the side of the mark]."""
 _CHECK_MARK = [[(0.12, 0.54), (0.4, 0.82), (0.9, 0.22)]]
 _CROSS = [[(0.17, 0.17), (0.83, 0.83)], [(0.83, 0.17), (0.17, 0.83)]]
+"""Lines of the mark, as points (x, y) [fraction of the side of the mark]; y points down."""
 _ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 
 

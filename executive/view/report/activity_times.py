@@ -12,9 +12,12 @@ from executive.mission.outline import OutlineNode
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 
-LOOK, RETRY, WAITING = "look", "retry", "waiting"
-"""Activities that are not skills: search for the next object; failed attempts with the looks before the next
-attempt; all other time."""
+LOOK = "look"
+"""Activity: search for the next object with an empty tool."""
+RETRY = "retry"
+"""Activity: failed attempts, and the looks before the next attempt."""
+WAITING = "waiting"
+"""Activity: time that belongs neither to a skill nor to another activity."""
 
 Interval = tuple[float, float, list[Activation]]
 """Start and end of an interval [s], and the skills that run in it, in the order of their starts."""

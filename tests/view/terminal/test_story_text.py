@@ -62,8 +62,8 @@ last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera over
             3 looks, 3 failed attempts in all
 now         the arm is at rest, the tool is empty
 left to do  1: cube-1
-next        to let the mission continue after Transit.dropped: put a try with a catch for it around line 15,
-            or allow more than 3 attempts with --set attempts=...
+next        to let the mission continue after Transit.dropped: add a try with a catch for this failure around
+            line 15, or allow more than 3 attempts with --set attempts=...
 """
     )
 
@@ -76,8 +76,8 @@ def test_a_time_that_is_over(abroad) -> None:
     assert (story.node.path, story.node.place) == ("tree/timeout", "trial.yaml:7")
     assert story.next == [
         "take cube-1 out of the tool before a new run",
-        "to let the mission continue after timeout.timeout: put a try with a catch for it around line 7, or "
-        "allow more than 1 s with --set patience=...",
+        "to let the mission continue after timeout.timeout: add a try with a catch for this failure "
+        "around line 7, or allow more than 1 s with --set patience=...",
     ]
 
 
@@ -113,7 +113,7 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
     assert chain[0::2] == ["catches only Detect.unsure", "all 10 attempts failed: 10 x Detect.unavailable"]
     assert [unnumbered(each) for each in story.next] == [
         "make sure that detector.embedded answers again",
-        "to let the mission continue after Detect.unavailable: catch it in the try at "
+        "to let the mission continue after Detect.unavailable: catch this failure in the try at "
         "missions/library/sorting.yaml:N, or allow more than 10 attempts at missions/library/sorting.yaml:N",
     ]
 
@@ -177,7 +177,7 @@ now         the arm is at rest, the tool holds cube-1
 left to do  1: cube-1
 next        take cube-1 out of the tool before a new run
 next        find what the arm collided with: link 5 met a wrench
-next        to let the mission continue after PutDown.blocked: catch it in the try at
+next        to let the mission continue after PutDown.blocked: catch this failure in the try at
             missions/library/sorting.yaml:N
 """
     )
