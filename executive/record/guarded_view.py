@@ -39,9 +39,9 @@ class GuardedView:
         """Stop showing the run."""
         self._forward(self._view.close)
 
-    def note(self, sentence: str) -> None:
+    def show_message(self, message: str) -> None:
         """Show a message about the record of the run."""
-        self._forward(lambda: self._view.note(sentence))
+        self._forward(lambda: self._view.show_message(message))
 
     def _forward(self, call: Callable[[], None]) -> None:
         if self.problem:

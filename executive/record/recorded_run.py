@@ -48,7 +48,7 @@ class View(Protocol):
     def close(self) -> None:
         """Stop showing the run; called after the end of the run, also after an exception."""
 
-    def note(self, sentence: str) -> None:
+    def show_message(self, message: str) -> None:
         """Show a message about the record of the run."""
 
 
@@ -112,7 +112,7 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, run
     """
     scene = "" if options.scene is None else read_source(options.scene).text
     directory = RunDirectory.create(
-        runs, mission=loaded.mission.name, seed=options.seed, started=datetime.now()
+        runs, mission=loaded.mission.name, seed=options.seed, start_time=datetime.now()
     )
     directory.save_inputs(
         mission=loaded.text,
@@ -173,7 +173,7 @@ class Recording:
                 result = replace(result, status="FAULT", reason="fault", message=str(error), node="")
         if any(problems):
             for view in self.views:
-                view.note("; ".join(filter(None, problems)))
+                view.show_message("; ".join(filter(None, problems)))
         return result
 
     def _make_result(
@@ -181,7 +181,7 @@ class Recording:
     ) -> Result:
         workcell, path, timeline = self.run.workcell, self.directory.path, self._timeline
         accounts = workcell.accounts
-        balance = accounts.count_states()
+        item_counts = accounts.count_states()
         return Result(
             mission=self.loaded.mission.name,
             status=outcome.status,
@@ -190,11 +190,11 @@ class Recording:
             node=outcome.node,
             holds=outcome.holds,
             seed=seed,
-            items=ItemCounts(**balance),
+            items=ItemCounts(**item_counts),
             unknown=accounts.unknown,
             doubts=accounts.doubts,
             empty=outcome.empty,
-            audit=None if audit is None else make_audit(balance, audit, outcome.empty),
+            audit=None if audit is None else make_audit(item_counts, audit, outcome.empty),
             planning=timeline.planning,
             requests=list_requests(timeline),
             ticks=outcome.ticks,
@@ -215,7 +215,7 @@ class Recording:
             for view in self.views:
                 view.open(run)
                 if self.start_message:
-                    view.note(self.start_message)
+                    view.show_message(self.start_message)
             for observer in observers:
                 run.add_observer(observer)
             for timed in self.earlier_events:

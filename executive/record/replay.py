@@ -1,4 +1,4 @@
-"""ReplayResult of a recorded run from its recorded inputs, and comparison of the decisions."""
+"""Replay of a recorded run from its recorded inputs, and comparison of the decisions."""
 
 from __future__ import annotations
 
@@ -60,10 +60,10 @@ class ReplayResult:
         """Message about the first difference, or ""."""
         if self.is_equal:
             return ""
-        both = f"recorded: {_describe_decision(self.recorded)}; replayed: {_describe_decision(self.replayed)}"
+        text = f"recorded: {_describe_decision(self.recorded)}; replayed: {_describe_decision(self.replayed)}"
         if not self.unanswered:
-            return both
-        return f"{both}: {self.unanswered}; only a run can show the consequences"
+            return text
+        return f"{text}: {self.unanswered}; only a run can show the consequences"
 
     def as_json(self) -> dict[str, JsonValue]:
         """Return the attributes as JSON; a decision has its tick, clock, kind and non-empty fields."""
@@ -136,17 +136,17 @@ class _Comparison:
     def __init__(self, log: InputLog, edited: bool) -> None:
         self._log = log
         self._edited = edited
-        self._recorded = [found for timed in log.events if (found := _to_decision(timed, edited))]
+        self._recorded = [decision for timed in log.events if (decision := _to_decision(timed, edited))]
         # The last control step of an interrupted run may be incomplete.
         self._has_ended = any(isinstance(timed.event, RunEnded) for timed in log.events)
-        self._is_over = False
+        self._is_finished = False
         self.equal_count = 0
         self.difference: tuple[TimedEvent | None, TimedEvent | None] = (None, None)
         self.unanswered = ""
         self.is_complete = True
 
     def __call__(self, timed: TimedEvent) -> None:
-        if self._is_over:
+        if self._is_finished:
             return
         decision = _to_decision(timed, self._edited)
         if decision is None:
@@ -155,7 +155,7 @@ class _Comparison:
         if recorded == decision:
             self.equal_count += 1
             return
-        self._is_over, self.unanswered = True, self.run.replayed_cell.missing_input_message
+        self._is_finished, self.unanswered = True, self.run.replayed_cell.missing_input_message
         # After the last recorded control step, the replay only halts.
         self.is_complete = decision.tick > self._log.last_tick
         if self._has_ended or any(map(self._is_complete, filter(None, (recorded, decision)))):
@@ -164,7 +164,7 @@ class _Comparison:
 
     def compare_end(self) -> None:
         """Compare the end of the replay with the end of the record; called after the replay."""
-        if self._is_over or self.equal_count == len(self._recorded):
+        if self._is_finished or self.equal_count == len(self._recorded):
             return
         self.is_complete = False
         next_decision = self._recorded[self.equal_count]

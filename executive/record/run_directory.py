@@ -53,7 +53,7 @@ class RunDirectory:
         return path if path.is_file() else None
 
     @staticmethod
-    def create(runs: Path, *, mission: str, seed: int, started: datetime) -> RunDirectory:
+    def create(runs: Path, *, mission: str, seed: int, start_time: datetime) -> RunDirectory:
         """Make and return a directory below `runs`; its name consists of start time, mission and seed.
 
         If the name exists already, it gets the suffix `-2`, `-3`, ....
@@ -61,8 +61,8 @@ class RunDirectory:
         Raises:
             InputError: The directory cannot be made.
         """
-        day = runs / started.strftime("%Y-%m-%d")
-        name = f"{started.strftime('%H-%M-%S')}_{mission}_s{seed}"
+        day = runs / start_time.strftime("%Y-%m-%d")
+        name = f"{start_time.strftime('%H-%M-%S')}_{mission}_s{seed}"
         with convert_os_errors(f'make a run directory below "{runs}"'):
             day.mkdir(parents=True, exist_ok=True)
             path = _make_unique(day, name)
@@ -144,11 +144,11 @@ def find_run(name: str, runs: Path) -> Path:
         # Path.is_file raises an error for a name that is too long.
         if os.path.isfile(path / "journal.jsonl"):
             return path.resolve()
-    known = sorted((path.parent for path in runs.glob("*/*/journal.jsonl")), reverse=True)
-    hint = f"the last runs there: {', '.join(str(path.relative_to(runs)) for path in known[:3])}"
+    run_paths = sorted((path.parent for path in runs.glob("*/*/journal.jsonl")), reverse=True)
+    hint = f"the last runs there: {', '.join(str(path.relative_to(runs)) for path in run_paths[:3])}"
     raise InputError(
         f'"{name}" is no run directory, and "{runs}" contains no run directory of this name; '
-        f"{hint if known else 'it contains no run at all; name the folder of the runs with --runs DIR'}"
+        f"{hint if run_paths else 'it contains no run at all; name the folder of the runs with --runs DIR'}"
     )
 
 

@@ -142,7 +142,7 @@ class InputLog:
         Args:
             step_count: Number of control steps that the cell has executed.
             last_command_tick: Control step of the last command to arm or tool according to the cell.
-            is_complete: True if the log holds all events of its last control step.
+            is_complete: True if the log contains all events of its last control step.
         """
         incomplete_ends = _find_incomplete_ends(self.events)
         if self.last_tick in incomplete_ends:

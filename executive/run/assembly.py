@@ -106,7 +106,7 @@ def assemble_resumed(
         options: Options of the interrupted run.
         log: The recorded inputs.
         world_log: File from which the cell rebuilds its world.
-        is_complete: True if the log holds all events of its last control step.
+        is_complete: True if the log contains all events of its last control step.
         has_ended: True if the recorded run had ended, so that it is only replayed.
 
     Raises:
@@ -133,7 +133,7 @@ def assemble_replay(
 
 
 class _RunBuilder:
-    """Builder of the builder of a run.
+    """Builder of the parts of a run.
 
     Attributes:
         context: Recorded cell and events of the run; `connect` must precede `build_tree`.
@@ -151,11 +151,11 @@ class _RunBuilder:
         self.context = RunContext(observers)
         self.control = RunControl()
 
-    def build_cell(self, resume: ResumePoint | None = None, request_count: int = 0) -> Workcell:
+    def build_cell(self, resume_point: ResumePoint | None = None, request_count: int = 0) -> Workcell:
         """Return the work cell of the run.
 
         Args:
-            resume: State in which an interrupted run left the cell; None for a new run.
+            resume_point: State in which an interrupted run left the cell; None for a new run.
             request_count: Number of requests that the operator gave before the interruption.
         """
         loaded, options, emit = self._loaded, self._options, self.context.emit
@@ -165,7 +165,7 @@ class _RunBuilder:
         else:
             operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, request_count)
         cell_options = CellOptions(
-            operator, loaded.cell_path.parent, options.gui, resume=resume, scene=options.scene
+            operator, loaded.cell_path.parent, options.gui, resume=resume_point, scene=options.scene
         )
         kind = options.kind or cell_kind(loaded.cell_config.kind)
         return kind(

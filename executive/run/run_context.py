@@ -15,7 +15,7 @@ from executive.run.lookahead_planner import LookaheadPlanner
 MAX_BRAKING_TIME = 2.0
 """Maximum time from the command to brake until the arm is at rest [s]."""
 MAX_BRAKING_ATTEMPTS = 4
-"""Maximum number of commands to brake; each command may raise the exception of another observer."""
+"""Maximum number of commands to brake, because each observer may fail once to record a command."""
 
 
 class RunContext:

@@ -65,7 +65,7 @@ class StopAtFirstTick:
     def close(self) -> None:
         """Do nothing."""
 
-    def note(self, sentence: str) -> None:
+    def show_message(self, message: str) -> None:
         """Do nothing."""
 
 

@@ -35,7 +35,7 @@ class FailingView:
     def close(self) -> None:
         self._call("close")
 
-    def note(self, sentence: str) -> None:
+    def show_message(self, message: str) -> None:
         self._call("note")
 
 
@@ -46,7 +46,7 @@ def use(view: GuardedView) -> None:
         lambda: view(None),  # type: ignore[arg-type]
         lambda: view(None),  # type: ignore[arg-type]
         view.close,
-        lambda: view.note("a note"),
+        lambda: view.show_message("a note"),
     )
     for call in calls:
         call()

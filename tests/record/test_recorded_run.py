@@ -34,8 +34,8 @@ class Watcher:
     def close(self):
         self.seen.append("closed")
 
-    def note(self, sentence):
-        self.seen.append(sentence)
+    def show_message(self, message):
+        self.seen.append(message)
 
 
 @pytest.fixture

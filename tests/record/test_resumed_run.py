@@ -64,7 +64,7 @@ class Cutter:
     def close(self) -> None:
         """End."""
 
-    def note(self, sentence: str) -> None:
+    def show_message(self, message: str) -> None:
         """Hear nothing."""
 
 
@@ -252,8 +252,8 @@ class Watcher(Cutter):
         super().__init__(10**9)
         self.notes: list[str] = []
 
-    def note(self, sentence: str) -> None:
-        self.notes.append(sentence)
+    def show_message(self, message: str) -> None:
+        self.notes.append(message)
 
 
 def truncate(path: Path, share: float) -> None:

@@ -17,7 +17,7 @@ STARTED = datetime(2026, 11, 21, 3, 15, 42)
 
 
 def create(runs: Path) -> RunDirectory:
-    return RunDirectory.create(runs, mission="sort", seed=7, started=STARTED)
+    return RunDirectory.create(runs, mission="sort", seed=7, start_time=STARTED)
 
 
 def test_is_named_after_time_mission_and_seed(tmp_path):

@@ -72,7 +72,7 @@ def test_an_activation_lasts_from_the_start_of_its_node_to_its_end() -> None:
     tree, detect = timeline.activations
     assert (tree.start, tree.end, tree.status, tree.failure) == (0, 3, "FAILURE", "Detect.unsure: too dark")
     assert (detect.start_tick, detect.end_tick, detect.skill) == (240, 480, "Detect")
-    assert timeline.nodes == {"tree": tree, "tree/Detect": detect}
+    assert timeline.activation_by_path == {"tree": tree, "tree/Detect": detect}
     assert timeline.last_end == tree
 
 
@@ -116,10 +116,10 @@ def test_the_ends_of_a_node_are_counted_and_its_last_failure_is_found() -> None:
 
 def test_an_activation_is_current_until_an_ancestor_starts_again() -> None:
     timeline = folded(NodeStarted("tree"), skill_started("tree/do/Grasp"), skill_ended("tree/do/Grasp"))
-    assert timeline.find_current("tree/do/Grasp") == timeline.nodes["tree/do/Grasp"]
+    assert timeline.find_current("tree/do/Grasp") == timeline.activation_by_path["tree/do/Grasp"]
     timeline(at(960, NodeStarted("tree")))
     assert timeline.find_current("tree/do/Grasp") is None
-    assert timeline.find_current("tree") == timeline.nodes["tree"]
+    assert timeline.find_current("tree") == timeline.activation_by_path["tree"]
 
 
 def test_the_failures_that_a_control_node_handled_are_counted_with_their_last_message() -> None:
@@ -127,7 +127,7 @@ def test_the_failures_that_a_control_node_handled_are_counted_with_their_last_me
         NodeStarted("tree/retry"), BranchChosen("tree/retry", "attempt 2 of 3", "Grasp.missed", "no seal"),
         BranchChosen("tree/retry", "attempt 3 of 3", "Grasp.missed", "too far"),
     )  # fmt: skip
-    retry = timeline.nodes["tree/retry"]
+    retry = timeline.activation_by_path["tree/retry"]
     assert (retry.choice, retry.last_handled) == ("attempt 3 of 3", "Grasp.missed")
     assert (retry.handled_counts, retry.message_by_reason) == (
         {"Grasp.missed": 2},
@@ -140,7 +140,7 @@ def test_a_control_node_knows_the_skills_that_it_halted() -> None:
         NodeStarted("tree"), skill_started("tree/Wait"), skill_ended("tree/Wait", "INVALID"),
         NodeEnded("tree", "FAILURE", reason="timeout.timeout"),
     )  # fmt: skip
-    assert (timeline.nodes["tree"].halted, timeline.halted) == (("tree/Wait",), ())
+    assert (timeline.activation_by_path["tree"].halted, timeline.halted) == (("tree/Wait",), ())
 
 
 def test_a_failed_skill_has_the_answers_of_the_cell_until_then_without_lists() -> None:
@@ -149,7 +149,7 @@ def test_a_failed_skill_has_the_answers_of_the_cell_until_then_without_lists() -
         read("arm.met", "a wrench"), skill_ended("tree/Approach", "FAILURE", "cube-1", reason="blocked"),
         read("tool.holding", True),
     )  # fmt: skip
-    readings = timeline.nodes["tree/Approach"].readings
+    readings = timeline.activation_by_path["tree/Approach"].readings
     assert [(reading.name, reading.value, reading.clock) for reading in readings] == [
         ("arm.met", "a wrench", 3)
     ]
@@ -201,7 +201,7 @@ def test_an_item_has_its_last_failure() -> None:
         item_changed("cube-1"), skill_started("tree/Grasp", "cube-1"),
         skill_ended("tree/Grasp", "FAILURE", "cube-1", reason="missed"),
     )  # fmt: skip
-    assert timeline.items.by_name["cube-1"].failure == timeline.nodes["tree/Grasp"]
+    assert timeline.items.by_name["cube-1"].failure == timeline.activation_by_path["tree/Grasp"]
 
 
 def test_a_class_keeps_its_place() -> None:

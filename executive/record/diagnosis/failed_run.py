@@ -45,20 +45,20 @@ class FailedRun:
             for name, item in timeline.items.by_name.items()
             if failed and not end.node and item.last_change.state == "lost"
         }
-        self.deciding_activation = timeline.nodes.get(end.node)
+        self.deciding_activation = timeline.activation_by_path.get(end.node)
         self.deciding_node = next(iter(find_nodes_on_path(loaded.tree, end.node)[-1:]), None)
         self.halted_skills = timeline.halted
         deciding = self.deciding_activation
         if failed:
             self.halted_skills = deciding.halted if deciding is not None else ()
-        activations = [deciding, *map(timeline.nodes.get, self.halted_skills)]
+        activations = [deciding, *map(timeline.activation_by_path.get, self.halted_skills)]
         items = [activation.item for activation in activations if activation is not None and activation.item]
         self.item = next(iter([*items, *self.lost]), "")
         self.is_unrecorded = f".{RecordLost.__name__}: " in timeline.traceback
 
     def name_skill(self, path: str) -> str:
         """Return the name of a skill with the item of its last activation: `Grasp of cube-1`."""
-        last = self.timeline.nodes.get(path)
+        last = self.timeline.activation_by_path.get(path)
         return to_skill_name(path) + (f" of {last.item}" if last is not None and last.item else "")
 
     def format_place(self, node: Node) -> str:

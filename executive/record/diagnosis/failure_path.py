@@ -80,11 +80,11 @@ def _make_propagated_failure(
     timeline: Timeline, node: Node, model: ControlNode | None, child: Node | None, reasons: frozenset[Reason]
 ) -> PropagatedFailure:
     """Return the failure that `node` got from its child `child`; `child` is None at the origin."""
-    activation = timeline.nodes.get(node.path) or _NEVER
+    activation = timeline.activation_by_path.get(node.path) or _NEVER
     children = [child for key in model.keys for child in model.list_children(key)] if model else []
 
     def has_failed(child: Child) -> bool:
-        last = timeline.nodes.get(get_mission_node(child).path)
+        last = timeline.activation_by_path.get(get_mission_node(child).path)
         return last is not None and last.number > activation.number and last.status == "FAILURE"
 
     return PropagatedFailure(

@@ -35,7 +35,7 @@ class Timeline:
             number of nodes and items.
         started, ended: Events of the start and the end of the run, or None.
         tick, clock: Control step and time of the last event [s].
-        nodes: Last activation of each node, by path.
+        activation_by_path: Last activation of each node, by path of the node.
         end_counts: Number of ended activations by status, for each node by path.
         last_end: The activation that ended last, or None.
         halted: Paths of the skills that were halted since the last start, success or failure of a node.
@@ -55,7 +55,7 @@ class Timeline:
     ended: events.RunEnded | None = None
     tick: int = 0
     clock: float = 0.0
-    nodes: dict[str, Activation] = field(default_factory=dict)
+    activation_by_path: dict[str, Activation] = field(default_factory=dict)
     end_counts: dict[str, Counter[str]] = field(default_factory=dict)
     last_end: Activation | None = None
     halted: tuple[str, ...] = ()
@@ -123,15 +123,15 @@ class Timeline:
 
     def find_running(self) -> list[Activation]:
         """Return the activations that have not ended, in the order of their starts."""
-        running = (last for last in self.nodes.values() if last.status == "RUNNING")
+        running = (last for last in self.activation_by_path.values() if last.status == "RUNNING")
         return sorted(running, key=lambda last: last.number)
 
     def find_current(self, path: str) -> Activation | None:
         """Return the last activation of a node, or None if an ancestor of the node was started after it."""
-        last = self.nodes.get(path)
+        last = self.activation_by_path.get(path)
         ancestor_path = path.rpartition("/")[0]
         while last is not None and ancestor_path:
-            ancestor = self.nodes.get(ancestor_path)
+            ancestor = self.activation_by_path.get(ancestor_path)
             if ancestor is not None and ancestor.number > last.number:
                 return None
             ancestor_path = ancestor_path.rpartition("/")[0]
@@ -139,11 +139,11 @@ class Timeline:
 
     def _has_tree_ended(self) -> bool:
         """Return True if the tree has ended."""
-        root = self.nodes.get(self._root)
+        root = self.activation_by_path.get(self._root)
         return root is not None and root.status != "RUNNING"
 
     def _start_activation(self, event: events.NodeStarted) -> None:
-        interrupted = self.nodes.get(event.node)
+        interrupted = self.activation_by_path.get(event.node)
         if interrupted is not None and interrupted.status == "RUNNING":
             # A resumed run restarts the nodes that were running at the interruption.
             self._close(interrupted, "INVALID")
@@ -151,13 +151,13 @@ class Timeline:
         self._activation_count += 1
         number, now = self._activation_count, (self.tick, self.clock)
         activation = Activation(event.node, number, event.skill, event.item, "RUNNING", *now, *now)
-        self.nodes[event.node] = activation
+        self.activation_by_path[event.node] = activation
         self.halted = ()
         if self.keeps_history:
             self.activations.append(activation)
 
     def _end_activation(self, event: events.NodeEnded) -> None:
-        ended = self.nodes.get(event.node)
+        ended = self.activation_by_path.get(event.node)
         if ended is None or ended.status != "RUNNING":
             return
         self._close(ended, event.status)
@@ -178,14 +178,14 @@ class Timeline:
         self.last_end = activation
 
     def _add_choice(self, event: events.BranchChosen) -> None:
-        node = self.nodes.get(event.node)
-        if node is None:
+        last = self.activation_by_path.get(event.node)
+        if last is None:
             return
-        node.choice = event.choice
+        last.choice = event.choice
         if event.reason:
-            node.handled_counts[event.reason] += 1
-            node.message_by_reason[event.reason] = event.message
-            node.last_handled = event.reason
+            last.handled_counts[event.reason] += 1
+            last.message_by_reason[event.reason] = event.message
+            last.last_handled = event.reason
 
     def _add_reading(self, event: events.InputRead) -> None:
         self._readings.pop(event.name, None)

@@ -47,7 +47,8 @@ class FilmRunState:
         if running := timeline.find_running():
             return frozenset(activation.node for activation in running)
         end = _get_end(timeline.last_end)
-        return frozenset(path for path, activation in timeline.nodes.items() if _get_end(activation) == end)
+        activations = timeline.activation_by_path.items()
+        return frozenset(path for path, activation in activations if _get_end(activation) == end)
 
     @property
     def failure_text(self) -> str:
@@ -60,7 +61,7 @@ class FilmRunState:
         """Text with the first running skill, its item, and the bin of a held item; "" if no skill runs."""
         timeline = self.timeline
         for path, name in self._skill_names_by_path.items():
-            last = timeline.nodes.get(path)
+            last = timeline.activation_by_path.get(path)
             if last is not None and last.status == "RUNNING":
                 item, target = timeline.items.by_name.get(last.item), timeline.targets.get(last.item)
                 is_held = item is not None and item.last_change.state == "held"

@@ -134,9 +134,9 @@ class LivePage:
     def close(self) -> None:
         """Do nothing: the page stays open until `finish` is called."""
 
-    def note(self, sentence: str) -> None:
-        """Show a sentence about the record of the run."""
-        self._enqueue(PageChange(note=sentence))
+    def show_message(self, message: str) -> None:
+        """Show a message about the record of the run."""
+        self._enqueue(PageChange(note=message))
 
     def finish(self, result: Result | None = None, report: str = "") -> None:
         """Show the result of the run, and end the server; a second call does nothing."""

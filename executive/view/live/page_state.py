@@ -71,7 +71,7 @@ class PageState:
                 self._set_values(choices=None, has_ended=True)
 
     def _describe_node(self, path: str) -> Json:
-        last, counts = self._timeline.nodes[path], self._timeline.end_counts.get(path, Counter())
+        last, counts = self._timeline.activation_by_path[path], self._timeline.end_counts.get(path, Counter())
         statuses = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
         return {
             **{name: counts[status] for name, status in statuses.items()},

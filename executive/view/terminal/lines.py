@@ -47,9 +47,9 @@ class LineView:
     def close(self) -> None:
         """Do nothing: every line is already flushed."""
 
-    def note(self, sentence: str) -> None:
+    def show_message(self, message: str) -> None:
         """Write a note about the record of the run on a separate line."""
-        self._stream.write(f"note: {sentence}\n")
+        self._stream.write(f"note: {message}\n")
 
     def _describe(self, event: events.Event) -> str:
         match event:

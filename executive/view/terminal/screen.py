@@ -75,9 +75,9 @@ class TerminalView:
         """Hide the view, so that the caller can print a summary."""
         self._set_visible(False)
 
-    def note(self, sentence: str) -> None:
+    def show_message(self, message: str) -> None:
         """Write a note about the record of the run on a separate line."""
-        text = escape_control_characters(sentence)
+        text = escape_control_characters(message)
         self._console.print(Text(f"note: {text}", style="yellow"))
 
     def render(self) -> RenderableType:
@@ -106,7 +106,7 @@ class TerminalView:
         shown = select_running(self._nodes, {running.node for running in self.timeline.find_running()})
         lines = Text()
         for node, prefix in zip(shown, draw_line_prefixes(shown), strict=True):
-            last = self.timeline.nodes.get(node.path)
+            last = self.timeline.activation_by_path.get(node.path)
             mark, style = _STATUS_MARKS.get(last.status if last else "", ("·", "dim"))
             note = escape_control_characters(last.note) if last else ""
             lines.append(prefix, style="dim")

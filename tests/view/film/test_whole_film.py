@@ -72,7 +72,7 @@ def test_picture_and_tree_are_in_step(filmed_run: RunDirectory) -> None:
     world.close()
     state = FilmRunState(events, source.nodes, [])
     state.advance_to(grasped, 0.0)
-    grasp = state.timeline.nodes["tree/Grasp"]
+    grasp = state.timeline.activation_by_path["tree/Grasp"]
     assert grasp.status == "SUCCESS"
     assert state.timeline.items.by_name[grasp.item].last_change.state == "held"
     assert holds[grasped]
