@@ -30,7 +30,7 @@ MIN_REPEATS_FOR_SATURATION = 2
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
 """Maximum class error of an item that may be touched to determine its class by its height."""
 MAX_UNCERTAIN_LOOKS = 10
-"""Number of consecutive looks with only low-confidence detections of an item that lead to its rejection."""
+"""Number of looks with a low-confidence detection, since the last confident one, to reject an item."""
 
 
 @dataclass(frozen=True)

@@ -61,9 +61,9 @@ class CartesianLine:
     ) -> None:
         self._spline = CubicSpline(np.linspace(0.0, length, len(waypoints)), waypoints)
         self._derivatives = [self._spline.derivative(order) for order in (1, 2)]
-        max_speed, joint_acceleration, jerk = self._tool_limits(limits, speed, length)
+        max_speed, joint_acceleration, jerk = self._compute_tool_limits(limits, speed, length)
         self.acceleration = acceleration = min(acceleration, joint_acceleration)
-        end_speed = _max_end_speed(length, max_speed, acceleration, jerk)
+        end_speed = _find_max_end_speed(length, max_speed, acceleration, jerk)
         inputs = InputParameter(1)
         inputs.current_position, inputs.target_position = [0.0], [length]
         inputs.current_velocity = [end_speed if starts_in_motion else 0.0]
@@ -86,7 +86,9 @@ class CartesianLine:
         q_s, q_ss = (derivative(distance) for derivative in self._derivatives)
         return JointState(self._spline(distance), q_s * speed, q_s * acceleration + q_ss * speed**2)
 
-    def _tool_limits(self, limits: JointLimits, speed: float, length: float) -> tuple[float, float, float]:
+    def _compute_tool_limits(
+        self, limits: JointLimits, speed: float, length: float
+    ) -> tuple[float, float, float]:
         """Return the maximum speed [m/s], acceleration [m/s²] and jerk [m/s³] of the tool on the line."""
         q_s, q_ss, q_sss = (
             np.abs(self._spline(_LIMIT_FRACTIONS * length, order)).max(axis=0) for order in (1, 2, 3)
@@ -108,17 +110,17 @@ class CartesianLine:
         return max_speed, acceleration, float(np.min(jerks / (q_s + _EPSILON)))
 
 
-def _max_end_speed(length: float, max_speed: float, acceleration: float, jerk: float) -> float:
+def _find_max_end_speed(length: float, max_speed: float, acceleration: float, jerk: float) -> float:
     """Return the largest speed [m/s], up to `max_speed`, from which the tool can stop within `length` [m]."""
 
-    def stopping_distance(speed: float) -> float:
+    def compute_stopping_distance(speed: float) -> float:
         ramp = speed / acceleration + acceleration / jerk
         return speed / 2 * (ramp if speed >= acceleration**2 / jerk else 2 * math.sqrt(speed / jerk))
 
     low, high = 0.0, max_speed
-    if stopping_distance(high) <= length:
+    if compute_stopping_distance(high) <= length:
         return high
     for _ in range(40):
         middle = (low + high) / 2
-        low, high = (middle, high) if stopping_distance(middle) <= length else (low, middle)
+        low, high = (middle, high) if compute_stopping_distance(middle) <= length else (low, middle)
     return low

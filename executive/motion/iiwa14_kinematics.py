@@ -25,7 +25,7 @@ from executive.motion.arm_model import BranchKey, Solutions, wrap_angles
 from executive.motion.limits import JointRange
 
 IIWA14_JOINT_COUNT = 7
-"""Number of joints."""
+"""Number of joints of the arm."""
 FLANGE_OFFSET = 0.045
 """Distance from the origin of link 7 to the outer face of the flange, along the z axis of the link [m]."""
 

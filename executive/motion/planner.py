@@ -30,14 +30,14 @@ from executive.motion.search import MotionSearch
 from executive.motion.trajectory import Trajectory, thin_out_path
 
 CollisionCheck = Callable[[Array, Task], None]
-"""Function that raises Blocked if joint positions `(N, n)` [rad] collide, given the load of a task."""
+"""Function that raises Blocked if a path `(N, n)` [rad] collides, given load and obstacles of a task."""
 
 MAX_CHECK_SPACING = math.radians(1.0)
 """Maximum change of a joint between two neighbouring states that are checked for collisions [rad]."""
 
 
 class Planner:
-    """PlanFactory motions of the arm of a cell file.
+    """Plans motions of the arm of a cell file.
 
     Args:
         config: Content of the cell file.

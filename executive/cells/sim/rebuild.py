@@ -109,7 +109,7 @@ def rebuild_world(world: World, tool: SuctionTool, commands: Iterable[Command]) 
 
 
 class SampledPiece:
-    """Quintic spline through sampled states; implements `executive.motion.trajectory.MotionPiece`.
+    """Quintic spline through sampled states; implements `executive.motion.state.MotionPiece`.
 
     Args:
         states: States at multiples of `STEP` and at the end; each array has the shape `(N, n)`.
