@@ -1,4 +1,4 @@
-"""Errors with their exit codes, and text of users and third parties made safe for messages."""
+"""Errors with exit codes, and functions that make text from users and servers safe for messages."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-MAX_QUOTED = 200
+MAX_QUOTATION_LENGTH = 200
 """Maximum length of a quotation or word in a message [characters]."""
 _CONTROL_CHARACTER = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff]"
 )
-"""Control characters except tab and line feed, invisible Unicode format characters and line separators, and
-lone surrogates."""
+"""Control characters except tab and line feed, invisible Unicode format characters, Unicode line separators,
+and lone surrogates."""
 _QUOTATION_OR_WORD = re.compile(r'"[^"\n]*"|\S+')
 """A quotation or a word."""
 
 
 class ExecutiveError(Exception):
-    """Base of the errors of this project.
+    """Base class of the errors of this project.
 
     Args:
         message: Description of the error; long quotations are shortened.
@@ -32,13 +32,13 @@ class ExecutiveError(Exception):
 
 
 class InputError(ExecutiveError):
-    """An input of the user is wrong; the text states the place, the problem and the solution."""
+    """An input of the user is invalid; the message states its position, the problem and a remedy."""
 
     exit_code = 2
 
 
 class Fault(ExecutiveError):
-    """A bug or a broken device: ends the run with the arm at rest, without retries.
+    """A bug or a broken device. It ends the run without retries, after the arm has braked to rest.
 
     Attributes:
         node: Path of the tree node that raised the fault, or "" outside the tree.
@@ -50,23 +50,23 @@ class Fault(ExecutiveError):
 
 
 class RecordLost(Fault):
-    """The record of the run cannot be written or was deleted: the run stops, because nothing explains it."""
+    """The record cannot be written or was deleted; the run stops, because it could not be explained later."""
 
 
 class Unreachable(ExecutiveError):
-    """No joint configuration inside the limits reaches a goal; the text states the excess."""
+    """No joint configuration within the limits reaches a goal; the message states by how much."""
 
 
 class Blocked(ExecutiveError):
-    """Every motion would come too close to an obstacle; the text names the obstacle and the distance."""
+    """Every motion comes too close to an obstacle; the message names the obstacle and the distance."""
 
 
 class Unavailable(ExecutiveError):
-    """A detector gave no usable answer; the text states the reason."""
+    """A detector returned no usable answer; the message states the reason."""
 
 
 class Crowded(Unavailable):
-    """A detector found more boxes than objects are possible."""
+    """A detector found more boxes than there can be objects in a cell."""
 
 
 class DeadlinePassed(Unavailable):
@@ -74,29 +74,29 @@ class DeadlinePassed(Unavailable):
 
 
 class NoDepth(ExecutiveError):
-    """A detection could not be localized because the frame has no usable depth there."""
+    """A detection cannot be localized, because the depth image has no usable values in its box."""
 
 
 class Stopped(BaseException):
-    """The run was stopped while it waited for the operator, so that there will be no answer.
+    """The run was halted while a skill waited for the operator.
 
-    A halt is no failure: therefore `except Exception` in a skill does not catch this exception.
+    A halt is not a failure; `except Exception` in a skill does not catch this exception.
     """
 
 
 def describe_os_error(error: OSError) -> str:
-    """Return the text of an error of the operating system, in lower case."""
+    """Return the message of an error of the operating system, in lower case."""
     return (error.strerror or str(error)).lower()
 
 
 @contextmanager
 def explain_os_errors(kind: type[ExecutiveError], problem: str, advice: str = "") -> Iterator[None]:
-    """Convert errors of the operating system to errors of a kind.
+    """Convert an OSError in the `with` block to an error with an explanation.
 
     Args:
-        kind: Class of the raised errors.
-        problem: Description of the action that failed.
-        advice: Consequence of the failure or advice, or "".
+        kind: Class of the raised error.
+        problem: Failed action, as in `the file cannot be read`.
+        advice: Consequence of the failure, or advice to the user, or "".
     """
     try:
         yield
@@ -110,11 +110,11 @@ def escape_control_characters(text: str) -> str:
 
 
 def shorten_quotations(text: str) -> str:
-    """Return `text` with every quotation and word shortened to `MAX_QUOTED` characters."""
+    """Return `text` with every quotation and word shortened to `MAX_QUOTATION_LENGTH` characters."""
 
     def shorten(match: re.Match[str]) -> str:
         piece = match[0]
         end = '…"' if piece.startswith('"') and piece.endswith('"') else "…"
-        return piece if len(piece) <= MAX_QUOTED else piece[: MAX_QUOTED - len(end)] + end
+        return piece if len(piece) <= MAX_QUOTATION_LENGTH else piece[: MAX_QUOTATION_LENGTH - len(end)] + end
 
     return _QUOTATION_OR_WORD.sub(shorten, text)

@@ -1,7 +1,7 @@
 """Rigid transforms, rotations and quaternions.
 
-Names follow the monogram notation: `X_WC` is the pose of frame C in frame W, with `p_W = X_WC.apply(p_C)` and
-`X_WB = X_WA @ X_AB`. Quaternions are `(x, y, z, w)`.
+Names follow the monogram notation: `X_WC` is the pose of coordinate frame C in frame W, with
+`p_W = X_WC.apply(p_C)` and `X_WB = X_WA @ X_AB`. Quaternions are `(x, y, z, w)`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A rigid transform: a rotation and a translation.
+    """A rigid transform, which consists of a rotation and a translation.
 
     Attributes:
         rotation: Rotation matrix `(3, 3)`.
@@ -36,7 +36,7 @@ class Pose:
 
     @staticmethod
     def of(position: ArrayLike, quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Pose:
-        """Return the pose with a position `(3,)` [m] and a unit quaternion `(x, y, z, w)`."""
+        """Return the pose with a position `(3,)` [m] and a quaternion `(x, y, z, w)`, which is normalized."""
         return Pose(rotation_from_quaternion(quaternion), np.asarray(position, dtype=float))
 
     def __matmul__(self, other: Pose) -> Pose:
@@ -47,7 +47,7 @@ class Pose:
         return Pose(self.rotation.T, -self.rotation.T @ self.position)
 
     def apply(self, points: ArrayLike) -> Array:
-        """Return points `(3,)` or `(N, 3)` [m], transformed from frame C to frame W for a pose `X_WC`."""
+        """Return points `(3,)` or `(N, 3)` [m] transformed by this pose: from C to W for `X_WC`."""
         return np.asarray(points, dtype=float) @ self.rotation.T + self.position
 
     @property
@@ -57,7 +57,7 @@ class Pose:
 
     @property
     def rotation_vector(self) -> Array:
-        """The rotation vector `(3,)`, axis times angle [rad], the angle at most pi: OpenCV's rvec."""
+        """The rotation vector `(3,)`: axis times angle [rad], with an angle of at most pi; OpenCV's rvec."""
         # The import of scipy.spatial takes 0.3 s, and few runs need a rotation vector.
         from scipy.spatial.transform import Rotation
 
@@ -69,7 +69,7 @@ class Pose:
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Return the rotation matrix `(3, 3)` of a unit quaternion `(x, y, z, w)`."""
+    """Return the rotation matrix `(3, 3)` of a quaternion `(x, y, z, w)`, which is normalized."""
     x, y, z, w = np.asarray(quaternion, dtype=float) / np.linalg.norm(np.asarray(quaternion, dtype=float))
     return np.array(
         [
@@ -83,7 +83,7 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
 def quaternion_from_rotation(rotation: Array) -> Array:
     """Return the unit quaternion `(x, y, z, w)`, `w >= 0`, of a rotation matrix `(3, 3)`.
 
-    Shepperd's method divides by the largest of the four components and is always numerically stable.
+    Shepperd's method divides by the largest of the four components, so that it is numerically stable.
     """
     r = rotation
     squares = np.array([r[0, 0], r[1, 1], r[2, 2], r[0, 0] + r[1, 1] + r[2, 2]])
@@ -101,16 +101,16 @@ def quaternion_from_rotation(rotation: Array) -> Array:
     return q if q[3] >= 0 else -q
 
 
-def about_z(angle: float) -> Array:
+def rotate_about_z(angle: float) -> Array:
     """Return the rotation `(3, 3)` by `angle` [rad] about the z axis."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def tool_down(position: ArrayLike, yaw: float = 0.0) -> Pose:
-    """Return the tool pose `X_WT` at `position` `(3,)` [m] whose z axis points straight down.
+def make_tool_down_pose(position: ArrayLike, yaw: float = 0.0) -> Pose:
+    """Return the tool pose `X_WT` at `position` `(3,)` [m] with the z axis of the tool vertically down.
 
-    At `yaw` 0 [rad], the y axis of the tool is the y axis of the world, and the x axis points backwards: an
-    iiwa has this orientation with the elbow up and joint 7 near zero.
+    At `yaw` 0 [rad], the y axes of tool and world are parallel, and the x axis of the tool points in the
+    negative x direction of the world: an iiwa has this orientation with elbow up and joint 7 near zero.
     """
-    return Pose(about_z(yaw) @ np.diag([-1.0, 1.0, -1.0]), np.asarray(position, dtype=float))
+    return Pose(rotate_about_z(yaw) @ np.diag([-1.0, 1.0, -1.0]), np.asarray(position, dtype=float))

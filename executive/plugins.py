@@ -1,6 +1,6 @@
-"""Plugins: skills, cell kinds and other classes that packages register by entry points.
+"""Plugins: skills, cell kinds and other classes that packages register as entry points.
 
-The project of the working directory counts as a package even if it is not installed.
+The project in the working directory is used like an installed package, even if it is not installed.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ else:
     import tomli as tomllib
 
 PROJECT_FILE = "pyproject.toml"
-SKILLS = "executive.skills"
-CELL_KINDS = "executive.cells"
+SKILL_GROUP = "executive.skills"
+CELL_KIND_GROUP = "executive.cells"
 
 _CLASS_PATH = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
 _EXAMPLE_LINE = 'Wave = "my_package.wave:Wave"'
@@ -37,11 +37,11 @@ def discover() -> dict[str, type[Skill]]:
     """Return every skill of the entry-point group `executive.skills`, by name.
 
     Raises:
-        InputError: Two packages register one name, an entry is not a skill or cannot be loaded, or the
-            pyproject.toml of the working directory's project is invalid.
+        InputError: Two packages register the same name, an entry is not a skill or cannot be loaded, or the
+            pyproject.toml of the project in the working directory is invalid.
     """
     found: dict[str, type[Skill]] = {}
-    for name, entry in list_entries(SKILLS, "skill").items():
+    for name, entry in list_entries(SKILL_GROUP, "skill").items():
         loaded = entry.load()
         if not (isinstance(loaded, type) and issubclass(loaded, Skill)):
             raise InputError(f'the entry point "{name}" ({entry.value}) is not a Skill subclass')
@@ -49,13 +49,13 @@ def discover() -> dict[str, type[Skill]]:
     return found
 
 
-def cell_kind(name: str) -> CellKind:
+def load_cell_kind(name: str) -> CellKind:
     """Return the class that builds cells of a kind.
 
     Raises:
         InputError: No package registers this kind, or its class cannot be loaded.
     """
-    entries = list_entries(CELL_KINDS, "kind of cell")
+    entries = list_entries(CELL_KIND_GROUP, "kind of cell")
     if name not in entries:
         raise InputError(
             f'no installed package offers cells of kind "{name}"; '
@@ -71,8 +71,8 @@ class PluginEntry:
 
     Attributes:
         name: Name of the entry point.
-        value: Place of the class: `module:Class`.
-        kind: Kind of plugin as named in an error message: `skill`.
+        value: Import path of the class: `module:Class`.
+        kind: Kind of plugin for error messages, for instance `skill`.
         remedy: Advice to the user if the class cannot be loaded.
     """
 
@@ -82,10 +82,10 @@ class PluginEntry:
     remedy: str
 
     def load(self) -> Any:
-        """Return the class.
+        """Import and return the class.
 
         Raises:
-            InputError: Importing the module of the class raised an exception.
+            InputError: The import of the module raised an exception, or the module lacks the class.
         """
         try:
             return EntryPoint(self.name, self.value, "").load()
@@ -97,18 +97,17 @@ class PluginEntry:
 
 
 def list_entries(group: str, kind: str) -> dict[str, PluginEntry]:
-    """Return the entries of a group by name, sorted by name, without loading their classes.
+    """Return the entries of a group by name, sorted by name, without importing their classes.
 
-    The project of the working directory (`project_here`) need not be installed: afterwards its folder is the
-    last in which Python looks for modules. If the project is installed, the entries in its pyproject.toml
-    count, not those at the time of the installation.
+    The project in the working directory (`find_project`) need not be installed: this function appends its
+    folder to `sys.path`. The entries in its pyproject.toml replace those of an installation of the project.
 
     Raises:
-        InputError: Two packages register one name, or the project's pyproject.toml is invalid.
+        InputError: Two packages register the same name, or the pyproject.toml of the project is invalid.
     """
-    project = project_here()
+    project = find_project()
     found: dict[str, PluginEntry] = {}
-    entries = (*_list_installed(group, kind, project), *_list_own(group, kind, project))
+    entries = (*_list_installed_entries(group, kind, project), *_list_project_entries(group, kind, project))
     for entry in sorted(entries, key=lambda entry: (entry.name, entry.value)):
         if entry.name in found and found[entry.name].value != entry.value:
             raise InputError(
@@ -119,7 +118,7 @@ def list_entries(group: str, kind: str) -> dict[str, PluginEntry]:
     return found
 
 
-def _list_installed(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
+def _list_installed_entries(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
     """Yield the entries of all installed packages except the project itself."""
     for point in entry_points(group=group):
         package = point.dist.name if point.dist else point.module.partition(".")[0]
@@ -127,16 +126,16 @@ def _list_installed(group: str, kind: str, project: Project | None) -> Iterator[
             yield PluginEntry(point.name, point.value, kind, f"uninstall the package {package}")
 
 
-def _list_own(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
-    """Yield the entries of the project, and make its modules importable."""
-    if project is None or not (entries := project.registers(group)):
+def _list_project_entries(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
+    """Yield the entries of the project, and append its folder to `sys.path`."""
+    if project is None or not (entries := project.read_entries(group)):
         return
     folder = str(project.file.parent)
     if folder not in sys.path:
         # At the end of the path, the folder cannot shadow installed modules.
         sys.path.append(folder)
     for name, value in entries.items():
-        yield PluginEntry(name, value, kind, f"take it out of {project.file}")
+        yield PluginEntry(name, value, kind, f"remove it from {project.file}")
 
 
 def _normalize(package: str) -> str:
@@ -145,9 +144,9 @@ def _normalize(package: str) -> str:
 
 
 def _locate_error(error: Exception) -> str:
-    """Return the file and line in which a module raised an error, or "" if no code of a plugin did."""
+    """Return file and line of the plugin in which an error was raised, or "" if there are none."""
     if isinstance(error, SyntaxError):
-        return ""  # The message of a syntax error names file and line.
+        return ""  # The message of a syntax error already names file and line.
     ignored_folders = Path(__file__).parent, Path(traceback.__file__).parent
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         file = Path(frame.filename)
@@ -162,25 +161,27 @@ class Project:
     """A folder with a pyproject.toml.
 
     Attributes:
-        file: The pyproject.toml.
+        file: Path of the pyproject.toml.
         name: Name of the project in this file, or "".
-        tables: Content of the table `project` in this file.
+        project_table: Content of the table `project` in this file.
     """
 
     file: Path
     name: str
-    tables: Mapping[str, Any]
+    project_table: Mapping[str, Any]
 
-    def registers(self, group: str) -> dict[str, str]:
+    def read_entries(self, group: str) -> dict[str, str]:
         """Return the entries of the table `[project.entry-points."<group>"]`: `module:Class` by name.
 
         Raises:
-            InputError: The entry is not a table of strings `module:Class`.
+            InputError: The value is not a table of strings `module:Class`.
         """
-        groups = self.tables.get("entry-points", {})
+        groups = self.project_table.get("entry-points", {})
         entries = groups.get(group, {}) if isinstance(groups, dict) else groups
         if not isinstance(entries, dict):
-            raise InputError(f"{self._locate(group)} is no table; write lines as {_EXAMPLE_LINE} below it")
+            raise InputError(
+                f"{self._locate(group)} is not a table; write lines like {_EXAMPLE_LINE} below it"
+            )
         for name, value in entries.items():
             if not isinstance(value, str) or _CLASS_PATH.fullmatch(value) is None:
                 raise InputError(
@@ -192,12 +193,11 @@ class Project:
         return f'{self.file}: [project.entry-points."{group}"]'
 
 
-def project_here() -> Project | None:
-    """Return the project of the working directory, or None if there is no project.
+def find_project() -> Project | None:
+    """Return the project with the nearest pyproject.toml, in the working directory or above it, or None.
 
-    The project is that of the nearest pyproject.toml, in the working directory or above it. A user who works
-    in a folder trusts its code, as with pytest. In a shared folder such as /tmp, any user may have written
-    the pyproject.toml: there it is ignored.
+    A user who works in a folder trusts its code, as with pytest. In a folder in which every user may write,
+    such as /tmp, a pyproject.toml is ignored.
 
     Raises:
         InputError: The file cannot be read, or is not TOML.
@@ -215,7 +215,7 @@ def project_here() -> Project | None:
 
 
 def _is_shared(folder: Path) -> bool:
-    """Return True if every user may add files to a folder that holds files of others, as /tmp."""
+    """Return True if all users may write in a folder, as in /tmp (sticky bit, writable by others)."""
     mode = folder.stat().st_mode
     return bool(mode & stat.S_ISVTX and mode & stat.S_IWOTH)
 
@@ -225,13 +225,15 @@ def _read_project(file: Path) -> Project:
         content = tomllib.loads(file.read_bytes().decode("utf-8"))
     except OSError as error:
         raise InputError(
-            f"{file} cannot be read: {error.strerror}; it lists the plugins of the project"
+            f"{file} cannot be read: {error.strerror}; the plugins of the project are registered there"
         ) from None
     except UnicodeDecodeError as error:
-        raise InputError(f"{file} is not UTF-8 text: byte {error.start} does not fit") from None
+        raise InputError(f"{file} is not UTF-8 text: byte {error.start} is invalid") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file} is no TOML: {error}; correct it: it lists the plugins") from None
-    tables = content.get("project", {})
-    if not isinstance(tables, dict):
-        raise InputError(f"{file}: project is no table; begin it with a line [project]")
-    return Project(file, str(tables.get("name", "")), tables)
+        raise InputError(
+            f"{file} is not valid TOML: {error}; correct the file: it registers plugins"
+        ) from None
+    table = content.get("project", {})
+    if not isinstance(table, dict):
+        raise InputError(f"{file}: project is not a table; begin it with a line [project]")
+    return Project(file, str(table.get("name", "")), table)

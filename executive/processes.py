@@ -1,4 +1,4 @@
-"""Child processes: worker pools that end with their parent, and commands that run a module."""
+"""Child processes: worker pools that end with their parent process, and commands that run a module."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from types import TracebackType
 from typing import Any, TypeVar
 
-R = TypeVar("R")
+Result = TypeVar("Result")
 
 
-class Workers(ProcessPoolExecutor):
+class WorkerPool(ProcessPoolExecutor):
     """A pool of spawned processes that ends with its parent process.
 
-    The processes ignore Ctrl-C, which a terminal sends to all of them: the parent process decides about their
-    work. An exception in the `with` block kills the processes.
+    The processes ignore Ctrl-C, which a terminal sends to all of them, so that the parent process decides
+    when they stop. An exception in the `with` block kills the processes.
 
     Args:
         count: Maximum number of processes.
     """
 
     def __init__(self, count: int) -> None:
-        # A fork would copy threads and locks of the simulator and the inference library.
+        # A forked process would contain locks of threads that it does not have.
         spawn = multiprocessing.get_context("spawn")
         super().__init__(count, mp_context=spawn, initializer=_initialize_worker)
 
-    def submit(self, fn: Callable[..., R], /, *args: Any, **kwargs: Any) -> Future[R]:
-        """Call `fn` in one of the processes, which may be started for the call."""
-        # A new process inherits the signal mask: Ctrl-C stays blocked until the process ignores it.
+    def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
+        """Call `fn` in one of the processes; the call may start a process."""
+        # A new process inherits the signal mask, which blocks Ctrl-C until the process ignores it.
         previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
             return super().submit(fn, *args, **kwargs)
@@ -49,7 +49,7 @@ class Workers(ProcessPoolExecutor):
 
 
 def kill_workers() -> None:
-    """Kill all processes that `multiprocessing` started; their pools are broken afterwards."""
+    """Kill all processes that `multiprocessing` started; their pools are unusable afterwards."""
     for process in multiprocessing.active_children():
         # After SIGTERM, a run would halt regularly, and the process would lose the order of its queue.
         process.kill()
@@ -58,13 +58,14 @@ def kill_workers() -> None:
 def _initialize_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
-    threading.Thread(target=_end_with_parent, name="end with parent", daemon=True).start()
+    threading.Thread(target=_exit_with_parent, name="exit with parent", daemon=True).start()
 
 
-def _end_with_parent() -> None:
+def _exit_with_parent() -> None:
+    """Wait until the parent process has ended, then exit at once."""
     parent = multiprocessing.parent_process()
     assert parent is not None
-    # `join` waits on a pipe to the parent, independently of the thread that started the worker.
+    # `join` waits for the parent process, not for the thread that started this process.
     parent.join()
     os._exit(1)
 
@@ -72,8 +73,8 @@ def _end_with_parent() -> None:
 def build_command(module: str, *arguments: str) -> list[str]:
     """Return the command that runs a module with the interpreter of this process.
 
-    Unlike `python -m`, the command does not search the working directory, where a file of the user may have
-    the name of a library.
+    Unlike `python -m`, the command does not import modules from the working directory, in which a file of the
+    user may have the name of a library.
     """
     script = (
         "import sys; sys.path[:] = filter(None, sys.path); "

@@ -1,9 +1,9 @@
-"""Base class of skills: typed ports and params, declared reasons of failure, and a generator.
+"""Base class of skills: typed ports and params, declared reasons of failure, and a generator `run`.
 
-The generator `run` yields once per control step (RUNNING). Its return is SUCCESS, and raising
-`self.failure(reason, message)` is FAILURE. `finally` clauses run at every end, also after a halt. A `run`
-without waits may be a plain function. The mission checker, the JSON Schema, the documentation and the tree
-use the declarations in the class body.
+The generator `run` yields once per control step (status RUNNING). It returns for SUCCESS, and raises
+`self.failure(reason, message)` for FAILURE. Its `finally` clauses run at every end, also after a halt. A
+`run` that never waits may be a function without `yield`. The mission checker, the JSON Schema, the
+documentation and the tree use the declarations in the class body.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ class Direction(Enum):
 
 
 In = Annotated[T, Direction.IN]
-"""An input: the skill reads its variable when the skill starts."""
+"""Type of an input: when the skill starts, it reads the variable of the port."""
 
 Out = Annotated[T, Direction.OUT]
-"""An output: the skill writes its variable when the skill succeeds."""
+"""Type of an output: when the skill succeeds, it writes the variable of the port."""
 
 Seconds = Annotated[float, "s"]
 Metres = Annotated[float, "m"]
@@ -40,7 +40,7 @@ MetresPerSecond = Annotated[float, "m/s"]
 
 
 class ToolState(Enum):
-    """Required or resulting state of the tool."""
+    """Required or resulting state of the tool of the arm."""
 
     ANY = "any"
     EMPTY = "empty"
@@ -52,17 +52,17 @@ ANY, EMPTY, HOLDING = ToolState.ANY, ToolState.EMPTY, ToolState.HOLDING
 
 @dataclass(frozen=True)
 class Param:
-    """A typed constant of a skill, set in the mission.
+    """A typed constant of a skill, which a mission sets.
 
     Attributes:
         name: Key in the mission file.
         type: Python type of the value.
         unit: SI unit, or "".
-        default: Value if the mission sets none; `...` if the mission must set one.
-        ge: Smallest allowed value, or None.
-        le: Largest allowed value, or None.
+        default: Value if the mission sets none; `...` if the mission must set a value.
+        ge: Minimum value, or None.
+        le: Maximum value, or None.
         choices: Allowed values, or None for any value.
-        refers: Kind of thing that the value names (`bin`, `detector`, `pose`, `class`), or "".
+        refers: Kind of name in the cell that the value is (`bin`, `detector`, `pose`, `class`), or "".
         doc: Description of the param.
     """
 
@@ -87,11 +87,11 @@ class Port:
     """A typed input or output of a skill.
 
     Attributes:
-        name: Attribute of the skill, and default name of the variable of the port.
+        name: Attribute of the skill; also the default name of the variable of the port.
         type: Python type of the value.
         direction: IN or OUT.
-        default: Value of an input without a variable; `...` if the input needs a written variable.
-        refers: Kind of thing that the value names (`item`, `bin`, `class`), or "".
+        default: Value of an input without a variable; `...` if the input needs a variable with a value.
+        refers: Kind of name that the value is (`item`, `bin`, `class`), or "".
         doc: Description of the port.
     """
 
@@ -117,18 +117,18 @@ def param(
     refers: str = "",
     doc: str = "",
 ) -> Any:
-    """Declare a param of a skill; see `Param` for the arguments."""
+    """Declare a param of a skill; the arguments are attributes of `Param`."""
     # `Skill.__init_subclass__` sets name, type and unit.
     return Param("", None, "", default, ge, le, choices, refers, doc)
 
 
 def port(*, default: Any = ..., refers: str = "", doc: str = "") -> Any:
-    """Declare a port of a skill; see `Port` for the arguments."""
+    """Declare a port of a skill; the arguments are attributes of `Port`."""
     return param(default, refers=refers, doc=doc)
 
 
 class SkillFailed(Exception):
-    """A declared failure: a reason from the skill's list, and a sentence with measured values."""
+    """Failure of a skill, with a reason that the skill declares and a message with measured values."""
 
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)
@@ -137,18 +137,18 @@ class SkillFailed(Exception):
 
 
 class Skill:
-    """Base of all skills; subclasses declare params and ports, and implement `run`.
+    """Base class of skills; subclasses declare params and ports, and implement `run`.
 
     Attributes:
         params: Declared params by name.
         ports: Declared ports by name.
         reasons: Possible reasons of failure.
-        uses: Devices that no parallel skill may use: `arm`, `tool`, `camera`.
+        uses: Devices that no skill in a parallel branch may use: `arm`, `tool`, `camera`.
         senses: True if the skill gets new information: an image, or a request of the operator.
         moves: True if the skill moves the arm.
-        tool_state: Required state of the tool (ANY: none), and state after success (ANY: unchanged).
-        tool_left: State of the tool after a failure, by reason, and after a `halt`, if the skill changes the
-            state; ANY if the state is unknown.
+        tool_state: State of the tool that the skill requires (ANY: none), and after success (ANY: unchanged).
+        tool_left: State of the tool after a failure, by reason, and after a halt (key `halt`), for those that
+            change the state; ANY if the state is unknown.
         waits: Name of the param whose duration [s] passes before every success, or "".
     """
 
@@ -193,7 +193,7 @@ class Skill:
         cls.params, cls.ports = params, ports
 
     def __init__(self, **values: Any) -> None:
-        """Set params and inputs by name; others get their defaults."""
+        """Set the given params and inputs, and all others to their defaults."""
         inputs = {name: port for name, port in self.ports.items() if port.direction is Direction.IN}
         known: dict[str, Param | Port] = {**self.params, **inputs}
         unknown = next((name for name in values if name not in known), None)
@@ -209,7 +209,7 @@ class Skill:
             setattr(self, name, value)
 
     def run(self, cell: Cell) -> Iterator[None] | None:
-        """Execute the skill: `yield` ends a control step, a return is success, raising is failure."""
+        """Execute the skill: `yield` ends a control step, `return` is success, an exception is failure."""
         raise NotImplementedError
 
     @classmethod
@@ -238,7 +238,7 @@ class Skill:
 
 
 def _require_annotations(skill: type[Skill]) -> None:
-    """Raise an error if a `param` or `port` in the class body has no annotation of its type.
+    """Check that every `param` and `port` in the class body has an annotation of its type.
 
     Raises:
         TypeError: A declaration has no annotation.

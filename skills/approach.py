@@ -68,7 +68,7 @@ class Approach(Skill):
         goal, _ = find_goal()
         yield from follow(self, cell, motion, until=_build_contact_check(tool))
         kind, middle = cell.classes[self.target.label], float(self.target.position[2])
-        height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded
+        height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded_length
         expected = f"expected at {(highest - cell.descent) * 1000:.0f} mm"
         if not tool.touching:
             cell.ledger.record_miss(item, found_table=_proves_absence(goal, self.target, kind))

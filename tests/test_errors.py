@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from executive.errors import MAX_QUOTED, InputError, escape_control_characters, shorten_quotations
+from executive.errors import MAX_QUOTATION_LENGTH, InputError, escape_control_characters, shorten_quotations
 
 
 @pytest.mark.parametrize(
@@ -33,8 +33,10 @@ def test_quotations_and_words_are_cut() -> None:
     quoted, word = '"' + "a b " * 100 + '"', "c" * 300
     short = shorten_quotations(f"unknown {quoted} in {word}; there are: d")
     first, second = short.removeprefix("unknown ").split(" in ")
-    assert (len(first), first[-2:]) == (MAX_QUOTED, '…"')
-    assert second == "c" * (MAX_QUOTED - 1) + "…; there are: d".replace("; there are: d", " there are: d")
+    assert (len(first), first[-2:]) == (MAX_QUOTATION_LENGTH, '…"')
+    assert second == "c" * (MAX_QUOTATION_LENGTH - 1) + "…; there are: d".replace(
+        "; there are: d", " there are: d"
+    )
 
 
 def test_an_error_repeats_at_most_200_characters_of_input_in_one_piece() -> None:

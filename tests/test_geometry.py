@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.geometry import Pose, about_z, tool_down
+from executive.geometry import Pose, make_tool_down_pose, rotate_about_z
 from tests.camera_poses import looking_down
 
 unit = st.floats(-1, 1, allow_nan=False)
@@ -27,8 +27,8 @@ def test_a_quaternion_survives_the_way_through_a_matrix(quaternion) -> None:
 
 
 def test_a_rotation_vector_is_the_axis_times_the_angle() -> None:
-    assert np.allclose(tool_down((0, 0, 0), yaw=np.pi).rotation_vector, [np.pi, 0, 0])
-    assert np.allclose(Pose(about_z(-0.4), np.zeros(3)).rotation_vector, [0, 0, -0.4])
+    assert np.allclose(make_tool_down_pose((0, 0, 0), yaw=np.pi).rotation_vector, [np.pi, 0, 0])
+    assert np.allclose(Pose(rotate_about_z(-0.4), np.zeros(3)).rotation_vector, [0, 0, -0.4])
 
 
 @given(points, quaternions, points, quaternions, points)
@@ -39,7 +39,7 @@ def test_poses_chain(p, q, r, s, point) -> None:
 
 @given(points, st.floats(-3, 3))
 def test_the_tool_points_down_at_every_yaw(position, yaw) -> None:
-    assert np.allclose(tool_down(position, yaw).rotation[:, 2], [0, 0, -1])
+    assert np.allclose(make_tool_down_pose(position, yaw).rotation[:, 2], [0, 0, -1])
 
 
 def test_a_camera_looking_down_shows_forward_at_the_top_of_its_image() -> None:

@@ -28,7 +28,7 @@ from executive.mission.parse.cell_file import load_cell
 from executive.mission.schema.files import make_mission_schema
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml, to_python_value
-from executive.plugins import cell_kind, discover
+from executive.plugins import discover, load_cell_kind
 from executive.record.result import EXIT_CODE_BY_STATUS
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
@@ -79,14 +79,14 @@ def assert_does_its_work(loaded: LoadedMission) -> None:
 
 @pytest.mark.parametrize("name", MISSIONS)
 def test_every_mission_of_the_mission_guides_does_its_work(name: str, folder: Path) -> None:
-    assert_does_its_work(load_mission(name, discover(), find_cell_kind=cell_kind))
+    assert_does_its_work(load_mission(name, discover(), find_cell_kind=load_cell_kind))
 
 
 def test_the_mission_on_the_front_page_does_its_work(tmp_path: Path) -> None:
     (block,) = (block for block in blocks("README.md") if block.language == "yaml")
     path = tmp_path / "shown.yaml"
     path.write_text(block.text, encoding="utf-8")
-    assert_does_its_work(load_mission(path, discover(), find_cell_kind=cell_kind))
+    assert_does_its_work(load_mission(path, discover(), find_cell_kind=load_cell_kind))
 
 
 @pytest.mark.parametrize("name", MISSIONS)
@@ -99,7 +99,7 @@ def test_an_editor_marks_nothing_in_the_missions_of_the_mission_guides(name: str
 @pytest.mark.parametrize("name", MISTAKES)
 def test_every_mistake_of_the_mission_guides_is_found(name: str, folder: Path) -> None:
     with pytest.raises(MissionError):
-        load_mission(name, discover(), find_cell_kind=cell_kind)
+        load_mission(name, discover(), find_cell_kind=load_cell_kind)
 
 
 @pytest.mark.parametrize(("words", "printed"), TRANSCRIPTS)

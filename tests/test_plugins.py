@@ -10,7 +10,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.perception.detectors.registry import find_detector_kinds
-from executive.plugins import cell_kind, discover, list_entries
+from executive.plugins import discover, list_entries, load_cell_kind
 
 Write = Callable[..., Path]
 Install = Callable[[str, str], None]
@@ -77,7 +77,7 @@ def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None
         "hall_four", "class Bench:\n    pass\n\n\nclass Eye:\n    pass\n",
         cells='bench = "hall_four.part:Bench"', detectors='eye = "hall_four.part:Eye"',
     )  # fmt: skip
-    assert cell_kind("bench").__name__ == "Bench"
+    assert load_cell_kind("bench").__name__ == "Bench"
     assert find_detector_kinds()["eye"].load().__name__ == "Eye"
 
 
@@ -85,7 +85,7 @@ def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None
     ("group", "kind", "ask"),
     [
         ("skills", "skill", discover),
-        ("cells", "kind of cell", lambda: cell_kind("wave")),
+        ("cells", "kind of cell", lambda: load_cell_kind("wave")),
         ("detectors", "kind of detector", lambda: find_detector_kinds()["wave"].load()),
     ],
 )
@@ -98,7 +98,7 @@ def test_what_cannot_be_loaded_is_named_with_place_and_file(
     assert str(caught.value) == (
         f'the {kind} "wave" (hall_five.part:Wave) cannot be loaded: ModuleNotFoundError: '
         f"No module named 'nowhere', in {file.parent}/hall_five/part.py:1; "
-        f"correct it, or take it out of {file}"
+        f"correct it, or remove it from {file}"
     )
 
 

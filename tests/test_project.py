@@ -10,7 +10,7 @@ from unittest.mock import Mock
 import pytest
 
 from executive.errors import InputError
-from executive.plugins import project_here
+from executive.plugins import find_project
 
 Write = Callable[[str], Path]
 
@@ -31,18 +31,18 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
 
 
 def registers(group: str = "executive.skills") -> dict[str, str]:
-    project = project_here()
+    project = find_project()
     assert project is not None
-    return project.registers(group)
+    return project.read_entries(group)
 
 
 def test_it_says_what_it_registers(write: Write) -> None:
     file = write(f'[project]\nname = "Blue-Table"\n{SKILLS}Wave = "blue.wave:Wave"\n')
-    project = project_here()
+    project = find_project()
     assert project is not None
     assert (project.file, project.name) == (file, "Blue-Table")
-    assert project.registers("executive.skills") == {"Wave": "blue.wave:Wave"}
-    assert project.registers("executive.cells") == {}
+    assert project.read_entries("executive.skills") == {"Wave": "blue.wave:Wave"}
+    assert project.read_entries("executive.cells") == {}
 
 
 @pytest.mark.parametrize("text", ["", "[tool.ruff]\n", '[project]\nname = "blue"\n'])
@@ -56,10 +56,10 @@ def test_it_is_that_of_the_nearest_file_upwards(write: Write, monkeypatch: pytes
     folder = file.parent / "inner" / "missions"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
-    assert (found := project_here()) is not None and found.file == file
+    assert (found := find_project()) is not None and found.file == file
     nearer = folder.parent / "pyproject.toml"
     nearer.write_text("")
-    assert (found := project_here()) is not None and found.file == nearer
+    assert (found := find_project()) is not None and found.file == nearer
 
 
 def test_a_working_directory_that_is_gone_has_none(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,28 +67,28 @@ def test_a_working_directory_that_is_gone_has_none(write: Write, monkeypatch: py
     folder.mkdir()
     monkeypatch.chdir(folder)
     folder.rmdir()
-    assert project_here() is None
+    assert find_project() is None
 
 
 @pytest.mark.parametrize(("mode", "counts"), [(0o1777, False), (0o777, True), (0o755, True)])
 def test_a_file_in_a_folder_that_is_everybodys_does_not_count(write: Write, mode: int, counts: bool) -> None:
     file = write("")
     file.parent.chmod(mode)
-    found = project_here()
+    found = find_project()
     assert (found is not None and found.file == file) == counts
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("[project\n", "is no TOML: Expected ']' at the end of a table declaration (at line 1, column 9); "
-         "correct it: it lists the plugins"),
-        ("project = 3\n", ": project is no table; begin it with a line [project]"),
+        ("[project\n", "is not valid TOML: Expected ']' at the end of a table declaration (at line 1, "
+         "column 9); correct the file: it registers plugins"),
+        ("project = 3\n", ": project is not a table; begin it with a line [project]"),
         ("[project]\nentry-points = 3\n",
-         ': [project.entry-points."executive.skills"] is no table; write lines as '
+         ': [project.entry-points."executive.skills"] is not a table; write lines like '
          'Wave = "my_package.wave:Wave" below it'),
         ('[project.entry-points]\n"executive.skills" = ["a:B"]\n',
-         ': [project.entry-points."executive.skills"] is no table; write lines as '
+         ': [project.entry-points."executive.skills"] is not a table; write lines like '
          'Wave = "my_package.wave:Wave" below it'),
         (f'{SKILLS}Wave = "blue.wave"\n',
          ': [project.entry-points."executive.skills"]: "Wave" names no class: \'blue.wave\'; write it as '
@@ -107,11 +107,11 @@ def test_what_is_wrong_is_said_with_the_file(write: Write, text: str, says: str)
 def test_a_file_that_cannot_be_read_is_refused(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     file = write("")
     file.write_bytes(b'name = "\xff"')
-    with pytest.raises(InputError, match=f"^{re.escape(str(file))} is not UTF-8 text: byte 8 does not fit$"):
-        project_here()
+    with pytest.raises(InputError, match=f"^{re.escape(str(file))} is not UTF-8 text: byte 8 is invalid$"):
+        find_project()
     monkeypatch.setattr(Path, "read_bytes", Mock(side_effect=PermissionError(13, "Permission denied")))
     with pytest.raises(InputError) as caught:
-        project_here()
+        find_project()
     assert str(caught.value) == (
-        f"{file} cannot be read: Permission denied; it lists the plugins of the project"
+        f"{file} cannot be read: Permission denied; the plugins of the project are registered there"
     )

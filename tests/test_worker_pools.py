@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from executive.processes import Workers
+from executive.processes import WorkerPool
 
 PARENT = """\
 import multiprocessing, signal
-from executive.processes import Workers
+from executive.processes import WorkerPool
 
 if __name__ == "__main__":
-    pool = Workers(1)
+    pool = WorkerPool(1)
     pool.submit(signal.getsignal, signal.SIGINT).result()
     (worker,) = multiprocessing.active_children()
     print(worker.pid, flush=True)
@@ -66,12 +66,12 @@ def interrupted() -> str:
 
 
 def test_ctrl_c_does_nothing_to_a_worker() -> None:
-    with Workers(1) as pool:
+    with WorkerPool(1) as pool:
         assert pool.submit(interrupted).result() == "unhurt"
 
 
 def test_ctrl_c_at_its_very_start_does_nothing_to_a_worker(capfd: pytest.CaptureFixture[str]) -> None:
-    with Workers(1) as pool:
+    with WorkerPool(1) as pool:
         future = pool.submit(os.getpid)
         (worker,) = multiprocessing.active_children()
         assert worker.pid is not None
@@ -81,14 +81,14 @@ def test_ctrl_c_at_its_very_start_does_nothing_to_a_worker(capfd: pytest.Capture
 
 
 def test_starting_a_worker_keeps_no_ctrl_c_from_its_parent() -> None:
-    with Workers(1) as pool:
+    with WorkerPool(1) as pool:
         pool.submit(os.getpid).result()
         assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
 def test_who_leaves_the_pool_by_an_exception_does_not_wait_for_the_work() -> None:
     began = time.monotonic()
-    with pytest.raises(KeyboardInterrupt), Workers(2) as pool:
+    with pytest.raises(KeyboardInterrupt), WorkerPool(2) as pool:
         for _ in range(4):
             pool.submit(time.sleep, 600.0)
         raise KeyboardInterrupt

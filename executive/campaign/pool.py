@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from typing import TypeVar
 
-from executive.processes import Workers, kill_workers
+from executive.processes import WorkerPool, kill_workers
 from executive.run.signals import HALT_SIGNALS, handle_signals
 
 J = TypeVar("J")
@@ -50,7 +50,7 @@ def run_jobs(
     pending = deque(enumerate(jobs))
     results: dict[int, R] = {}
     running: dict[Future[R], int] = {}
-    pool, is_broken, is_halted, halt = Workers(workers), False, False, threading.Event()
+    pool, is_broken, is_halted, halt = WorkerPool(workers), False, False, threading.Event()
     try:
         with handle_signals(HALT_SIGNALS, lambda *_: halt.set()):
             while running or (pending and not is_halted):
@@ -85,7 +85,7 @@ def run_jobs(
                         progress(len(results), len(jobs))
                 if is_broken and not running:
                     pool.shutdown()
-                    pool, is_broken = Workers(workers), False
+                    pool, is_broken = WorkerPool(workers), False
     finally:
         pool.shutdown()
     return [results.get(number) for number in range(len(jobs))]

@@ -27,14 +27,15 @@ class Goal:
     Attributes:
         position: Position of the tool centre point `(x, y, z)` [m].
         yaw: Rotation about the vertical axis [rad]; None: any rotation.
-        guarded: Length of the guarded last part, straight down [m]; 0 for none.
-        speed: Largest tool speed of the guarded part [m/s].
+        guarded_length: Length of the guarded descent at the end [m]: slow and vertical, until a skill stops
+            the arm at the first contact; 0 for none.
+        guarded_speed: Maximum tool speed of the guarded descent [m/s].
     """
 
     position: tuple[float, float, float]
     yaw: float | None = None
-    guarded: float = 0.0
-    speed: float = math.inf
+    guarded_length: float = 0.0
+    guarded_speed: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -43,12 +44,12 @@ class Task:
 
     Attributes:
         load: Object in the tool, or None.
-        around: Obstacles that the cell file does not declare: objects on the table and in the bins.
-        target: Obstacle that the tool may touch on the guarded part only, or None.
+        obstacles: Obstacles that are not in the cell file: objects on the table and in the bins.
+        target: Obstacle that the tool may touch, only during the guarded descent; None for none.
     """
 
     load: Load | None = None
-    around: tuple[Obstacle, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
     target: Obstacle | None = None
 
 

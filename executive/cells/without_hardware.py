@@ -17,7 +17,7 @@ from executive.cell.visuals import Visuals
 from executive.cell.workcell import CellOptions
 from executive.events import Emit, TargetSelected
 from executive.ledger.tracker import Tracker
-from executive.perception.evidence import classes_distinct_by_touch
+from executive.perception.evidence import find_classes_distinct_by_touch
 
 
 class CellWithoutHardware:
@@ -53,7 +53,7 @@ class CellWithoutHardware:
             build_bins(config),
             self.routes,
             emit,
-            classes_distinct_by_touch(config),
+            find_classes_distinct_by_touch(config),
         )
         missing: Any = None
 

@@ -30,14 +30,14 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
         from executive.errors import InputError
         from executive.mission.findings import MAX_LISTED_FINDINGS, Finding
         from executive.mission.load import load_mission
-        from executive.plugins import cell_kind, discover
+        from executive.plugins import discover, load_cell_kind
 
         skills = discover()
         reports: list[dict[str, Any]] = []
         texts = []
         for mission in missions:
             try:
-                loaded = load_mission(mission, skills, overrides, cell_kind)
+                loaded = load_mission(mission, skills, overrides, load_cell_kind)
                 findings, endings, ok = loaded.warnings, loaded.unhandled_failures, True
                 texts.append(_describe(mission, findings, endings))
             except InputError as error:

@@ -132,10 +132,10 @@ def check_packages() -> Iterator[Diagnosed]:
 def check_plugins() -> Iterator[Diagnosed]:
     """Load every installed skill, kind of cell and kind of detector, and yield their numbers."""
     from executive.perception.detectors import registry
-    from executive.plugins import CELL_KINDS, discover, list_entries, project_here
+    from executive.plugins import CELL_KIND_GROUP, discover, find_project, list_entries
 
-    skills, project = discover(), project_here()
-    kinds, detectors = list_entries(CELL_KINDS, "kind of cell"), registry.find_detector_kinds()
+    skills, project = discover(), find_project()
+    kinds, detectors = list_entries(CELL_KIND_GROUP, "kind of cell"), registry.find_detector_kinds()
     for entry in (*kinds.values(), *detectors.values()):
         entry.load()
     message = f"{len(skills)} skills, {len(kinds)} kinds of cells, {len(detectors)} kinds of detectors"

@@ -131,11 +131,11 @@ def _run_mission(
 ) -> Result:
     """Run a mission from its start and return the result."""
     from executive.mission.load import load_mission
-    from executive.plugins import cell_kind, discover
+    from executive.plugins import discover, load_cell_kind
     from executive.record.recorded_run import record_run
 
     skills = discover()
-    loaded = load_mission(mission, skills, overrides, cell_kind)
+    loaded = load_mission(mission, skills, overrides, load_cell_kind)
     for warning in loaded.warnings if record.views else ():
         click.echo(str(warning), err=True)
     if options.scene is not None:

@@ -51,11 +51,11 @@ def command(
         from executive.cell.json_values import to_json
         from executive.cli.progress import bar, print_halting
         from executive.mission.load import load_mission
-        from executive.plugins import cell_kind, discover
+        from executive.plugins import discover, load_cell_kind
         from executive.record.run_directory import check_runs_folder
 
         # A mistake in the mission or the folder is reported once, not for every seed.
-        loaded = load_mission(mission, discover(), overrides, cell_kind)
+        loaded = load_mission(mission, discover(), overrides, load_cell_kind)
         if scene is not None:
             from executive.cells.sim.scene_file import load_scene
 

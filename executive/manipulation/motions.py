@@ -125,7 +125,7 @@ def release_item(
 def make_task(cell: Cell) -> Task:
     """Return load and obstacles of a motion with the present content of the tool."""
     held = cell.ledger.find_held_item()
-    return Task(around=list_obstacles(cell)) if held is None else make_transport_task(cell, held)
+    return Task(obstacles=list_obstacles(cell)) if held is None else make_transport_task(cell, held)
 
 
 def make_transport_task(cell: Cell, item: Item) -> Task:

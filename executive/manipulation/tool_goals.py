@@ -65,7 +65,7 @@ def make_approach(
         overtravel=overtravel,
         spacing=spacing,
     )
-    return goal, Task(around=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
+    return goal, Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
 
 
 def make_object_goal(
@@ -95,7 +95,9 @@ def make_object_goal(
     lowest = compute_lowest_contact(kind, z, overtravel)
     if attempt >= ATTEMPTS_BEFORE_PROBE:
         lowest = min(lowest, z - kind.height / 2 + PROBE_CLEARANCE)
-    return Goal((x + dx, y + dy, lowest), guarded=surface + descent - lowest, speed=descent_speed)
+    return Goal(
+        (x + dx, y + dy, lowest), guarded_length=surface + descent - lowest, guarded_speed=descent_speed
+    )
 
 
 def compute_lowest_contact(kind: ObjectClass, centre_height: float, overtravel: float) -> float:

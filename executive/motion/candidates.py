@@ -62,6 +62,6 @@ def find_candidates(
         arrival, entry = None, JointState.at_rest(low)
         if length > 0:
             waypoints = solve_vertical_waypoints(kinematics, low, length, WAYPOINT_COUNT, branch)[::-1]
-            arrival = CartesianLine(waypoints, length, limits, goal.speed, starts_in_motion=True)
+            arrival = CartesianLine(waypoints, length, limits, goal.guarded_speed, starts_in_motion=True)
             entry = arrival.state_at(0.0)
         yield Candidate(float(durations[index]), entry, arrival, branch)

@@ -9,7 +9,7 @@ import numpy as np
 
 from executive.cell.arm import Goal
 from executive.errors import Unreachable
-from executive.geometry import Array, Pose, tool_down
+from executive.geometry import Array, Pose, make_tool_down_pose
 from executive.motion.arm_model import BranchKey, Kinematics, Solutions, wrap_angles
 
 LIMIT_MARGIN = math.radians(1.0)
@@ -51,7 +51,7 @@ def find_configuration_pairs(
         Unreachable: No pair is in the joint range; the message states the position and the cause.
     """
     x, y, z = goal.position
-    poses = [tool_down((x, y, z + length)), tool_down((x, y, z))]
+    poses = [make_tool_down_pose((x, y, z + length)), make_tool_down_pose((x, y, z))]
     for spacing, margin in ((COARSE_SPACING, LIMIT_MARGIN), (FINE_SPACING, 0.0)):
         upper, lower = (kinematics.solve_all(pose, q_start, spacing) for pose in poses)
         high, low = upper.qs, lower.qs

@@ -114,4 +114,6 @@ class Planner:
 
 def _make_free_part_task(task: Task) -> Task:
     """Return the task of a motion before its guarded part: the target of the motion counts as an obstacle."""
-    return task if task.target is None else replace(task, around=(*task.around, task.target), target=None)
+    return (
+        task if task.target is None else replace(task, obstacles=(*task.obstacles, task.target), target=None)
+    )

@@ -13,7 +13,7 @@ from executive.cell.arm import Goal, Task
 from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height
 from executive.errors import Unreachable
-from executive.geometry import Array, tool_down
+from executive.geometry import Array, make_tool_down_pose
 from executive.motion.arm_model import BranchKey, Kinematics
 from executive.motion.candidates import Candidate, find_candidates
 from executive.motion.cartesian_line import WAYPOINT_COUNT, CartesianLine
@@ -78,7 +78,7 @@ class MotionSearch:
         self._payload = PayloadLimit(task.load, kinematics) if task.load else None
         ends = kinematics.compute_tips_and_axes(start[None]), self._find_free_end()
         tips, axes = map(np.concatenate, zip(*ends, strict=True))
-        self._clearance = ClearanceModel(config, task.around, tips[:, :2])
+        self._clearance = ClearanceModel(config, task.obstacles, tips[:, :2])
         self._clearance.relax_end_margins(tips, axes, self._discs)
         self._rises: dict[tuple[float, bool], tuple[list[MotionPiece], JointState]] = {}
         self._departure = departure = self._plan_departure(start, float(tips[0, 2]))
@@ -107,13 +107,13 @@ class MotionSearch:
         if not isinstance(self._end, Goal):
             return self._kinematics.compute_tips_and_axes(self._end[None])
         x, y, z = self._end.position
-        return np.array([[x, y, z + self._end.guarded]]), np.array([[0.0, 0.0, -1.0]])
+        return np.array([[x, y, z + self._end.guarded_length]]), np.array([[0.0, 0.0, -1.0]])
 
     def _list_candidates(self) -> Iterator[Candidate]:
         if not isinstance(self._end, Goal):
             yield Candidate(0.0, JointState.at_rest(self._end), None, None)
             return
-        length = self._end.guarded or self._straight_length
+        length = self._end.guarded_length or self._straight_length
         yield from find_candidates(self._kinematics, self._limits, self._start, self._end, length)
 
     def _list_direct_and_optimized(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
@@ -176,7 +176,7 @@ class MotionSearch:
         """Return the motion that consists of departure, free part, and arrival."""
         pieces = (self._departure, *free_part) if self._departure else free_part
         guarded_start_time = math.inf
-        if isinstance(self._end, Goal) and self._end.guarded > 0:
+        if isinstance(self._end, Goal) and self._end.guarded_length > 0:
             guarded_start_time = sum(piece.duration for piece in pieces)
         return Trajectory((*pieces, candidate.arrival) if candidate.arrival else pieces, guarded_start_time)
 
@@ -232,7 +232,7 @@ class MotionSearch:
         self, position: tuple[float, float, float], branch: BranchKey, q_near: Array
     ) -> JointState:
         """Return the state of rest at a tool position [m], with the last joint of `q_near` `(n,)` [rad]."""
-        q = self._kinematics.solve(tool_down(position), branch)
+        q = self._kinematics.solve(make_tool_down_pose(position), branch)
         q[-1] = q_near[-1]
         return JointState.at_rest(q)
 

@@ -1,1 +1,1 @@
-"""Camera model, localization, detectors, dataset, training, evaluation."""
+"""Camera model, localization, detectors, and checks of cameras and detections."""

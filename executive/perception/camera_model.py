@@ -1,7 +1,7 @@
 """Pinhole camera model: projection of points into an image, and rays through its pixels.
 
 Camera frames follow OpenCV (z along the optical axis, x to the right, y down). Image coordinates are
-continuous: pixel i covers [i, i + 1), so the principal point of a centred camera is (W / 2, H / 2).
+continuous: pixel i covers [i, i + 1), so that the centre of an image is (W / 2, H / 2).
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from executive.cell.frame import Box
 from executive.geometry import Array, Pose
 
 NEAR, FAR = 0.02, 5.0
-"""Clipping planes of rendered cameras [m]."""
+"""Distances of the near and far clipping planes of rendered cameras [m]."""
 
 
 def compute_camera_matrix(width: int, height: int, fov_deg: float) -> Array:
-    """Return the camera matrix `(3, 3)` [pixel] of a centred camera with square pixels.
+    """Return the camera matrix `(3, 3)` [pixel] for square pixels and a principal point in the image centre.
 
     Args:
         width: Image width [pixel].
@@ -39,10 +39,10 @@ def compute_field_of_view(matrix: Array, height: int) -> float:
 def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
     """Return the pose of a camera at `position` whose optical axis passes through `target`.
 
-    `up` `(3,)` is the direction towards the top of the image; it need not be perpendicular to the axis.
+    `up` `(3,)` is the direction to the top of the image; it need not be perpendicular to the optical axis.
 
     Raises:
-        ValueError: The three arguments do not determine a pose.
+        ValueError: The arguments do not determine a pose.
     """
     origin = np.asarray(position, dtype=float)
     axis = np.asarray(target, dtype=float) - origin
@@ -51,7 +51,7 @@ def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) 
         raise ValueError(
             f"a camera at {origin.tolist()} with axis {axis.tolist()} cannot have "
             f"{np.asarray(up, dtype=float).tolist()} as its upward direction: "
-            "look_at must differ from position, and up must not lie along the axis"
+            "look_at must differ from position, and up must not be parallel to the axis"
         )
     z = axis / np.linalg.norm(axis)
     x = right / np.linalg.norm(right)
@@ -61,10 +61,10 @@ def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) 
 def convert_from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Array, Pose]:
     """Return camera matrix `(3, 3)` [pixel] and pose `X_WC` of a camera calibrated with OpenCV.
 
-    The inverse of `Frame.to_opencv`. Pixel centres have integer coordinates in OpenCV, and are half a pixel
-    further here; rvec [rad] and tvec [m] of `cv2.solvePnP` transform points from W to C.
+    This is the inverse of `Frame.to_opencv`. Pixel centres have integer coordinates in OpenCV; here, 0.5 is
+    added to both coordinates. rvec [rad] and tvec [m] of `cv2.solvePnP` transform points from W to C.
     """
-    # The import takes a third of a second, and few cells have a camera calibrated with OpenCV.
+    # The import takes 0.3 s, and few cells have a camera calibrated with OpenCV.
     from scipy.spatial.transform import Rotation
 
     shifted = np.array(matrix, dtype=float)
@@ -74,9 +74,9 @@ def convert_from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> 
 
 
 def compute_calibration(config: CameraConfig) -> tuple[Array, Pose]:
-    """Return the camera matrix `(3, 3)` [pixel] and the pose `X_MC` of a camera in a cell file.
+    """Return the camera matrix `(3, 3)` [pixel] and the pose `X_MC` of a camera of a cell file.
 
-    Frame M is the world for a fixed camera, and the flange for a wrist camera.
+    M is the coordinate frame of the world for a fixed camera, and of the flange for a wrist camera.
     """
     calibration = config.calibration
     if calibration is None:
@@ -92,14 +92,14 @@ def compute_calibration(config: CameraConfig) -> tuple[Array, Pose]:
 def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
     """Return the image coordinates `(..., 2)` [pixel] of points `(..., 3)` [m] in the world.
 
-    The points must lie in front of the camera.
+    The points must be in front of the camera.
     """
     p = X_WC.inverse().apply(points) @ matrix.T
     return np.asarray(p[..., :2] / p[..., 2:])
 
 
 def compute_pixel_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:
-    """Return the unit vector `(3,)` in the world along the ray through `pixel` `(2,)`."""
+    """Return the direction in the world, a unit vector `(3,)`, of the ray through `pixel` `(2,)`."""
     u, v = np.asarray(pixel, dtype=float)
     direction = X_WC.rotation @ np.linalg.solve(matrix, np.array([u, v, 1.0]))
     return np.asarray(direction / np.linalg.norm(direction))
@@ -109,21 +109,21 @@ def intersect_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Ar
     """Return the point `(3,)` [m] at height `z` [m] in the world that appears at `pixel` `(2,)`.
 
     Raises:
-        ValueError: The ray through the pixel does not meet that height in front of the camera.
+        ValueError: The ray through the pixel does not intersect the plane in front of the camera.
     """
     u, v = np.asarray(pixel, dtype=float)
     direction = X_WC.rotation @ np.linalg.solve(matrix, np.array([u, v, 1.0]))
-    drop = z - X_WC.position[2]
-    if abs(direction[2]) < 1e-9 or drop / direction[2] <= 0:
+    height = z - X_WC.position[2]
+    if abs(direction[2]) < 1e-9 or height / direction[2] <= 0:
         raise ValueError(
             f"pixel {np.asarray(pixel, dtype=float).tolist()} of a camera {X_WC.position[2]:.3f} m high "
-            f"looks away from the plane z = {z:.3f} m; only pixels whose ray meets it can be placed on it"
+            f"has a ray that does not intersect the plane z = {z:.3f} m in front of the camera"
         )
-    return np.asarray(X_WC.position + drop / direction[2] * direction)
+    return np.asarray(X_WC.position + height / direction[2] * direction)
 
 
 def compute_view_matrix(X_WC: Pose) -> tuple[float, ...]:
-    """Return the view matrix of OpenGL and PyBullet: 16 numbers, column by column."""
+    """Return the view matrix of OpenGL and PyBullet: 16 numbers in column-major order."""
     X_CW = X_WC.inverse()
     view = np.eye(4)
     view[:3, :3], view[:3, 3] = X_CW.rotation, X_CW.position
@@ -131,16 +131,16 @@ def compute_view_matrix(X_WC: Pose) -> tuple[float, ...]:
 
 
 def compute_projection_matrix(
-    matrix: Array, part: Box, near: float = NEAR, far: float = FAR
+    matrix: Array, region: Box, near: float = NEAR, far: float = FAR
 ) -> tuple[float, ...]:
-    """Return OpenGL's projection matrix of a part of an image: 16 numbers, column by column.
+    """Return OpenGL's projection matrix for a region of an image: 16 numbers in column-major order.
 
-    A renderer with this matrix draws `part` (left, top, right, bottom [pixel]) of the camera's image; the
-    pixels are those of the full image. `near` and `far` are the clipping planes [m].
+    A renderer with this matrix draws only `region` (left, top, right, bottom [pixel]) of the full image.
+    `near` and `far` are the distances of the clipping planes [m].
     """
     (left, top), (right, bottom) = (
         ((x - matrix[0, 2]) / matrix[0, 0] * near, (matrix[1, 2] - y) / matrix[1, 1] * near)
-        for x, y in (part[:2], part[2:])
+        for x, y in (region[:2], region[2:])
     )
     projection = np.array(
         [

@@ -1,4 +1,4 @@
-"""Localization of detections, from an image to positions in the world."""
+"""Localization: positions in the world from detections in an image."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from executive.perception.depth_image import measure_top
 from executive.perception.evidence import describe_wrong_size, describe_wrong_top
 
 HeightMethod = Callable[[Detection, Frame, ObjectClass], float]
-"""Returns the height of the centre of a detected object [m]; raises NoDepth if it cannot be found."""
+"""Function that returns the height of the centre of a detected object [m], or raises NoDepth."""
 
-Cast = Callable[[Array, Array], Array | None]
-"""Ray test: takes origin `(3,)` [m] and direction `(3,)`; returns the first point hit `(3,)` [m], or None."""
+RayTest = Callable[[Array, Array], Array | None]
+"""Function of origin `(3,)` [m] and direction `(3,)` that returns the first hit `(3,)` [m], or None."""
 
 
 @dataclass(frozen=True, eq=False)
 class CellLocalizer:
-    """Localizes detections and checks their class; implements `executive.cell.protocols.Localizer`.
+    """Localizes detections and checks their classes; implements `executive.cell.protocols.Localizer`.
 
-    The centre of an object is the point of known height on the ray through the centre of its box.
+    The centre of an object is the point at the height from `find_height` on the ray through the box centre.
 
     Attributes:
-        find_height: Finds the height of the centre of an object.
+        find_height: Method that finds the height of the centre of an object.
         classes: Classes of the cell by label.
         bins: Bins of the cell.
     """
@@ -44,7 +44,7 @@ class CellLocalizer:
         """Return the centre of the detected object `(3,)` [m], from the camera pose of the frame.
 
         Raises:
-            NoDepth: The height is unknown, or the ray does not meet it in front of the camera.
+            NoDepth: The height is unknown, or the ray does not reach it in front of the camera.
         """
         height = self.find_height(detection, frame, self.classes[detection.label])
         try:
@@ -52,14 +52,14 @@ class CellLocalizer:
         except ValueError:
             column, row = detection.centre
             raise NoDepth(
-                f"the ray through pixel ({column:.0f}, {row:.0f}) of frame {frame.id} does not meet the "
-                f"plane {height * 1000:.0f} mm above the table"
+                f"the ray through pixel ({column:.0f}, {row:.0f}) of frame {frame.id} does not intersect "
+                f"the plane {height * 1000:.0f} mm above the table"
             ) from None
 
     def localize(self, detections: Detections) -> list[Observation]:
-        """Return an observation of each found or doubtful detection, the doubtful ones first.
+        """Return an observation for each doubtful and each found detection, in this order.
 
-        A doubtful detection without a position is left out if at least one object was found.
+        If any object was found, doubtful detections that cannot be localized are omitted.
 
         Raises:
             NoDepth: A detection cannot be localized.
@@ -84,7 +84,7 @@ class CellLocalizer:
         return Observation(detection, position, std, not (is_doubtful or contradiction), contradiction)
 
     def _describe_contradiction(self, detections: Detections, detection: Detection, position: Array) -> str:
-        """Return how its box or its top contradicts a class, or ""; objects in bins lean and lie deep."""
+        """Return a sentence if box or height contradicts the class, else ""; bins are not checked."""
         if any(bin.contains(position, BIN_THICKNESS) for bin in self.bins):
             return ""
         frame, area, kind = detections.frame, detections.area, self.classes[detection.label]
@@ -97,49 +97,48 @@ def build_localizer(
     method: Literal["plane", "depth", "ray"],
     classes: Mapping[str, ObjectClass],
     bins: Collection[Bin] = (),
-    cast: Cast | None = None,
+    cast_ray: RayTest | None = None,
 ) -> CellLocalizer:
     """Return the localizer of a cell.
 
     Args:
-        method: Method by which the height of an object is found.
+        method: Source of the height of an object: its class, the depth image, or a ray test.
         classes: Classes of the cell by label.
         bins: Bins of the cell; the class of an object in a bin is not checked.
-        cast: Ray test of the simulator, for the method `ray`.
+        cast_ray: Ray test of the simulator, for the method `ray`.
     """
     if method == "ray":
-        assert cast is not None, "the method `ray` needs a simulator"
-        return CellLocalizer(partial(_height_by_ray, cast), classes, bins)
-    return CellLocalizer(_height_by_depth if method == "depth" else _height_on_table, classes, bins)
+        assert cast_ray is not None, "the method `ray` needs a simulator"
+        return CellLocalizer(partial(_find_height_by_ray, cast_ray), classes, bins)
+    return CellLocalizer(_find_height_by_depth if method == "depth" else _find_height_on_table, classes, bins)
 
 
-def _height_on_table(detection: Detection, frame: Frame, kind: ObjectClass) -> float:
-    """Return half the height of the class [m]: the object stands on the table."""
+def _find_height_on_table(detection: Detection, frame: Frame, kind: ObjectClass) -> float:
+    """Return half the height of the class [m], as if the object stood on the table."""
     del detection, frame
     return kind.height / 2
 
 
-def _height_by_depth(detection: Detection, frame: Frame, kind: ObjectClass) -> float:
-    """Return the height of the centre [m] below the top that the depth image shows.
+def _find_height_by_depth(detection: Detection, frame: Frame, kind: ObjectClass) -> float:
+    """Return the height of the centre [m]: half the height of the class below the top in the depth image.
 
-    The object may lie on another one.
+    The object may lie on another object.
 
     Raises:
-        NoDepth: The frame has no depth image, or too little depth in the box.
+        NoDepth: The frame has no depth image, or too few depth values in the box.
     """
     return measure_top(detection, frame) - kind.height / 2
 
 
-def _height_by_ray(cast: Cast, detection: Detection, frame: Frame, kind: ObjectClass) -> float:
-    """Return the height of the centre [m] below the point that a ray of the simulator hits.
+def _find_height_by_ray(cast_ray: RayTest, detection: Detection, frame: Frame, kind: ObjectClass) -> float:
+    """Return the height of the centre [m]: half the height of the class below the hit of a simulated ray.
 
-    Hardware has no such ray. The simulator casts it at the call and not at capture: an object may have moved
-    since.
+    The ray test uses the current scene, not the scene at capture; a hardware cell has no ray test.
 
     Raises:
         NoDepth: The ray hits nothing.
     """
-    hit = cast(frame.X_WC.position, compute_pixel_ray(frame.matrix, frame.X_WC, detection.centre))
+    hit = cast_ray(frame.X_WC.position, compute_pixel_ray(frame.matrix, frame.X_WC, detection.centre))
     if hit is None:
         column, row = detection.centre
         raise NoDepth(f"the ray through pixel ({column:.0f}, {row:.0f}) of frame {frame.id} hits nothing")

@@ -1,4 +1,4 @@
-"""Base class of the cameras of cells: pose, calibration and numbering of frames."""
+"""Base class of the cameras of cells: pose, calibration, and numbering of frames."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from executive.perception.camera_model import compute_calibration
 
 
 class MountedCamera:
-    """Base of the cameras of cells, with frames numbered from 1; implements part of `cell.protocols.Camera`.
+    """Base class of cameras, with frames numbered from 1; implements part of `cell.protocols.Camera`.
 
     Args:
         name: Name of the camera in the cell file.
         config: Section of the camera in the cell file.
-        flange: Returns the pose of the arm's flange, on which a wrist camera is mounted.
+        get_flange_pose: Function that returns the pose `X_WF` of the flange, the mount of a wrist camera.
         clock: Clock of the run, for the capture times of frames.
-        epoch: Returns the number of changes of the table.
+        get_epoch: Function that returns the version of the scene (`Ledger.epoch`).
 
     Attributes:
         name: Name of the camera in the cell file.
@@ -34,14 +34,14 @@ class MountedCamera:
         self,
         name: str,
         config: CameraConfig,
-        flange: Callable[[], Pose],
+        get_flange_pose: Callable[[], Pose],
         clock: Clock,
-        epoch: Callable[[], int] = lambda: 0,
+        get_epoch: Callable[[], int] = lambda: 0,
     ) -> None:
-        self.name, self.config, self._clock, self._epoch = name, config, clock, epoch
+        self.name, self.config, self._clock, self._get_epoch = name, config, clock, get_epoch
         self.matrix, self._X_MC = compute_calibration(config)
-        self._flange = flange
-        self._frames = self._turn = 0
+        self._get_flange_pose = get_flange_pose
+        self._frame_count = self._pose_count = 0
 
     @property
     def scan_poses(self) -> Sequence[str]:
@@ -49,21 +49,21 @@ class MountedCamera:
         return self.config.scan_poses
 
     def next_pose(self) -> str:
-        """Advance to the next scan pose and return its name."""
-        self._turn += 1
-        return self.scan_poses[self._turn % len(self.scan_poses)]
+        """Advance to the next scan pose, cyclically, and return its name."""
+        self._pose_count += 1
+        return self.scan_poses[self._pose_count % len(self.scan_poses)]
 
     def get_view_box(self, view: str) -> Box:
-        """Return the box [pixel] of a view of the image: `table` or `full`."""
+        """Return the region of the image [pixel] of a view: `table` or `full`."""
         return self.config.get_view_box(view)
 
     def capture(self) -> Frame:
-        """Capture a frame."""
-        self._frames += 1
-        X_WC = self._pose()
+        """Capture and return a frame."""
+        self._frame_count += 1
+        X_WC = self._compute_pose()
         image, depth = self._capture_images()
         return Frame(
-            id=self._frames,
+            id=self._frame_count,
             camera=self.name,
             image=image,
             depth=depth,
@@ -71,7 +71,7 @@ class MountedCamera:
             X_WC=X_WC,
             stamp=self._clock.now,
             visible=self._compute_visibility_mask(X_WC),
-            epoch=self._epoch(),
+            epoch=self._get_epoch(),
         )
 
     def _capture_images(self) -> tuple[NDArray[np.uint8], Array | None]:
@@ -79,12 +79,12 @@ class MountedCamera:
         raise NotImplementedError
 
     def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
-        """Return the mask `(H, W)` of the pixels in which the arm does not hide the scene."""
+        """Return the mask `(H, W)` of the pixels that the arm does not occlude."""
         raise NotImplementedError
 
-    def skip(self, frames: int, turns: int) -> None:
-        """Count `frames` captured frames and `turns` calls of `next_pose`, for the resumption of a run."""
-        self._frames, self._turn = frames, turns
+    def set_counts(self, frame_count: int, pose_count: int) -> None:
+        """Set the numbers of captured frames and of calls of `next_pose`, for the resumption of a run."""
+        self._frame_count, self._pose_count = frame_count, pose_count
 
-    def _pose(self) -> Pose:
-        return self._X_MC if self.config.mount == "fixed" else self._flange() @ self._X_MC
+    def _compute_pose(self) -> Pose:
+        return self._X_MC if self.config.mount == "fixed" else self._get_flange_pose() @ self._X_MC

@@ -1,4 +1,4 @@
-"""Masks of the pixels that the arm may hide, and of those inside an outline in the world."""
+"""Masks of the pixels that the arm may occlude, and of the pixels inside a polygon in the world."""
 
 from __future__ import annotations
 
@@ -12,32 +12,31 @@ from numpy.typing import NDArray
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import project
 
-TOOL_RADIUS = 0.02
-"""Radius of the spheres that enclose the tool, its tube with fittings [m]."""
-
+TOOL_SPHERE_RADIUS = 0.02
+"""Radius of the spheres that enclose the tool, including tube and fittings [m]."""
 
 ArmPart = tuple[Sequence[Array], float]
-"""Points `(3,)` [m] along a part of the arm, and the radius of the spheres that enclose the part [m]."""
+"""Points `(3,)` [m] on the axis of a part of the arm, and the radius of spheres that enclose the part [m]."""
 
 
-def find_hidden_pixels(
+def compute_occlusion_mask(
     parts: Sequence[ArmPart], matrix: Array, X_WC: Pose, size: tuple[int, int]
 ) -> NDArray[np.bool_]:
-    """Return the mask `(H, W)` of the pixels that the arm may hide: the images of spheres along its parts.
+    """Return the mask `(H, W)` of the pixels that the arm may occlude: the images of spheres along its parts.
 
     Args:
-        parts: The links, the tool, and the held object.
+        parts: The links, the tool and the held object.
         matrix: Camera matrix `(3, 3)` [pixel].
-        X_WC: Camera pose.
-        size: Image width and height [pixel].
+        X_WC: Camera pose in the world.
+        size: Width and height of the image [pixel].
     """
     mask = np.zeros((size[1], size[0]), dtype=np.uint8)
     for points, radius in parts:
         for start, end in itertools.pairwise(points):
             for fraction in np.linspace(0.0, 1.0, 9):
                 x, y, z = X_WC.inverse().apply(start + fraction * (end - start))
-                # A sphere behind the camera or around it is skipped: the sphere of the link that carries
-                # the wrist camera would hide the whole image.
+                # Spheres behind or around the camera are skipped: the sphere around the link on which a
+                # wrist camera is mounted would occlude the whole image.
                 if z <= radius:
                     continue
                 column, row, _ = matrix @ np.array([x / z, y / z, 1.0])
@@ -47,12 +46,12 @@ def find_hidden_pixels(
     return mask.astype(bool)
 
 
-def find_outline_pixels(
+def compute_hull_mask(
     corners: Array, matrix: Array, X_WC: Pose, size: tuple[int, int]
 ) -> NDArray[np.bool_] | None:
-    """Return the mask `(H, W)` of the pixels inside the convex hull of points `(N, 3)` [m] in the world.
+    """Return the mask `(H, W)` of the pixels in the convex hull of the images of world points `(N, 3)` [m].
 
-    None if any of the points lies outside the image.
+    None if the image of any point is outside the image.
     """
     if np.any(X_WC.inverse().apply(corners)[:, 2] <= 0):
         return None

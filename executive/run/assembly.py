@@ -12,7 +12,7 @@ from executive.cells.without_hardware import CellWithoutHardware
 from executive.events import Observer, RequestGiven, RunStarted
 from executive.mission.build import TreeNode, build_tree
 from executive.mission.load import LoadedMission
-from executive.plugins import cell_kind
+from executive.plugins import load_cell_kind
 from executive.replay.input_log import InputLog, Interruption
 from executive.replay.replayed_cell import ReplayedCell
 from executive.run.lookahead_planner import LookaheadPlanner
@@ -167,7 +167,7 @@ class _RunBuilder:
         cell_options = CellOptions(
             operator, loaded.cell_path.parent, options.gui, resume=resume_point, scene=options.scene
         )
-        kind = options.kind or cell_kind(loaded.cell_config.kind)
+        kind = options.kind or load_cell_kind(loaded.cell_config.kind)
         return kind(
             loaded.cell_config, seed=options.seed, routes=loaded.routes, emit=emit, options=cell_options
         )

@@ -76,7 +76,7 @@ def _put_down(cell: Cell) -> Steps:
 def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
     """Move to a goal if possible, observe the view `full` of the camera, and return the frame."""
     with suppress(Unreachable, Blocked):
-        yield from _move(cell, goal, Task(around=list_obstacles(cell)))
+        yield from _move(cell, goal, Task(obstacles=list_obstacles(cell)))
     frame = cell.camera.capture()
     request = next(iter(cell.detectors.values())).request(frame, "full")
     while not request.ready:

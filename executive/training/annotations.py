@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
 from executive.cell.frame import Box
 from executive.cell.paths import has_outside_link, is_outside_path
-from executive.errors import MAX_QUOTED, InputError
+from executive.errors import MAX_QUOTATION_LENGTH, InputError
 
 COCO_FILE_NAME = "_annotations.coco.json"
 """Name of the file with the COCO annotations of a split."""
@@ -135,7 +135,7 @@ def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
         if image_id not in objects:
             raise InputError(f"{key}.image_id: there is no image {image_id}")
         if category not in names:
-            known_ids = ", ".join(map(str, names))[:MAX_QUOTED] or "none"
+            known_ids = ", ".join(map(str, names))[:MAX_QUOTATION_LENGTH] or "none"
             raise InputError(f"{key}.category_id: there is no category {category}; there are {known_ids}")
         left, top, width, height = entry.bbox
         box = left, top, left + width, top + height

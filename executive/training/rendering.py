@@ -19,7 +19,7 @@ from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
 from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.processes import Workers
+from executive.processes import WorkerPool
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.labelled_image import LabelledImage
 
@@ -101,7 +101,7 @@ def _make_in_blocks(
 ) -> list[ItemT]:
     """Return items 0 to `count` - 1 in order; worker processes call `make` for blocks of item numbers."""
     made: dict[int, ItemT] = {}
-    with Workers(workers) as pool:
+    with WorkerPool(workers) as pool:
         starts = range(0, count, BLOCK_SIZE)
         blocks = [pool.submit(make, range(first, min(first + BLOCK_SIZE, count))) for first in starts]
         for block in as_completed(blocks):

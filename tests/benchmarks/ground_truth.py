@@ -21,7 +21,7 @@ from executive.ledger.item import State
 from executive.mission.load import load_mission
 from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.rated_detectors import build_rated_detectors
-from executive.plugins import cell_kind, discover
+from executive.plugins import discover, load_cell_kind
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.result import find_exit_code
@@ -272,7 +272,7 @@ def _run_in_this_process(
     mission: str, seed: int, runs: Path, scene: Path | None, detectors: DetectorMaker
 ) -> AuditedRun:
     skills = discover()
-    loaded = load_mission(mission, skills, {}, cell_kind)
+    loaded = load_mission(mission, skills, {}, load_cell_kind)
     maker = AuditedCellMaker(detectors)
     options = RunOptions(seed, kind=maker, scene=scene)
     result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))

@@ -32,7 +32,7 @@ from executive.geometry import Array
 from executive.ledger.outcomes import is_balanced
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
-from executive.plugins import cell_kind
+from executive.plugins import load_cell_kind
 from executive.record.journal import Journal, read_journal
 from executive.record.trace import Trace
 from executive.run.assembly import RunOptions, assemble
@@ -174,7 +174,7 @@ class _RunWithHalts:
         self._halt: Figures = {}
         config = subject.loaded.cell_config
         self._limits = JointLimits.from_config(config.arm.limits)
-        kind = subject.kind or cell_kind(config.kind)
+        kind = subject.kind or load_cell_kind(config.kind)
 
         def make_cell(*args: Any, **options: Any) -> CellWrapper:
             return _WatchedCell(

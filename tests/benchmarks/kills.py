@@ -23,7 +23,7 @@ from executive.cli.options import runs_option
 from executive.errors import ExecutiveError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, TimedEvent
 from executive.geometry import Array
-from executive.plugins import cell_kind
+from executive.plugins import load_cell_kind
 from executive.record.journal import find_end, read_journal
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
@@ -160,7 +160,7 @@ def change_world(subject: MissionUnderTest, seed: int, path: Path, past: InputLo
 
     assert past.start is not None
     loaded = read_mission_of_run(path, past.start, subject.skills)
-    meanwhile(path / "world.log", loaded, seed, act, subject.kind or cell_kind(loaded.cell_config.kind))
+    meanwhile(path / "world.log", loaded, seed, act, subject.kind or load_cell_kind(loaded.cell_config.kind))
     return "".join(done)
 
 

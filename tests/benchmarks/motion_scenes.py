@@ -19,7 +19,7 @@ from executive.cells.sim.suction import compute_breakaway_force, measure_contact
 from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.cells.sim.world import World
 from executive.errors import InputError, Unreachable
-from executive.geometry import tool_down
+from executive.geometry import make_tool_down_pose
 from executive.manipulation.tool_goals import make_object_goal, make_slot_goal
 from executive.motion.arms import build_planner
 from executive.motion.planner import Planner
@@ -71,7 +71,7 @@ class Scene:
     @property
     def fetch_task(self) -> Task:
         """Task of the motion onto the object."""
-        return Task(around=self.others, target=self.target)
+        return Task(obstacles=self.others, target=self.target)
 
     def make_carry_task(self, breakaway_force: float) -> Task:
         """Return the task of the motion into the bin with a seal of this breakaway force [N]."""
@@ -158,7 +158,7 @@ class SceneGenerator:
         surface, force = top + tool.reach, 0.0
         # Twice: the distance found by the rays depends a little on where they start.
         for _ in range(2):
-            X_WT = tool_down((*place, surface))
+            X_WT = make_tool_down_pose((*place, surface))
             seal = measure_contact(self._world.client, X_WT, {body}, tool.cup_radius, tool.reach)
             force = compute_breakaway_force(seal, tool)
             surface -= seal.distance if seal else 0.0

@@ -19,7 +19,7 @@ from executive.cells.sim.models import load_mesh
 from executive.cells.sim.suction import compute_breakaway_force
 from executive.cells.sim.suction import measure_contact as measure_seal
 from executive.cells.sim.world import World
-from executive.geometry import Array, Pose, about_z, tool_down
+from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z
 from tests.benchmarks.report import CELL_OPTIONS, Figures, run_command
 
 SHIPPED_MAP = Path(__file__).with_name("suction_map.csv")
@@ -104,7 +104,7 @@ def _find_places(cell: CellConfig, label: str, offset: float) -> Iterator[Array]
     outline = load_mesh(cell.objects[label]).vertices[:, :2]
     reach = cell.objects[label].ring + offset
     for yaw in 2 * np.pi * np.arange(YAWS) / YAWS:
-        R_WO = about_z(yaw)[:2, :2]
+        R_WO = rotate_about_z(yaw)[:2, :2]
         turned = outline @ R_WO.T
         aim_W = (turned.min(axis=0) + turned.max(axis=0)) / 2
         for angle in 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
@@ -122,9 +122,9 @@ def _measure_places(world: World, body: int, tool: ToolConfig, places: Iterable[
     for place in places:
         x, y, _ = X_WO.apply([*place, 0.0])
         # Twice: Bullet's ray against a sphere errs by up to 0.8 mm over 0.2 m, by 0.02 mm over 5 mm.
-        seal = measure_seal(world.client, tool_down([x, y, top]), {body}, tool.cup_radius, top)
+        seal = measure_seal(world.client, make_tool_down_pose([x, y, top]), {body}, tool.cup_radius, top)
         if seal is not None:
-            landed = tool_down([x, y, top - seal.distance])
+            landed = make_tool_down_pose([x, y, top - seal.distance])
             seal = measure_seal(world.client, landed, {body}, tool.cup_radius, tool.reach)
         gaps.append(math.inf if seal is None else seal.gap)
         tilts.append(math.pi / 2 if seal is None else seal.tilt)

@@ -120,7 +120,7 @@ class Torn:
 
 def test_a_pool_found_broken_is_replaced_and_no_run_is_lost(monkeypatch):
     pools = iter([Torn(), ThreadPoolExecutor(1)])
-    monkeypatch.setattr("executive.campaign.pool.Workers", lambda count: next(pools))
+    monkeypatch.setattr("executive.campaign.pool.WorkerPool", lambda count: next(pools))
     results = swept(range(2), lambda job: result(job.seed), workers=1)
     assert [entry.status for entry in results] == ["SUCCESS", "SUCCESS"]
 

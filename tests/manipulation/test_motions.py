@@ -28,7 +28,7 @@ def test_a_look_during_planning_changes_the_plan(fake: FakeCell) -> None:
 
     def ask() -> tuple[Goal, Task]:
         stands = (Obstacle(0.5, 0.1, 0.03, 0.05, "cube-9"),) if len(asked) > 0 else ()
-        asked.append(Task(around=stands))
+        asked.append(Task(obstacles=stands))
         return Goal((0.5, -0.1, 0.1)), asked[-1]
 
     steps = plan(MoveToScan(), fake.cell.arm, ask)

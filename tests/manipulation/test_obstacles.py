@@ -26,7 +26,7 @@ def test_what_stands_on_the_table_is_in_the_way_but_for_what_is_to_be_touched(
 ) -> None:
     assert names(fake) == ["cube-1", "duck-1"]
     _, task = make_approach(fake.cell, targets[0])
-    (duck,) = task.around
+    (duck,) = task.obstacles
     kind = fake.cell.classes["duck"]
     assert (duck.name, duck.radius) == ("duck-1", kind.radius)
     assert (duck.x, duck.y, duck.top) == pytest.approx((0.6, 0.15, kind.height))
@@ -52,7 +52,7 @@ def test_what_is_carried_is_the_load_and_in_nobodys_way(fake: FakeCell, targets:
     assert task == make_transport_task(fake.cell, "cube-1")
     assert task.load is not None
     assert (task.load.kind.label, task.load.holding_force) == ("cube", 7.9)
-    assert [obstacle.name for obstacle in task.around] == ["duck-1"]
+    assert [obstacle.name for obstacle in task.obstacles] == ["duck-1"]
     fake.tool.breakaway_force = 3.0
     assert make_task(fake.cell).load.holding_force == 3.0  # type: ignore[union-attr]
 

@@ -73,15 +73,15 @@ def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slo
     fake.world.put("cube", 0.5, 0.0)
     goal, _ = make_approach(fake.cell, look(fake, "full")[0])
     assert goal.position == pytest.approx((0.5, 0.0, 0.035))
-    assert goal.position[2] + goal.guarded == pytest.approx(0.05 + fake.cell.descent)
-    assert goal.speed == fake.cell.descent_speed
+    assert goal.position[2] + goal.guarded_length == pytest.approx(0.05 + fake.cell.descent)
+    assert goal.guarded_speed == fake.cell.descent_speed
 
 
 def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:
     washer = ObjectClass("washer", 0.006, 0.025, ring=0.017)
     goal = make_object_goal(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05)  # on another one
     assert goal.position == pytest.approx((0.517, 0.1, 0.013))
-    assert (goal.guarded, goal.speed) == pytest.approx((0.003 + 0.02, 0.05))
+    assert (goal.guarded_length, goal.guarded_speed) == pytest.approx((0.003 + 0.02, 0.05))
     further = make_object_goal(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05, attempt=1, overtravel=0.001)
     assert further.position[2] == pytest.approx(0.015)
     assert np.hypot(further.position[0] - 0.5, further.position[1] - 0.1) == pytest.approx(0.017)

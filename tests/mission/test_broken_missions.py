@@ -21,7 +21,7 @@ from executive.cli.main import main
 from executive.cli.streams import stdout_kept_clean
 from executive.mission.findings import MEANING_BY_CODE, Finding, MissionError
 from executive.mission.load import FindCellKind, load_mission
-from executive.plugins import cell_kind, discover
+from executive.plugins import discover, load_cell_kind
 from executive.skill import Skill
 
 FOLDER = Path(__file__).parent / "broken"
@@ -60,12 +60,12 @@ def rendered(path: Path, findings: Iterable[Finding]) -> str:
 @pytest.fixture(scope="module")
 def look(shared_cells: None) -> Look:
     """What is wrong with a mission; each is loaded once."""
-    skills, kind = discover(), functools.cache(cell_kind)
+    skills, kind = discover(), functools.cache(load_cell_kind)
     return functools.cache(lambda path: findings_of(path, skills, kind))
 
 
 def findings_of(
-    path: Path, skills: dict[str, type[Skill]], kind: FindCellKind = cell_kind
+    path: Path, skills: dict[str, type[Skill]], kind: FindCellKind = load_cell_kind
 ) -> tuple[Finding, ...]:
     """Return the findings of a mission."""
     try:

@@ -22,7 +22,7 @@ from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.model.grammar import USE_KEYWORD
-from executive.plugins import cell_kind, discover
+from executive.plugins import discover, load_cell_kind
 from executive.run import assembly
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
@@ -88,7 +88,7 @@ class Trial:
         mission.write_text(base.mission)
         # As bytes: no ending of a line is translated.
         file.write_bytes(text.encode())
-        kinds = cell_kind if real_kind else lambda name: FakeCell
+        kinds = load_cell_kind if real_kind else lambda name: FakeCell
         return load_mission(mission, self.skills, {"cell.table.objects": "[1, 3]"}, kinds)
 
 
@@ -134,7 +134,7 @@ def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) ->
 
 @pytest.mark.parametrize("file", OWN_BASES, ids=lambda file: file.stem)
 def test_the_bases_of_the_mutants_pass_the_check(file: Path) -> None:
-    assert load_mission(file, discover(), find_cell_kind=cell_kind).mission.name == file.stem
+    assert load_mission(file, discover(), find_cell_kind=load_cell_kind).mission.name == file.stem
 
 
 def test_the_bases_of_the_mutants_use_every_control_node() -> None:

@@ -22,7 +22,7 @@ from executive.cells.sim.cell import SimCell
 from executive.mission.load import load_mission
 from executive.perception.detectors.requests import Pending
 from executive.perception.detectors.screening import screen_detectors
-from executive.plugins import cell_kind, discover
+from executive.plugins import discover, load_cell_kind
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.result import Result
 from executive.run.assembly import RunOptions
@@ -114,7 +114,7 @@ def run_crowded(
 ) -> tuple[Result, str]:
     """Run a shipped mission and return its result and its journal."""
     skills = discover()
-    loaded = load_mission(mission, skills, find_cell_kind=cell_kind)
+    loaded = load_mission(mission, skills, find_cell_kind=load_cell_kind)
     options = RunOptions(1, keyboard=False, kind=kind)
     result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))
     return result, (Path(result.run) / "journal.jsonl").read_text()

@@ -9,7 +9,7 @@ import pytest
 
 from executive.cell.detection import Answer, Detection
 from executive.cells.fake.cell import FakeCell
-from executive.plugins import cell_kind
+from executive.plugins import load_cell_kind
 from executive.testing.faults import ScheduledFault, after, during, object_bumped, with_probability
 from executive.testing.faults.detector import faulty_detector
 from executive.testing.faults.effect import Effect, Occurrence
@@ -103,7 +103,7 @@ def names_rejected_and_lost_items(result: MissionResult) -> bool:
 @pytest.mark.parametrize("kind", KINDS)
 def test_ledger_and_audit_agree_or_the_run_names_the_items(kind: str, cell: str, seed: int) -> None:
     result = run_mission(
-        "sort_overhead", FakeCell if cell == "fake" else cell_kind("sim"),
+        "sort_overhead", FakeCell if cell == "fake" else load_cell_kind("sim"),
         seed=seed, faults=schedule(kind, seed), set={"cell.kind": cell},
     )  # fmt: skip
     assert result.agrees or names_rejected_and_lost_items(result)

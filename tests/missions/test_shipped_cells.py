@@ -11,7 +11,7 @@ from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.envelope.rated_detectors import find_unmeasured
-from executive.plugins import cell_kind
+from executive.plugins import load_cell_kind
 
 CELLS = sorted((Path(__file__).parents[2] / "missions" / "cells").glob("*.yaml"))
 
@@ -62,7 +62,7 @@ def test_three_keys_make_a_hosted_model_of_a_server_of_ones_own() -> None:
 
 
 def test_its_kind_finds_nothing_wrong_with_it(path: Path, config: CellConfig) -> None:
-    assert list(cell_kind(config.kind).check(config, path.parent)) == []
+    assert list(load_cell_kind(config.kind).check(config, path.parent)) == []
 
 
 def test_the_most_objects_that_it_asks_for_find_room(config: CellConfig) -> None:

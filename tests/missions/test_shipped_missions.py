@@ -13,7 +13,7 @@ from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
-from executive.plugins import cell_kind, discover
+from executive.plugins import discover, load_cell_kind
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
@@ -42,7 +42,7 @@ class Done:
 @functools.cache
 def loaded(name: str) -> LoadedMission:
     """Return a shipped mission."""
-    return load_mission(MISSIONS[name], discover(), find_cell_kind=cell_kind)
+    return load_mission(MISSIONS[name], discover(), find_cell_kind=load_cell_kind)
 
 
 def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = FakeCell) -> Done:

@@ -44,7 +44,7 @@ def test_a_halt_at_any_tick_is_short_and_inside_the_stop_limits(
 
 
 def test_a_halt_on_a_way_around_something_is_inside_the_stop_limits_too(planner, limits, home) -> None:
-    picked = planner.plan(home, Goal((0.55, 0.15, 0.055), guarded=0.02, speed=0.04)).end
+    picked = planner.plan(home, Goal((0.55, 0.15, 0.055), guarded_length=0.02, guarded_speed=0.04)).end
     trajectory = planner.plan(picked, Goal((0.24, -0.44, 0.08)))
     for s in np.arange(0.0, trajectory.duration, 10 * STEP):
         assert_short_and_inside(trajectory, float(s), limits)

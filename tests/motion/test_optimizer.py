@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from joint_states import LIMITS, passed, peaks, positions
 
 from executive.cell.objects import Load, ObjectClass, Obstacle
-from executive.geometry import Array, tool_down
+from executive.geometry import Array, make_tool_down_pose
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.optimizer import OptimizationProblem, Optimizer
 from executive.motion.payload import PayloadLimit
@@ -32,7 +32,7 @@ def over_the_post(config, kinematics, connector):
         branch, _ = kinematics.find_branch(np.radians(config.arm.poses_deg["home"]))
 
         def state(x: float, y: float, z: float) -> JointState:
-            return JointState.at_rest(kinematics.solve(tool_down((x, y, z)), (branch, 0.0)))
+            return JointState.at_rest(kinematics.solve(make_tool_down_pose((x, y, z)), (branch, 0.0)))
 
         corners = [state(*LEFT), state(*LEFT[:2], HIGH), state(*RIGHT[:2], HIGH), state(*RIGHT)]
         clearance = ClearanceModel(config, (POST,), np.array([LEFT[:2], RIGHT[:2]]))

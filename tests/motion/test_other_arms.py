@@ -71,7 +71,7 @@ def test_motions_of_six_joints_reach_their_goals_within_asymmetric_limits(
     for number in range(12):
         x, y = rng.uniform((0.42, -0.22), (0.64, 0.22)).tolist()
         wall = Obstacle(0.4, float(rng.choice([-0.25, 0.25])), 0.05, 0.15, "the wall")
-        goal, task = Goal((x, y, 0.053), guarded=0.015, speed=0.04), Task(around=(wall,))
+        goal, task = Goal((x, y, 0.053), guarded_length=0.015, guarded_speed=0.04), Task(obstacles=(wall,))
         if number % 2:
             bin = list(six.bins.values())[number % len(six.bins)].position
             goal, task = Goal((bin[0], bin[1], 0.08)), Task(Load(CUBE, 4.0), (wall,))

@@ -26,7 +26,7 @@ on_the_table = st.tuples(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.float
 
 
 def pick(x: float, y: float, z: float = 0.053) -> Goal:
-    return Goal((x, y, z), guarded=0.015, speed=0.04)
+    return Goal((x, y, z), guarded_length=0.015, guarded_speed=0.04)
 
 
 def tips_of(planner: Planner, motion: Trajectory) -> Array:
@@ -46,7 +46,7 @@ def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Tr
     straight = build_planner(config.model_copy(update={"motion": motion}))
     return {
         "pick": lambda: planner.plan(home, pick(0.5, -0.1)),
-        "pick of many": lambda: planner.plan(aside, pick(0.5, -0.1), Task(around=near)),
+        "pick of many": lambda: planner.plan(aside, pick(0.5, -0.1), Task(obstacles=near)),
         "turn": lambda: planner.plan(home, Goal((0.6, 0.2, 0.1), 0.5)),
         "carry": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 7.9), near)),
         "carry weakly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 2.4))),
@@ -54,7 +54,7 @@ def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Tr
         "sweep past": lambda: planner.plan(beside, onto, Task(target=Obstacle(0.5, 0.0, 0.0354, 0.05, "it"))),
         "carry hardly": lambda: planner.plan(picked, BIN, Task(Load(CUBE, 1.0))),
         "over a wall": lambda: planner.plan(picked, beyond, Task(Load(CUBE), wall)),
-        "empty over a wall": lambda: planner.plan(picked, beyond, Task(around=wall)),
+        "empty over a wall": lambda: planner.plan(picked, beyond, Task(obstacles=wall)),
         "home": lambda: planner.plan(planner.plan(picked, BIN).end, home),
         "straight": lambda: straight.plan(picked, BIN, Task(Load(CUBE, 3.0))),
     }[name]()
@@ -91,7 +91,7 @@ def test_a_fixed_question_gets_a_fixed_answer(planner, config, home, name: str) 
 def test_the_guarded_part_is_straight_even_and_no_faster_than_asked(
     planner, home, place, guarded, speed
 ) -> None:
-    motion = planner.plan(home, Goal(place, guarded=guarded, speed=speed))
+    motion = planner.plan(home, Goal(place, guarded_length=guarded, guarded_speed=speed))
     states = passed(motion)
     tips, axes = planner.kinematics.compute_tips_and_axes(states.q)
     low = tips[:, 2] < place[2] + guarded
@@ -130,11 +130,11 @@ def test_what_is_to_be_touched_is_in_the_way_until_the_guarded_part(config, home
         Obstacle(0.5, 0.0, CUBE.radius, 0.05, "cube-1"),
         Obstacle(0.6, 0.2, CUBE.radius, 0.05, "duck-1"),
     )
-    task = Task(around=(duck,), target=target)
+    task = Task(obstacles=(duck,), target=target)
     planner = build_planner(config, lambda path, task: asked.append((path, task)))
-    motion = planner.plan(home, Goal((0.5, 0.0, 0.035), guarded=0.02, speed=0.035), task)
+    motion = planner.plan(home, Goal((0.5, 0.0, 0.035), guarded_length=0.02, guarded_speed=0.035), task)
     (free, before), (guarded, after) = asked
-    assert (before, after) == (Task(around=(duck, target)), task)
+    assert (before, after) == (Task(obstacles=(duck, target)), task)
     assert np.array_equal(free[0], motion.start)
     assert np.array_equal(guarded[-1], motion.end)
     assert np.array_equal(free[-1], guarded[0]), "nothing is left out between"
@@ -226,7 +226,7 @@ def test_random_motions_keep_every_limit(planner, limits, config, home) -> None:
         motion = (
             planner.plan(q, goal, Task(Load(CUBE)))
             if loaded
-            else planner.plan(q, pick(x, y), Task(around=around))
+            else planner.plan(q, pick(x, y), Task(obstacles=around))
         )
         states = passed(motion)
         assert max(peaks(states, limits)) <= 1 + 1e-6

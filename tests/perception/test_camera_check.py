@@ -13,7 +13,7 @@ from executive.cell.config import BinConfig
 from executive.cell.frame import Frame
 from executive.cell.layout import build_bin
 from executive.geometry import Array, Pose
-from executive.perception.camera_check import MAX_DISTANCE, describe_displacement, estimate_offset
+from executive.perception.camera_check import MAX_OUTLINE_DISTANCE, describe_displacement, estimate_offset
 from executive.perception.camera_model import compute_camera_matrix, project
 from tests.camera_poses import looking_down
 
@@ -72,7 +72,7 @@ def test_a_camera_in_its_place_is_believed_to_be_there(light: float) -> None:
     frame = draw(DECLARED, light=light)
     offset = estimate_offset(frame, BINS)
     assert offset is not None
-    assert offset.distance < MAX_DISTANCE / 3 and offset.support > 0.8
+    assert offset.distance < MAX_OUTLINE_DISTANCE / 3 and offset.support > 0.8
     assert describe_displacement(frame, BINS) == ""
 
 
@@ -82,7 +82,7 @@ def test_a_camera_in_its_place_is_believed_to_be_there(light: float) -> None:
 )
 def test_a_shift_is_measured(shift: tuple[float, float, float]) -> None:
     offset = estimate_offset(draw(moved(shift)), BINS)
-    assert offset is not None and offset.distance > MAX_DISTANCE
+    assert offset is not None and offset.distance > MAX_OUTLINE_DISTANCE
     assert offset.shift == pytest.approx(shift, abs=0.015)
     assert np.all(np.abs(offset.shift - shift) < 3 * offset.shift_std + 0.001)
     assert offset.rotation_deg < 1.0
@@ -91,7 +91,7 @@ def test_a_shift_is_measured(shift: tuple[float, float, float]) -> None:
 @pytest.mark.parametrize("turn_deg", [(2, 0, 0), (0, -6, 0), (0, 0, 2), (0, 0, -10), (5, 5, 3)])
 def test_a_rotation_is_measured(turn_deg: tuple[float, float, float]) -> None:
     offset = estimate_offset(draw(moved(turn_deg=turn_deg)), BINS)
-    assert offset is not None and offset.distance > MAX_DISTANCE
+    assert offset is not None and offset.distance > MAX_OUTLINE_DISTANCE
     assert offset.rotation_deg == pytest.approx(np.linalg.norm(turn_deg), abs=1.0)
 
 
@@ -103,7 +103,7 @@ def test_another_lens_is_found(fov: float) -> None:
 def test_the_words_say_where_the_bins_are_and_how_the_camera_has_moved() -> None:
     words = describe_displacement(draw(moved((0.0, -0.03, 0.0))), BINS)
     assert re.fullmatch(
-        r"camera top is not where the cell file says: the outlines of red, blue, yellow appear 12 pixels "
+        r"camera top is not at its declared pose: the outlines of red, blue, yellow appear 12 pixels "
         r"\((29|30|31) mm\) away from their expected positions, as if the camera had moved by "
         r"\(\S+, -\d+, \S+\) mm "
         r"\(standard deviation \d+ mm\) and turned by \S+ degrees; limit 5 mm; mount camera and bins as "

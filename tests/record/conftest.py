@@ -35,5 +35,5 @@ def cells(monkeypatch: pytest.MonkeyPatch) -> list[FakeCell]:
             super().__init__(*args, **options)
             made.append(self)
 
-    monkeypatch.setattr("executive.run.assembly.cell_kind", lambda name: Cell)
+    monkeypatch.setattr("executive.run.assembly.load_cell_kind", lambda name: Cell)
     return made

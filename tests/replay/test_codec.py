@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from executive.cell.detection import Answer, Detection, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
-from executive.geometry import Pose, about_z
+from executive.geometry import Pose, rotate_about_z
 from executive.replay.codec import (
     ANSWER_CODEC,
     ARRAY_CODEC,
@@ -39,7 +39,7 @@ def back(codec: Codec, answer: Any) -> Any:
 @given(arrays(np.float64, (3, 2), elements=finite), st.floats(-4, 4))
 def test_numbers_come_back_bit_by_bit(array: np.ndarray, angle: float) -> None:
     assert np.array_equal(back(ARRAY_CODEC, array), array)
-    pose = Pose(about_z(angle), array[:, 0])
+    pose = Pose(rotate_about_z(angle), array[:, 0])
     assert np.array_equal(back(POSE_CODEC, pose).rotation, pose.rotation)
     assert np.array_equal(back(POSE_CODEC, pose).position, pose.position)
     assert back(MOTION_CODEC, RecordedMotion(angle)) == RecordedMotion(angle)

@@ -18,7 +18,7 @@ from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
 from executive.events import FaultInjected, InputRead, NodeEnded, RunEnded, TimedEvent
-from executive.plugins import cell_kind
+from executive.plugins import load_cell_kind
 from executive.record.recorded_run import Recording, make_run_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
@@ -126,7 +126,7 @@ class _TrialRun:
         )
 
     def _make_cell(self, *args: Any, **options: Any) -> Workcell:
-        make_inner_cell = self._mission.kind or cell_kind(self._mission.loaded.cell_config.kind)
+        make_inner_cell = self._mission.kind or load_cell_kind(self._mission.loaded.cell_config.kind)
         return CellWrapper(make_inner_cell(*args, **options), after_step=self._stop_run_if_due)
 
     def _on_event(self, timed: TimedEvent) -> None:

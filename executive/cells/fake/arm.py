@@ -19,7 +19,7 @@ from executive.cells.fake.obstacles import Collision, FakeObstacles
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, discard_event
-from executive.geometry import Array, Pose, tool_down
+from executive.geometry import Array, Pose, make_tool_down_pose
 from executive.motion.arms import build_kinematics
 from executive.motion.plans import Plan, PlanFactory
 
@@ -202,9 +202,9 @@ class FakeArm:
         else:
             end_position = np.array(goal.position)
             check_reachable(end_position)
-            guarded_start = np.array([*end_position[:2], end_position[2] + goal.guarded])
-            rotation = tool_down(end_position, goal.yaw or 0.0).rotation
-            speed = min(goal.speed, MAX_TOOL_SPEED)
+            guarded_start = np.array([*end_position[:2], end_position[2] + goal.guarded_length])
+            rotation = make_tool_down_pose(end_position, goal.yaw or 0.0).rotation
+            speed = min(goal.guarded_speed, MAX_TOOL_SPEED)
         position_over_goal = np.array([*end_position[:2], max(guarded_start[2], self._height)])
         fast_part = [
             pose

@@ -37,11 +37,11 @@ class FakeCamera(MountedCamera):
         name: str,
         config: CameraConfig,
         table: TableConfig,
-        flange: Callable[[], Pose],
+        get_flange_pose: Callable[[], Pose],
         clock: Clock,
-        epoch: Callable[[], int],
+        get_epoch: Callable[[], int],
     ) -> None:
-        super().__init__(name, config, flange, clock, epoch)
+        super().__init__(name, config, get_flange_pose, clock, get_epoch)
         self.is_table_visible: Callable[[], bool] = self._is_table_in_image
         self.occluded_regions: list[Box] = []
         self.displacement_message = ""
@@ -67,7 +67,7 @@ class FakeCamera(MountedCamera):
         return visible
 
     def _is_table_in_image(self) -> bool:
-        corners = self._pose().inverse().apply(self._corners) @ self.matrix.T
+        corners = self._compute_pose().inverse().apply(self._corners) @ self.matrix.T
         pixels = corners[:, :2] / corners[:, 2:]
         inside = (pixels >= 0) & (pixels < (self.config.width, self.config.height))
         return bool(np.all(corners[:, 2] > 0) and np.all(inside))

@@ -98,9 +98,9 @@ class FakeCell(CellWithoutHardware):
             name,
             camera,
             config.table,
-            flange=lambda: self.arm.tool_pose @ X_TF,
+            get_flange_pose=lambda: self.arm.tool_pose @ X_TF,
             clock=clock,
-            epoch=lambda: self.ledger.epoch,
+            get_epoch=lambda: self.ledger.epoch,
         )
         self.detectors = {
             name: FakeDetector(name, detector, self.world, clock, self.camera.get_view_box)
@@ -110,7 +110,7 @@ class FakeCell(CellWithoutHardware):
         self._log: FakeLog | None = None
         if options.resume is not None:
             self.steps, self.last_command = restore_world(options.resume.log, self.world, self.arm)
-            self.camera.skip(options.resume.frames, options.resume.turns)
+            self.camera.set_counts(options.resume.frames, options.resume.turns)
             self.log_to(options.resume.log)
         self.cell = replace(
             self.cell,

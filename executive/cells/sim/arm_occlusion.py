@@ -14,10 +14,10 @@ from executive.cells.sim.robot_models import ROBOT_MODELS
 from executive.geometry import Array, Pose
 from executive.motion.arm_model import Kinematics
 from executive.perception.visibility import (
-    TOOL_RADIUS,
+    TOOL_SPHERE_RADIUS,
     ArmPart,
-    find_hidden_pixels,
-    find_outline_pixels,
+    compute_hull_mask,
+    compute_occlusion_mask,
 )
 
 MAX_LOAD_OFFSET = 0.015
@@ -65,16 +65,16 @@ class ArmOcclusion:
             *(frame.position for frame in self._kinematics.compute_joint_frames(q)),
             flange,
         ]
-        parts: list[ArmPart] = [(joints, self._link_radius), ([flange, X_WT.position], TOOL_RADIUS)]
+        parts: list[ArmPart] = [(joints, self._link_radius), ([flange, X_WT.position], TOOL_SPHERE_RADIUS)]
         if self._is_loaded():
             load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
             parts.append(([X_WT.position, load_end], self._load_radius))
-        return ~find_hidden_pixels(parts, matrix, X_WC, size)
+        return ~compute_occlusion_mask(parts, matrix, X_WC, size)
 
     def is_table_visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
         """Return True if the whole workspace, up to the height of a pile, is in the image and not occluded.
 
         The arguments are those of `compute_visibility_mask`.
         """
-        table = find_outline_pixels(self._corners, matrix, X_WC, size)
+        table = compute_hull_mask(self._corners, matrix, X_WC, size)
         return table is not None and bool(np.all(self.compute_visibility_mask(matrix, X_WC, size)[table]))

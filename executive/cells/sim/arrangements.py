@@ -19,7 +19,7 @@ from executive.cells.audit import UNKNOWN
 from executive.cells.sim.models import add_body, compute_upright_pose, load_mesh
 from executive.cells.sim.variations import random_object_colour
 from executive.cells.sim.world import World, add_bin
-from executive.geometry import Array, Pose, about_z, rotation_from_quaternion, tool_down
+from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z, rotation_from_quaternion
 
 MAX_OBJECTS_SPARSE, MAX_OBJECTS_DENSE = 7, 20
 """Largest number of objects in a sparse scene and in a dense scene."""
@@ -67,7 +67,7 @@ def move_arm(world: World, camera: CameraConfig, rng: Generator) -> bool:
         X_WT = world.get_tool_pose()
         offset = rng.uniform(-1, 1, 3) * spread
         tilt = Pose.of(np.zeros(3), [*rng.normal(0, math.radians(1.5), 2) / 2, 0, 1])
-        turned = Pose(about_z(rng.uniform(-turn, turn)) @ X_WT.rotation, X_WT.position + offset)
+        turned = Pose(rotate_about_z(rng.uniform(-turn, turn)) @ X_WT.rotation, X_WT.position + offset)
         _move_tool(world, turned @ tilt)
         return bool(rng.random() < 0.08)
     if usual:
@@ -76,7 +76,7 @@ def move_arm(world: World, camera: CameraConfig, rng: Generator) -> bool:
     position = rng.uniform((0.25, -0.50, 0.05), (0.72, 0.50, 0.40))
     bearing = math.atan2(position[1], position[0])
     world.set_joint_positions([bearing, *map(math.radians, world.robot.forward_pose_deg)])
-    _move_tool(world, tool_down(position, bearing + rng.uniform(-1.2, 1.2)))
+    _move_tool(world, make_tool_down_pose(position, bearing + rng.uniform(-1.2, 1.2)))
     return bool(rng.random() < 0.3)
 
 
@@ -165,7 +165,7 @@ def make_held_object(X_WT: Pose, config: CellConfig, rng: Generator) -> SceneObj
     """Return a random object that hangs upright at the tip of the tool."""
     (item,) = draw_items(config, 1, (0.5, 0.5, 0.5), rng)
     place = X_WT.position - [0, 0, load_mesh(item.model).top]
-    return replace(item, X_WO=Pose(about_z(rng.uniform(0, math.tau)), place))
+    return replace(item, X_WO=Pose(rotate_about_z(rng.uniform(0, math.tau)), place))
 
 
 def settle(config: CellConfig, items: Sequence[SceneObject]) -> list[SceneObject]:
@@ -251,7 +251,7 @@ def _stack(items: list[SceneObject], rng: Generator) -> None:
         height = load_mesh(below.model).top - load_mesh(items[upper].model).bottom
         offset = np.array([*rng.normal(0, 0.003, 2), height])
         items[upper] = replace(
-            items[upper], X_WO=Pose(about_z(rng.uniform(0, math.tau)), below.X_WO.position + offset)
+            items[upper], X_WO=Pose(rotate_about_z(rng.uniform(0, math.tau)), below.X_WO.position + offset)
         )
 
 
@@ -285,6 +285,6 @@ def _place_side_by_side(
             )
             if free and np.linalg.norm(point) > BASE_CLEARANCE:
                 place = np.array([*point, floor - load_mesh(item.model).bottom])
-                placed.append(replace(item, X_WO=Pose(about_z(rng.uniform(0, math.tau)), place)))
+                placed.append(replace(item, X_WO=Pose(rotate_about_z(rng.uniform(0, math.tau)), place)))
                 break
     return placed

@@ -166,7 +166,7 @@ class SimCamera(MountedCamera):
         seed: int,
         *,
         occlusion: ArmOcclusion | None = None,
-        epoch: Callable[[], int] = lambda: 0,
+        get_epoch: Callable[[], int] = lambda: 0,
         light: Light = CELL_LIGHT,
         true_config: CameraConfig | None = None,
         bins: Sequence[Bin] = (),
@@ -180,13 +180,13 @@ class SimCamera(MountedCamera):
             clock: Clock for the time stamps of the frames.
             seed: Seed of the noise.
             occlusion: Occlusion by the arm; None: nothing is occluded, and the table is always visible.
-            epoch: Returns how many times the ledger has been informed of a change on the table.
+            get_epoch: Function that returns the version of the scene (`Ledger.epoch`).
             light: Light of the scene.
             true_config: Pose, lens and noise with which images are rendered if they differ from `config`.
                 The frames contain the matrix and the pose of `config`.
             bins: Bins whose positions in a frame show a displacement of the camera.
         """
-        super().__init__(name, config, world.get_flange_pose, clock, epoch)
+        super().__init__(name, config, world.get_flange_pose, clock, get_epoch)
         self._true_config = true_config or config
         self._world = world
         self._seed = seed
@@ -197,7 +197,7 @@ class SimCamera(MountedCamera):
     def sees_table(self) -> bool:
         """Return True if the whole workspace is in the image now and not occluded by the arm."""
         occlusion = self._occlusion
-        return occlusion is None or occlusion.is_table_visible(self.matrix, self._pose(), self._size)
+        return occlusion is None or occlusion.is_table_visible(self.matrix, self._compute_pose(), self._size)
 
     def describe_displacement(self, frame: Frame) -> str:
         """Return a message about the displacement of the camera in a frame from its declared pose, or ""."""
@@ -214,11 +214,11 @@ class SimCamera(MountedCamera):
     def _capture_images(self) -> tuple[Image, Array | None]:
         """Return the colour image and the depth image of the current frame; None without a depth sensor."""
         rendered = render(self._world, *self._get_true_view(), (0, 0, *self._size), self._light)
-        rng = np.random.default_rng([self._seed, self._frames])
+        rng = np.random.default_rng([self._seed, self._frame_count])
         image = add_noise(rendered.image, self._true_config.noise, rng)
         if self.config.depth is None:
             return image, None
-        rng = np.random.default_rng([self._seed, self._frames, DEPTH_SEED])
+        rng = np.random.default_rng([self._seed, self._frame_count, DEPTH_SEED])
         return image, add_depth_noise(rendered.depth, self.config.depth, rng)
 
     def _compute_visibility_mask(self, X_WC: Pose) -> Mask:

@@ -87,13 +87,13 @@ class SimCell(CellWithoutHardware):
             clock,
             seeds.camera,
             occlusion=ArmOcclusion(self._arm, planner.kinematics, config, lambda: self._tool.holding),
-            epoch=lambda: self.accounts.epoch,
+            get_epoch=lambda: self.accounts.epoch,
             light=build_light(scene.light),
             true_config=self._world.config.cameras[name],
             bins=tuple(bins),
         )
         if options.resume is not None:
-            self._camera.skip(options.resume.frames, options.resume.turns)
+            self._camera.set_counts(options.resume.frames, options.resume.turns)
         classes = {label: object_class_with_mass(label, kind) for label, kind in config.objects.items()}
         localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
         # Detectors are built last, because their processes would not be ended if a later statement failed.

@@ -72,7 +72,7 @@ class ClearanceChecker:
         Raises:
             Blocked: The path violates the margin; the message states bodies, distance and tool position.
         """
-        with self._place_obstacles(task.around):
+        with self._place_obstacles(task.obstacles):
             self._check_path(path, task.load)
 
     def _check_path(self, path: Array, load: Load | None) -> None:

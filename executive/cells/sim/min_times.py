@@ -9,7 +9,7 @@ from executive.cell.layout import build_bin, compute_max_pile_height
 from executive.cells.min_times import CellMinTimes
 from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.errors import Unreachable
-from executive.geometry import Array, tool_down
+from executive.geometry import Array, make_tool_down_pose
 from executive.motion.arms import build_kinematics
 from executive.motion.limits import JointLimits, compute_min_time
 
@@ -68,7 +68,7 @@ class SimMinTimes(CellMinTimes):
         Raises:
             Unreachable: No joint configuration is within the limits.
         """
-        pose = tool_down(np.array([*position, self._pile_height]))
+        pose = make_tool_down_pose(np.array([*position, self._pile_height]))
         start = np.zeros(self._limits.joint_count)
         qs = self._kinematics.solve_all(pose, start, REDUNDANCY_ANGLE_STEP).qs
         qs[:, -1] = 0.0

@@ -20,7 +20,7 @@ from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.viewpoint import Viewpoint
-from executive.processes import Workers
+from executive.processes import WorkerPool
 
 FILM_LIGHT = Light(direction=(0.5, -0.6, 1.2), ambient=0.6, diffuse=0.4, shadow=True)
 """Light with contrast between objects: from the right, with shadows."""
@@ -72,7 +72,7 @@ def take_pictures(shoot: Shoot, steps: Sequence[int], workers: int) -> Generator
     """
     bounds = [0, *range(PICTURES_IN_FIRST_BLOCK, len(steps), PICTURES_PER_BLOCK), len(steps)]
     blocks = [steps[first:end] for first, end in pairwise(bounds)]
-    with Workers(workers) as pool:
+    with WorkerPool(workers) as pool:
         pending: deque[Future[list[Image]]] = deque()
         # The number of pending blocks is limited, because waiting pictures occupy memory.
         for block in blocks:

@@ -16,7 +16,7 @@ from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, UnknownC
 from executive.cells.sim.scene_world import paint_table, true_cell, unknown_objects
 from executive.cells.sim.world import World
 from executive.errors import InputError
-from executive.geometry import Array, Pose, about_z
+from executive.geometry import Array, Pose, rotate_about_z
 
 MAX_PLACE_ATTEMPTS = 2000
 """Maximum number of places tried for one set of objects; then the workspace counts as too small."""
@@ -104,7 +104,7 @@ def spawn(
     bodies = []
     for (label, model), place in zip(kinds, places, strict=True):
         height = DROP_HEIGHT - load_mesh(model).bottom
-        X_WO = Pose(about_z(rng.uniform(0, math.tau)), np.array([*place, height]))
+        X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), np.array([*place, height]))
         colour = model.colours[int(rng.integers(len(model.colours)))]
         bodies.append(world.add_object(label, X_WO, colour, model))
     _come_to_rest(world, bodies)
@@ -189,7 +189,7 @@ def _put_on(world: World, upper: int, lower: int, rng: np.random.Generator) -> b
     below, above = (load_mesh(world.models[body]) for body in (lower, upper))
     height = base[2] + below.top - above.bottom + DROP_HEIGHT
     place = np.array([*(base[:2] + rng.uniform(-MAX_STACK_OFFSET, MAX_STACK_OFFSET, 2)), height])
-    goal = {**before, upper: Pose(about_z(rng.uniform(0, math.tau)), place)}
+    goal = {**before, upper: Pose(rotate_about_z(rng.uniform(0, math.tau)), place)}
     world.place_object(upper, goal[upper])
     _come_to_rest(world, list(goal), lambda: _has_moved(world, goal))
     heading = rng.uniform(0, math.tau)

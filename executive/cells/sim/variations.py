@@ -15,7 +15,7 @@ import numpy as np
 from executive.cell.config import CameraConfig, Colour, NoiseConfig
 from executive.cells.sim.camera import CELL_LIGHT, Light
 from executive.cells.sim.table_top import PLAIN, TEXTURES, WOOD
-from executive.geometry import Array, Pose, about_z
+from executive.geometry import Array, Pose, rotate_about_z
 from executive.perception.camera_model import intersect_plane
 
 MAX_FOV_CHANGE = 0.27
@@ -121,7 +121,7 @@ def random_camera(
     target = intersect_plane(matrix, X_WC, (centre[0], centre[1]), 0.0)
     axis, tilt = rng.uniform(0, math.tau), MAX_TILT * float(rng.choice([0.0, 0.1, 0.3, 1.0])) * rng.random()
     rotation, _ = cv2.Rodrigues(tilt * np.array([math.cos(axis), math.sin(axis), 0.0]))
-    rotation = np.asarray(rotation) @ about_z(rng.normal(0, math.radians(3)))
+    rotation = np.asarray(rotation) @ rotate_about_z(rng.normal(0, math.radians(3)))
     offset = (X_WC.position - target) * (1 + rng.uniform(-1, 1) * MAX_HEIGHT_CHANGE)
     shift = np.array([*rng.uniform(-MAX_SHIFT, MAX_SHIFT, 2), 0.0])
     return matrix, Pose(rotation @ X_WC.rotation, target + rotation @ offset + shift)

@@ -10,7 +10,7 @@ import numpy as np
 
 from executive.cell.config import Section, TableConfig
 from executive.cell.frame import Frame
-from executive.perception.visibility import find_outline_pixels
+from executive.perception.visibility import compute_hull_mask
 
 MIN_PIXELS = 400
 """Smallest number of visible pixels of the workspace from which statistics are computed."""
@@ -76,7 +76,7 @@ def measure_frame(frame: Frame, table: TableConfig) -> FrameStatistics | None:
     """
     height, width = frame.image.shape[:2]
     corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
-    mask = find_outline_pixels(corners, frame.matrix, frame.X_WC, (width, height))
+    mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, (width, height))
     if mask is None or np.count_nonzero(mask := mask & frame.visible) < MIN_PIXELS:
         return None
     # Averaging over 3 x 3 pixels removes most of the sensor's noise from the contrast.

@@ -14,7 +14,7 @@ from executive.cell.detection import Detections
 from executive.cell.objects import Item, Target
 from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import ROUTES, FakeCell, SilentOperator, load_empty_cell
-from executive.geometry import tool_down
+from executive.geometry import make_tool_down_pose
 from executive.mission.model.port_types import describe_type
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 
@@ -193,7 +193,7 @@ def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
     if is_holding or _starts_at_target(skill):
         kind = fake.cell.classes[targets[0].label]
         top = targets[0].position + np.array([kind.ring, 0.0, kind.height / 2])
-        fake.arm.set_tool_pose(tool_down(top, 0.0))
+        fake.arm.set_tool_pose(make_tool_down_pose(top, 0.0))
     if is_holding:
         fake.tool.close()
         fake.ledger.record_touch(item)

@@ -14,10 +14,10 @@ from executive.cell.objects import Load, Obstacle
 from executive.cells.fake.arm import MAX_TOOL_SPEED
 from executive.cells.fake.cell import FakeCell, load_empty_cell
 from executive.errors import Blocked, Fault, Unreachable
-from executive.geometry import Array, tool_down
+from executive.geometry import Array, make_tool_down_pose
 
 LATENCY = load_empty_cell().motion.planning_time
-BESIDE = Goal((0.5, 0.2, 0.03), guarded=0.02, speed=0.05)
+BESIDE = Goal((0.5, 0.2, 0.03), guarded_length=0.02, guarded_speed=0.05)
 
 
 def motion_to(fake: FakeCell, goal: Goal | str, task: Task = Task()) -> Motion:
@@ -72,7 +72,7 @@ def test_a_plan_takes_its_time_unless_it_was_asked_for_before(fake: FakeCell) ->
 
 
 def test_a_plan_for_another_task_or_from_another_place_is_another_plan(fake: FakeCell) -> None:
-    among = Task(around=(Obstacle(0.4, -0.2, 0.03, 0.05, "cube-1"),))
+    among = Task(obstacles=(Obstacle(0.4, -0.2, 0.03, 0.05, "cube-1"),))
     fake.arm.plan_ahead(BESIDE)
     assert not fake.arm.plan(BESIDE, among).ready
     fake.arm.plan_ahead("aside")
@@ -89,7 +89,7 @@ def test_what_is_out_of_reach_is_said_when_the_plan_is_known(fake: FakeCell) -> 
 def hold_cube(fake: FakeCell) -> Task:
     """Let the tool hold a cube that stands on the table, and return the task of carrying it."""
     fake.world.held = fake.world.put("cube", 0.5, 0.0)
-    fake.arm.set_tool_pose(tool_down((0.5, 0.0, 0.05)))
+    fake.arm.set_tool_pose(make_tool_down_pose((0.5, 0.0, 0.05)))
     return Task(Load(fake.cell.classes["cube"]))
 
 
@@ -97,7 +97,7 @@ def hold_cube(fake: FakeCell) -> Task:
     ("goal", "text"),
     [
         (Goal((0.5, 0.2, -0.01)), "tool 0.010 m into the table, with the tool at (0.500, 0.200, -0.010) m"),
-        (Goal((0.5, 0.2, -0.01), guarded=0.05, speed=0.05), "tool 0.010 m into the table, "),
+        (Goal((0.5, 0.2, -0.01), guarded_length=0.05, guarded_speed=0.05), "tool 0.010 m into the table, "),
         (Goal((0.24, -0.48, 0.002)), "tool 0.003 m into red_bin, with the tool at (0.240, -0.480, 0.002) m"),
         (Goal((0.1175, -0.48, 0.03)), "tool 0.009 m into red_bin, "),
     ],
@@ -133,7 +133,7 @@ def test_a_load_may_lie_on_the_table_and_on_the_floor_of_a_bin(fake: FakeCell) -
 
 def test_what_is_pressed_into_the_table_can_be_lifted_and_not_be_pressed_deeper(fake: FakeCell) -> None:
     task = hold_cube(fake)
-    fake.arm.set_tool_pose(tool_down((0.5, 0.0, 0.045)))
+    fake.arm.set_tool_pose(make_tool_down_pose((0.5, 0.0, 0.045)))
     with pytest.raises(Blocked, match=r"the held cube 0\.006 m into the table"):
         motion_to(fake, Goal((0.5, 0.0, 0.044)), task)
     assert go(fake, Goal((0.5, 0.0, 0.1)), task)[-1, 2] == pytest.approx(0.1)

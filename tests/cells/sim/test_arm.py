@@ -71,7 +71,7 @@ def test_a_motion_planned_ahead_too_late_is_waited_for_as_long_as_it_takes(rig: 
         (OVER, Task()),
         (Goal(BESIDE.position, yaw=0.0), Task()),
         ("home", Task()),
-        (BESIDE, Task(around=(Obstacle(0.6, 0.2, 0.03, 0.05, "cube-1"),))),
+        (BESIDE, Task(obstacles=(Obstacle(0.6, 0.2, 0.03, 0.05, "cube-1"),))),
     ],
     ids=["another place", "another yaw", "a pose", "other surroundings"],
 )

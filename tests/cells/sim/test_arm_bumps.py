@@ -16,7 +16,7 @@ from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
 
 LEFT, RIGHT = Goal((0.5, 0.25, 0.15)), Goal((0.5, -0.2, 0.15))
-LONG_DESCENT = Goal(RIGHT.position, guarded=0.1, speed=0.05)
+LONG_DESCENT = Goal(RIGHT.position, guarded_length=0.1, guarded_speed=0.05)
 
 
 def float_at(rig: Rig, label: str, place: Array, mass: float = 0.1) -> int:
@@ -83,7 +83,7 @@ def test_it_counts_on_the_guarded_part_of_a_motion_as_well(rig: Rig) -> None:
 def test_what_the_held_object_runs_into_counts_but_neither_the_tool_nor_the_table_it_lay_on(rig: Rig) -> None:
     held = rig.add("cube", 0.5, 0.1)
     rig.step(60)
-    rig.touch_down(Goal((0.5, 0.1, 0.045), guarded=0.012, speed=0.035))
+    rig.touch_down(Goal((0.5, 0.1, 0.045), guarded_length=0.012, guarded_speed=0.035))
     rig.tool.close()
     assert rig.tool.held_body == held
     task = Task(Load(build_object_class("cube", rig.config.objects["cube"]), rig.tool.holding_force))

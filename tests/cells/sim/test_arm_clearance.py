@@ -70,14 +70,14 @@ def into_the_bin(height: float, *distances: float) -> list[tuple[float, float, f
         ([(*RED_BIN[:2], z) for z in (0.15, 0.057)], DUCK, ""),
         (straight(0.003, 0.004, 0.1), Task(), ""),
         (straight(0.003, 0.001), Task(), "the table"),
-        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(around=(TOWER,)), ""),
+        ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(obstacles=(TOWER,)), ""),
         ([(0.5, y, 0.15) for y in (0.0, 0.1)], Task(), ""),
-        ([(0.5, y, 0.15) for y in (0.0, 0.1)], Task(around=(TOWER,)), NAMED),
+        ([(0.5, y, 0.15) for y in (0.0, 0.1)], Task(obstacles=(TOWER,)), NAMED),
         ([(0.5, y, 0.23) for y in (-0.1, 0.1)], Task(DUCK.load, (TOWER,)), r"held duck 0\.020 m into cube-3"),
         ([(0.5, 0.1, z) for z in (0.1, 0.0505)], DUCK, ""),
         ([(0.5, 0.1, z) for z in (0.1, 0.0505)], Task(DUCK.load, (COIN,)), r"the held duck .* a coin"),
-        ([(0.5, 0.1, z) for z in (0.202, 0.203, 0.25)], Task(around=(TOWER,)), ""),
-        ([(0.5, 0.1, z) for z in (0.202, 0.201)], Task(around=(TOWER,)), r"the tool 0\.001 m from cube-3"),
+        ([(0.5, 0.1, z) for z in (0.202, 0.203, 0.25)], Task(obstacles=(TOWER,)), ""),
+        ([(0.5, 0.1, z) for z in (0.202, 0.201)], Task(obstacles=(TOWER,)), r"the tool 0\.001 m from cube-3"),
     ],
 )
 def test_a_path_keeps_the_margin_but_a_load_may_lie_on_table_and_floor(
@@ -104,7 +104,7 @@ def test_a_long_tool_may_meet_the_upper_arm(overhead: CellConfig) -> None:
 def test_the_margin_is_kept_above_and_beside_what_stands_around(clearance: ClearanceChecker, at) -> None:
     def passes(*end: float) -> bool:
         try:
-            clearance.check(np.array([at(0.5, -0.1, 0.25), at(*end)]), Task(around=(TOWER,)))
+            clearance.check(np.array([at(0.5, -0.1, 0.25), at(*end)]), Task(obstacles=(TOWER,)))
         except Blocked as error:
             assert "the tool 0.004 m from cube-3" in str(error)
             return False
@@ -119,7 +119,7 @@ def test_several_things_of_one_size_stand_around_at_once(clearance: ClearanceChe
     towers = tuple(Obstacle(0.5, y, 0.03, 0.2, f"cube-{y}") for y in (-0.1, 0.0, 0.1))
     for tower in towers:
         with pytest.raises(Blocked, match=f"into {tower.name}, "):
-            clearance.check(np.array([at(0.5, 0.2, 0.25), at(0.5, tower.y, 0.15)]), Task(around=towers))
+            clearance.check(np.array([at(0.5, 0.2, 0.25), at(0.5, tower.y, 0.15)]), Task(obstacles=towers))
 
 
 def test_a_held_object_keeps_clear_of_the_arm(clearance: ClearanceChecker) -> None:

@@ -16,7 +16,7 @@ from executive.cell.objects import Load
 from executive.motion.trajectory import Trajectory
 from tests.benchmarks.halts import measure_distance
 
-PICK = Goal((0.6, -0.15, 0.04), guarded=0.016, speed=0.035)
+PICK = Goal((0.6, -0.15, 0.04), guarded_length=0.016, guarded_speed=0.035)
 ON_A_CUBE = Goal((0.6, -0.15, 0.0505))
 IN_A_BIN = Goal((0.3, 0.55, 0.07))
 SHARES = np.random.default_rng(11).uniform(0.02, 0.98, 3)
@@ -78,7 +78,7 @@ def test_a_guarded_descent_rests_within_a_millimetre_of_where_it_felt_something(
     rig.step(60)
     lay, expected = rig.world.get_object_pose(body).position, top - share * motion.descent
     lowest = expected - 0.015
-    goal = Goal((*place, lowest), guarded=0.015 + motion.descent, speed=motion.descent_speed)
+    goal = Goal((*place, lowest), guarded_length=0.015 + motion.descent, guarded_speed=motion.descent_speed)
     felt, pressed = rig.touch_down(goal)
     assert felt[2] == pytest.approx(top, abs=0.0012)
     assert np.linalg.norm(rig.arm.tool_pose.position - felt) < 0.001

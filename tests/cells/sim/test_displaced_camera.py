@@ -73,7 +73,7 @@ def test_a_camera_that_is_moved_during_a_run_ends_it_once_the_tool_is_empty() ->
         """A camera that is moved by 20 mm before its seventh frame."""
 
         def capture(self) -> TrueFrame:
-            if self._frames == 6:
+            if self._frame_count == 6:
                 keys = ("position", "look_at")
                 moved = {
                     key: tuple(np.add(getattr(self._true_config, key), (0.0, 0.02, 0.0))) for key in keys

@@ -11,7 +11,7 @@ from executive.cell.objects import Load
 
 CUBE = (0.5, 0.1)
 OVER = Goal((*CUBE, 0.15))
-ONTO = Goal((*CUBE, 0.04), guarded=0.015, speed=0.035)
+ONTO = Goal((*CUBE, 0.04), guarded_length=0.015, guarded_speed=0.035)
 
 
 @pytest.fixture

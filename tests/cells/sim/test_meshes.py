@@ -13,7 +13,7 @@ from executive.cells.sim.model_files import read_obj
 from executive.cells.sim.models import find_missing_models, load_mesh
 from executive.cells.sim.world import World
 from executive.errors import InputError
-from executive.geometry import Pose, about_z
+from executive.geometry import Pose, rotate_about_z
 from tests.cells.sim.conftest import shipped_cell
 
 Build = Callable[[CellConfig], World]
@@ -54,7 +54,7 @@ def with_objects(config: CellConfig, **objects: ObjectConfig) -> CellConfig:
 
 def put(world: World, label: str, x: float, y: float, yaw: float = 0.0) -> int:
     bottom = load_mesh(world.config.objects[label]).bottom
-    body = world.add_object(label, Pose(about_z(yaw), np.array([x, y, 0.001 - bottom])), (1, 1, 1))
+    body = world.add_object(label, Pose(rotate_about_z(yaw), np.array([x, y, 0.001 - bottom])), (1, 1, 1))
     for _ in range(240):
         world.step()
     return body
@@ -87,7 +87,7 @@ def test_a_mesh_stands_around_its_middle_and_weighs_about_the_middle_of_its_volu
     laid = wedge.model_copy(update={"scale": 2.0, "upright_deg": (90.0, 0.0, 0.0)})
     assert np.ptp(load_mesh(laid).vertices, axis=0) == pytest.approx([0.04, 0.06, 0.02])
     world = build(with_objects(overhead, wedge=wedge, laid=laid))
-    X_WO = Pose(about_z(0.7), np.array([0.5, 0.1, 0.2]))
+    X_WO = Pose(rotate_about_z(0.7), np.array([0.5, 0.1, 0.2]))
     body, other = (
         world.add_object("wedge", X_WO, (1, 1, 1)),
         world.add_object("laid", Pose.of([0.3, 0, 0.3]), (1, 1, 1)),

@@ -25,7 +25,7 @@ from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
 from executive.cells.sim.silhouette import compute_silhouette_area
 from executive.errors import InputError
 from executive.geometry import Pose
-from executive.processes import Workers
+from executive.processes import WorkerPool
 from executive.training.rendering import generate_dataset, render_run_frames, to_labelled_frame
 
 
@@ -138,7 +138,7 @@ def make(out: Path, workers: int = 1, images: int = 1, **cells: CellConfig) -> l
 
 
 class Here(ThreadPoolExecutor):
-    """Does at once, in this process, what `Workers` does in others."""
+    """Does at once, in this process, what `WorkerPool` does in others."""
 
     def submit(self, call, /, *arguments):  # type: ignore[no-untyped-def]
         done: Future[object] = Future()
@@ -146,12 +146,12 @@ class Here(ThreadPoolExecutor):
         return done
 
 
-@pytest.mark.parametrize("pool", [Here, pytest.param(Workers, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("pool", [Here, pytest.param(WorkerPool, marks=pytest.mark.slow)])
 def test_data_sets_and_frames_are_the_same_for_any_number_of_workers(
     pool: type, overhead: CellConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("executive.training.rendering.BLOCK_SIZE", 2)
-    monkeypatch.setattr("executive.training.rendering.Workers", pool)
+    monkeypatch.setattr("executive.training.rendering.WorkerPool", pool)
     one, two = tmp_path / "one", tmp_path / "two"
     assert make(one, 1, 4, overhead=overhead) == make(two, 2, 4, overhead=overhead) == [(2, 4), (4, 4)]
     files = sorted(path.relative_to(one) for path in one.rglob("*") if path.is_file())

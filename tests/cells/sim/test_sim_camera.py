@@ -10,7 +10,7 @@ from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, D
 from executive.cells.sim.camera import CELL_LIGHT, SimCamera, add_depth_noise, get_camera_pose, render
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.world import World
-from executive.geometry import Pose, about_z
+from executive.geometry import Pose, rotate_about_z
 from executive.perception.camera_model import compute_calibration, project
 
 Build = Callable[[CellConfig], World]
@@ -60,7 +60,7 @@ def test_projected_meshes_agree_with_the_rendered_silhouettes(
         label = list(config.objects)[i % 3]
         mesh = load_mesh(config.objects[label])
         place = np.array([0.44 + 0.09 * (i % 3), -0.18 + 0.18 * (i // 3), -mesh.bottom])
-        world.add_object(label, Pose(about_z(0.7 * i), place), (1, 0, 0))
+        world.add_object(label, Pose(rotate_about_z(0.7 * i), place), (1, 0, 0))
     matrix, X_WC = compute_calibration(camera)[0], get_camera_pose(world, camera)
     left, top, _, _ = camera.table_view
     bodies = render(world, matrix, X_WC, camera.table_view, CELL_LIGHT).bodies
@@ -118,7 +118,7 @@ def test_a_frame_carries_what_is_needed_to_use_it_later(build: Build, overhead: 
 
     world, name = at_scan_pose(build, overhead)
     config = overhead.cameras[name].model_copy(update={"noise": NoiseConfig(gain=0, read=0)})
-    camera = SimCamera(world, name, config, StoppedClock(), 1, occlusion=Half(), epoch=lambda: 4)
+    camera = SimCamera(world, name, config, StoppedClock(), 1, occlusion=Half(), get_epoch=lambda: 4)
     frame = camera.capture()
     assert (frame.camera, frame.stamp, frame.epoch, frame.depth) == (name, 1.5, 4, None)
     assert frame.image.shape == (480, 640, 3)

@@ -9,7 +9,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.config import ToolConfig
 from executive.cells.sim.suction import CupContact, compute_breakaway_force, measure_contact
-from executive.geometry import tool_down
+from executive.geometry import make_tool_down_pose
 
 REACH = 0.002
 TOOL = ToolConfig(
@@ -37,7 +37,7 @@ def ball(client: BulletClient, radius: float) -> int:
 
 def test_a_cup_over_the_middle_of_a_cube_seals_perfectly_at_the_distance_it_has(client: BulletClient) -> None:
     body = box(client, (0, 0, -0.025), 0.025)
-    seal = measure_contact(client, tool_down([0, 0, 0.0015]), {body}, 0.006, REACH)
+    seal = measure_contact(client, make_tool_down_pose([0, 0, 0.0015]), {body}, 0.006, REACH)
     assert seal is not None
     assert seal.body == body
     assert seal.distance == pytest.approx(0.0015, abs=1e-5)
@@ -48,8 +48,8 @@ def test_a_cup_over_the_middle_of_a_cube_seals_perfectly_at_the_distance_it_has(
 
 def test_a_cup_reaching_over_the_edge_of_a_cube_has_no_seal(client: BulletClient) -> None:
     body = box(client, (0, 0, -0.025), 0.025)
-    inside = measure_contact(client, tool_down([0.018, 0, 0.001]), {body}, 0.006, REACH)
-    outside = measure_contact(client, tool_down([0.020, 0, 0.001]), {body}, 0.006, REACH)
+    inside = measure_contact(client, make_tool_down_pose([0.018, 0, 0.001]), {body}, 0.006, REACH)
+    outside = measure_contact(client, make_tool_down_pose([0.020, 0, 0.001]), {body}, 0.006, REACH)
     assert compute_breakaway_force(inside, TOOL) == pytest.approx(TOOL.force, rel=0.01)
     assert outside is not None and math.isinf(outside.gap)
     assert compute_breakaway_force(outside, TOOL) == 0
@@ -58,7 +58,7 @@ def test_a_cup_reaching_over_the_edge_of_a_cube_has_no_seal(client: BulletClient
 @pytest.mark.parametrize("cup", [0.004, 0.006, 0.012])
 def test_the_gap_on_a_sphere_is_the_height_of_the_cap_under_the_cup(client: BulletClient, cup: float) -> None:
     radius = 0.03
-    seal = measure_contact(client, tool_down([0, 0, 0.0]), {ball(client, radius)}, cup, REACH)
+    seal = measure_contact(client, make_tool_down_pose([0, 0, 0.0]), {ball(client, radius)}, cup, REACH)
     assert seal is not None
     assert seal.gap == pytest.approx(radius - math.sqrt(radius**2 - cup**2), abs=5e-5)
     assert seal.tilt == pytest.approx(0, abs=0.01)
@@ -68,7 +68,7 @@ def test_the_gap_on_a_sphere_is_the_height_of_the_cap_under_the_cup(client: Bull
 def test_a_tilted_face_costs_tilt_and_no_gap(client: BulletClient, angle: float) -> None:
     body = box(client, (0, 0, 0), 0.025, roll=angle)
     height = 0.025 / math.cos(angle) + 0.006 * math.tan(angle)
-    seal = measure_contact(client, tool_down([0, 0, height]), {body}, 0.006, REACH)
+    seal = measure_contact(client, make_tool_down_pose([0, 0, height]), {body}, 0.006, REACH)
     assert seal is not None
     assert seal.tilt == pytest.approx(angle, abs=1e-3)
     assert seal.gap == pytest.approx(0, abs=2e-5)
@@ -77,7 +77,7 @@ def test_a_tilted_face_costs_tilt_and_no_gap(client: BulletClient, angle: float)
 def test_the_rays_look_through_the_tool_they_start_in(client: BulletClient) -> None:
     body = box(client, (0, 0, -0.025), 0.025)
     around_the_lip = box(client, (0, 0, 0.0515), 0.05)
-    seal = measure_contact(client, tool_down([0, 0, 0.0015]), {body}, 0.006, REACH)
+    seal = measure_contact(client, make_tool_down_pose([0, 0, 0.0015]), {body}, 0.006, REACH)
     assert seal is not None and seal.body == body != around_the_lip
     assert seal.distance == pytest.approx(0.0015, abs=1e-5)
     assert seal.gap == pytest.approx(0, abs=1e-5)
@@ -85,7 +85,7 @@ def test_the_rays_look_through_the_tool_they_start_in(client: BulletClient) -> N
 
 def test_two_objects_under_one_cup_are_no_seal(client: BulletClient) -> None:
     bodies = {box(client, (-0.0255, 0, -0.025), 0.025), box(client, (0.0255, 0, -0.025), 0.025)}
-    seal = measure_contact(client, tool_down([0.001, 0, 0.001]), bodies, 0.006, REACH)
+    seal = measure_contact(client, make_tool_down_pose([0.001, 0, 0.001]), bodies, 0.006, REACH)
     assert seal is not None and math.isinf(seal.gap)
 
 

@@ -82,7 +82,7 @@ def test_a_ray_is_cast_from_the_lens_through_the_middle_of_the_box():
         assert origin == pytest.approx(ABOVE.position)
         return origin + (centre[2] + SIDE / 2 - origin[2]) / direction[2] * direction
 
-    found = build_localizer("ray", CLASSES, cast=onto_the_top).locate(*showing_cube(centre))
+    found = build_localizer("ray", CLASSES, cast_ray=onto_the_top).locate(*showing_cube(centre))
     assert found == pytest.approx(centre, abs=0.002)
 
 
@@ -99,24 +99,24 @@ def with_one_pixel(detection, frame):
             DEPTH,
             with_one_pixel,
             "1 of 196 pixels in the middle of the box (310, 230, 330, 250) of frame 7 have a depth; "
-            "20 are needed",
+            "20 are required",
         ),
         (DEPTH, lambda one, frame: (one, replace(frame, visible=~frame.visible)), "0 of 196 pixels in the"),
         (DEPTH, lambda one, frame: (replace(one, box=(700, 100, 720, 120)), frame), "0 of 0 pixels in the"),
         (
             DEPTH,
             lambda one, frame: (one, replace(frame, depth=None)),
-            "frame 7 has no depth image; set `localization: plane`, or `depth` of the camera eye",
+            "frame 7 has no depth image; set `localization: plane` in the cell file, or `depth` of",
         ),
         (
-            build_localizer("ray", CLASSES, cast=lambda origin, direction: None),
+            build_localizer("ray", CLASSES, cast_ray=lambda origin, direction: None),
             lambda one, frame: (one, frame),
             "the ray through pixel (320, 240) of frame 7 hits nothing",
         ),
         (
             PLANE,
             lambda one, frame: (one, replace(frame, X_WC=UPWARDS)),
-            "the ray through pixel (320, 240) of frame 7 does not meet the plane 25 mm above the table",
+            "the ray through pixel (320, 240) of frame 7 does not intersect the plane 25 mm above the table",
         ),
     ],
 )
