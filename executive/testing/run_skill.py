@@ -32,11 +32,11 @@ class SkillResult:
     """Result of a run of a skill.
 
     Attributes:
-        status: `SUCCESS`, `FAILURE`, `HALTED`, or `RUNNING` if the skill has not ended.
+        status: `SUCCESS`, `FAILURE`, `HALTED`, or `RUNNING` if the skill did not end within `max_ticks`.
         reason: The declared reason of a failure, or "".
         message: Message of the failure, or "".
         outputs: Values of the output ports by name, on success.
-        ticks: Number of control steps.
+        ticks: Number of control steps from the start to the end.
         commands: Commands to the cell, in order; `log_commands` defines the texts.
         braking_steps: Number of control steps from a halt until the arm was at rest; None if the arm was not
             at rest after `MAX_BRAKING_TIME`.
@@ -56,7 +56,7 @@ def run_skill(
     workcell: Workcell,
     *,
     inputs: Mapping[str, Any] | None = None,
-    ticks: int = 20_000,
+    max_ticks: int = 20_000,
     halt_at: int | None = None,
 ) -> SkillResult:
     """Tick a skill until it ends, is halted, or has taken the maximum number of control steps.
@@ -68,7 +68,7 @@ def run_skill(
         skill: The skill, or the class of the skill.
         workcell: Cell in which the skill runs.
         inputs: Values of params and inputs by name, if `skill` is a class.
-        ticks: Maximum number of control steps.
+        max_ticks: Maximum number of control steps.
         halt_at: Control step before which the skill is halted; None: no halt.
 
     Raises:
@@ -78,7 +78,7 @@ def run_skill(
     """
     commands: list[str] = []
     run = SkillRun(_instantiate(skill, inputs), log_commands(workcell.cell, commands))
-    for tick in range(ticks):
+    for tick in range(max_ticks):
         if tick == halt_at:
             run.halt()
             return SkillResult(
@@ -91,7 +91,7 @@ def run_skill(
         if has_succeeded:
             return SkillResult("SUCCESS", outputs=run.read_outputs(), ticks=tick, commands=commands)
         workcell.advance()
-    return SkillResult("RUNNING", ticks=ticks, commands=commands)
+    return SkillResult("RUNNING", ticks=max_ticks, commands=commands)
 
 
 def _instantiate(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -> Skill:

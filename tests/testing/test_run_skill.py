@@ -179,5 +179,5 @@ def test_an_arm_that_never_rests_is_not_waited_for(fake: FakeCell, monkeypatch: 
 
 
 def test_a_skill_that_does_not_end_is_left_running(fake: FakeCell) -> None:
-    result = run_skill(Coaster, fake, ticks=400)
+    result = run_skill(Coaster, fake, max_ticks=400)
     assert (result.status, result.ticks) == ("RUNNING", 400)

@@ -97,5 +97,5 @@ def test_a_bug_in_finally_comes_up_in_a_halt_and_not_without_one(fake: FakeCell,
 
 def test_it_never_ends_but_can_be_taken_away(fake: FakeCell) -> None:
     waiting = make_endless(Wait)
-    assert run_skill(waiting, fake, inputs={"seconds": 0.1}, ticks=500).status == "RUNNING"
+    assert run_skill(waiting, fake, inputs={"seconds": 0.1}, max_ticks=500).status == "RUNNING"
     assert run_skill(waiting, fake, inputs={"seconds": 0.1}, halt_at=500).status == "HALTED"

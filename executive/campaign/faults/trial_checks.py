@@ -37,12 +37,13 @@ NO_UNOBSERVED_OBJECTS = UnobservedCounts(0, 0)
 def check_end(
     outcome: RunEnded,
     faults: Sequence[PlannedFault],
-    endings: Sequence[UnhandledFailure],
+    unhandled_failures: Sequence[UnhandledFailure],
     is_bug_raised: bool,
 ) -> Iterator[str]:
     """Yield a problem if the run did not end as its faults require.
 
-    `is_bug_raised` is True if an injected bug was raised; then the run must end as a fault at its node.
+    `unhandled_failures` are the failures with which the mission may end. If `is_bug_raised` is True, an
+    injected bug was raised, and the run must end as a fault at the node of the bug.
     """
     if outcome.status == "FAULT":
         nodes = [fault.location for fault in faults if fault.ends_run]
@@ -53,7 +54,7 @@ def check_end(
     elif is_bug_raised:
         yield f"a bug was raised, but the run ended as {outcome.status} {outcome.reason}"
     if outcome.status == "FAILURE" and outcome.reason != "lost":
-        known = {(ending.node, f"{ending.source}.{ending.reason}") for ending in endings}
+        known = {(failure.node, f"{failure.source}.{failure.reason}") for failure in unhandled_failures}
         if (outcome.node, outcome.reason) not in known:
             yield f"it ended with {outcome.reason} at {outcome.node}, which the mission checker excludes"
 
