@@ -11,14 +11,7 @@ from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, make_warning
 from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
-from executive.mission.model.nodes import (
-    InnerNode,
-    KeyValue,
-    Node,
-    SectionNode,
-    SkillNode,
-    iterate_key_values,
-)
+from executive.mission.model.nodes import InnerNode, KeyValue, Node, SectionNode, SkillNode, iterate_keys
 from executive.mission.model.paths import get_path_name
 from executive.mission.model.values import FailureName, Literal, Reference
 from executive.skill import Skill
@@ -35,7 +28,7 @@ def check_constants(context: CheckContext) -> Iterator[Finding]:
 
 
 def _check_keys(context: CheckContext, owner: InnerNode | SectionNode, name: str) -> Iterator[Finding]:
-    for key, value in iterate_key_values(owner):
+    for key, value in iterate_keys(owner):
         if isinstance(value, SectionNode):
             yield from _check_keys(context, value, key.name)
         elif isinstance(value, tuple):

@@ -94,10 +94,7 @@ class ElementLoop:
         return writers.get(self.source.name, ())
 
     def check_lists(self, list_writers: Iterable[Writer]) -> Iterator[Finding]:
-        """Yield an error for each writer that does not write a list to the variable `source`.
-
-        The check of constants reports a value in the file that is not a list.
-        """
+        """Yield an error for each writer that does not write a list to the variable `source`."""
         if not isinstance(self.source, Reference):
             return
         variable, mark, key = self.source.name, self.source.mark, f"{self.keyword}.{self.key}"

@@ -8,14 +8,7 @@ from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, list_choices, make_error
 from executive.mission.flow.analysis import FlowAnalysis
 from executive.mission.model import grammar
-from executive.mission.model.nodes import (
-    InnerNode,
-    Node,
-    SectionNode,
-    SkillNode,
-    iterate_key_values,
-    list_nodes,
-)
+from executive.mission.model.nodes import InnerNode, Node, SectionNode, SkillNode, iterate_keys, list_nodes
 from executive.mission.model.values import FailureName
 from executive.mission.source import Mark
 from executive.tree.flow import UNKNOWN_NAME, PossibleFailure
@@ -78,7 +71,7 @@ def _find_names_with_bodies(node: Node) -> Iterator[tuple[FailureName, str, Node
 
 def _find_failure_names(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, FailureName]]:
     """Yield the names of failures in the keys of a node and of its sections."""
-    for key, value in iterate_key_values(owner):
+    for key, value in iterate_keys(owner):
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, FailureName):
                 yield key, item

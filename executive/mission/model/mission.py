@@ -14,12 +14,7 @@ from executive.mission.source import Mark
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of a subtree.
-
-    Attributes:
-        mark: Position of the name.
-        default: Default value or variable; None if every `use` must give the argument.
-    """
+    """An argument of a subtree and its position; without a default, every `use` must give the argument."""
 
     mark: Mark
     default: Value | None
@@ -76,13 +71,7 @@ class MissionParam:
 
 @dataclass(frozen=True)
 class Route:
-    """Class of objects, with its permitted bins.
-
-    Attributes:
-        label: Name of the class.
-        label_mark: Position of the class.
-        bins: Names of the bins; each may receive the objects.
-    """
+    """Class of objects `label`, with its position, and the bins that may receive the objects."""
 
     label: str
     label_mark: Mark

@@ -104,7 +104,7 @@ class InnerNode(Node):
     @cached_property
     def children(self) -> tuple[Node, ...]:
         """The nodes in the values of the keys, also in sections."""
-        return tuple(node for _, value in iterate_key_values(self) for node in list_nodes(value))
+        return tuple(node for _, value in iterate_keys(self) for node in list_nodes(value))
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ KeyValue: TypeAlias = (
 """Value of a key of a control node."""
 
 
-def iterate_key_values(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, KeyValue]]:
+def iterate_keys(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, KeyValue]]:
     """Yield the given keys with their values, in the order of the declarations."""
     for name, key in owner.declaring_class.keys.items():
         if name in owner.values:
@@ -147,7 +147,7 @@ def iterate_key_values(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, Ke
 def list_nodes(value: KeyValue) -> list[Node]:
     """Return the nodes in the value of a key, without their descendants."""
     if isinstance(value, SectionNode):
-        return [node for _, inner in iterate_key_values(value) for node in list_nodes(inner)]
+        return [node for _, inner in iterate_keys(value) for node in list_nodes(inner)]
     if isinstance(value, tuple):
         return [node for item in value if not isinstance(item, FailureName) for node in list_nodes(item)]
     return [value] if isinstance(value, Node) else []

@@ -17,7 +17,7 @@ from executive.mission.model.nodes import (
     SkillNode,
     UnknownNode,
     UseNode,
-    iterate_key_values,
+    iterate_keys,
 )
 from executive.tree.keys import Kind
 
@@ -71,7 +71,7 @@ def _assign_value_paths(
     `section_slot` is the key of the control node that contains the section `owner`, or "".
     """
     values: dict[str, KeyValue] = {}
-    for key, value in iterate_key_values(owner):
+    for key, value in iterate_keys(owner):
         # The child of a section under `do` has the slot of the section.
         slot = section_slot if section_slot and key.name == "do" else _join(section_slot, key.name)
         if isinstance(value, Node):

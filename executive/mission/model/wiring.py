@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, iterate_key_values
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, iterate_keys
 from executive.mission.model.values import Literal, LocatedName, Reference
 from executive.mission.source import Mark
 from executive.skill import Direction, Port, Skill
@@ -58,7 +58,7 @@ def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
 def find_control_node_outputs(node: Node) -> Iterator[tuple[Key, LocatedName]]:
     """Yield each key of a control node that names an output variable, with the variable."""
     if isinstance(node, InnerNode):
-        for key, value in iterate_key_values(node):
+        for key, value in iterate_keys(node):
             if isinstance(value, LocatedName):
                 yield key, value
 
@@ -66,7 +66,7 @@ def find_control_node_outputs(node: Node) -> Iterator[tuple[Key, LocatedName]]:
 def find_control_node_inputs(node: Node) -> Iterator[Reference]:
     """Yield the variables that a control node reads as lists of elements."""
     if isinstance(node, InnerNode):
-        for key, value in iterate_key_values(node):
+        for key, value in iterate_keys(node):
             if key.kind is Kind.ELEMENTS and isinstance(value, Reference):
                 yield value
 

@@ -54,10 +54,7 @@ def _compute_outline(bin: BinConfig) -> Array:
 
 
 def _compute_shift(outline: Array, other: Array, distance: float = 0.0) -> float:
-    """Return the shift along x or y that gives two rectangles a distance [m]; 0 if they have the distance.
-
-    A rectangle consists of its minimum and its maximum x and y, `(2, 2)` [m].
-    """
+    """Return the shift along x or y that gives two outlines `(2, 2)` a distance [m]; 0 if they have it."""
     gaps = np.maximum(outline[0] - other[1], other[0] - outline[1])
     is_apart = gaps.max() >= 0 and np.linalg.norm(np.maximum(gaps, 0.0)) >= distance
     return 0.0 if is_apart else float(distance - gaps.max())

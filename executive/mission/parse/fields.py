@@ -138,11 +138,7 @@ class Fields:
 def read_settings(
     node: YamlNode, owner: str, findings: list[Finding], example_key: str = "name"
 ) -> dict[str, Setting]:
-    """Return the values of a mapping by name; an empty value counts as an empty mapping.
-
-    `owner` is the skill or key with the mapping. If a single value takes the place of the mapping, the hint
-    contains `example_key`.
-    """
+    """Return the values of the mapping of a skill or key `owner`; a hint suggests `example_key`."""
     if isinstance(node, YamlScalar) and node.value is None:
         return {}
     if not isinstance(node, YamlMapping):

@@ -20,10 +20,7 @@ def make_override_source(key: str, value: str) -> Source:
 
 
 def parse_override(key: str, value: str, is_text: bool = False) -> tuple[YamlNode | None, list[Finding]]:
-    """Return the value of an override as a YAML node, or None if it is invalid, and the findings.
-
-    With `is_text`, the value is a text and no YAML.
-    """
+    """Return the YAML node of an override, or None if it is invalid, and the findings; `is_text`: no YAML."""
     source = make_override_source(key, value)
     mark = source.make_mark(1, len(key) + 2, max(1, len(value)))
     if is_text:

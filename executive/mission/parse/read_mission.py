@@ -98,10 +98,7 @@ def _add_library(
     trees: dict[str, Subtree],
     findings: list[Finding],
 ) -> str | None:
-    """Add the subtrees of a library to `trees` and return its text, or None if it cannot be read.
-
-    `reference` is the path of the library, relative to `folder`.
-    """
+    """Add the subtrees of the library file `reference` in `folder` to `trees`; return its text, or None."""
     try:
         source = read_source(find_file_below(folder, reference.name))
     except InputError as problem:
