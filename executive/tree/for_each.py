@@ -70,7 +70,7 @@ class ForEach(Loop):
     def _write_element(self) -> None:
         element = self._elements[self._next]
         self.blackboard.write({self.each: element})
-        self.report_choice(f"element {self._next + 1} of {len(self._elements)}: {_describe(element)}")
+        self.report_choice(f"element {self._next + 1} of {len(self._elements)}: {_describe_element(element)}")
 
     def _read_list(self) -> tuple[object, ...]:
         source = self.in_
@@ -123,7 +123,7 @@ class ForEach(Loop):
         return f"failed at {failure.last_choice}"
 
 
-def _describe(element: object) -> str:
+def _describe_element(element: object) -> str:
     """Return a short text for an element: the item of a target, a plain value, or the name of the type."""
     if isinstance(element, Target):
         return element.item

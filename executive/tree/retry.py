@@ -36,7 +36,7 @@ class Backoff(KeySection):
         return f"{self.first:g} s{factor}{limit}"
 
     def compute_delay(self, attempt: int) -> float:
-        """Return the delay after the failure of an attempt, counted from 1 [s]."""
+        """Return the delay [s] after a failure of the attempt with the number `attempt`, counted from 1."""
         try:
             return min(self.first * self.factor ** (attempt - 1), self.max)
         except OverflowError:

@@ -104,7 +104,7 @@ class SkillLeaf(Behaviour):
         yield self
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
-        """Close the running skill, so that its `finally` runs; a skill that is not running stays as it is.
+        """Set the status; close the generator of a running skill, so that its `finally` runs.
 
         Raises:
             Fault: The skill raised or yielded during its `finally`.
@@ -113,7 +113,7 @@ class SkillLeaf(Behaviour):
             self.status = new_status
             return
         run = self._run
-        self._close(new_status)
+        self._end_run(new_status)
         try:
             if run is not None:
                 run.halt()
@@ -153,22 +153,22 @@ class SkillLeaf(Behaviour):
         outputs = {port: values[port] for port in self.wiring.outputs}
         self._blackboard.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._find_item(outputs) or self._item
-        self._close(Status.SUCCESS)
+        self._end_run(Status.SUCCESS)
         reported = {port: to_json_or_type_name(value) for port, value in outputs.items()}
         self._emit_end(Status.SUCCESS, outputs=reported)
 
     def _fail(self, failed: SkillFailed) -> None:
         labels = (self.label,) if self.label else ()
         self.failure = Failure(failed.reason, failed.message, self.skill_name, self.path, labels)
-        self._close(Status.FAILURE)
+        self._end_run(Status.FAILURE)
         self._emit_end(Status.FAILURE, failed.reason, failed.message)
 
     def _end_with_fault(self, message: str) -> Fault:
-        self._close(Status.INVALID)
+        self._end_run(Status.INVALID)
         self._emit_end(Status.INVALID, "fault", message)
         return Fault(f"{self.name}: {message}", self.path)
 
-    def _close(self, status: Status) -> None:
+    def _end_run(self, status: Status) -> None:
         self.status, self._run = status, None
 
     def _emit_end(

@@ -41,7 +41,7 @@ def test_it_is_written_once_more_from_what_the_record_says_now(run: Path) -> Non
     (run / "journal.jsonl").write_text("".join(lines[:-1]))
     (run / "result.json").unlink()
     assert invoke("report", str(run)).exit_code == 0
-    assert "CUT OFF" in (run / "report.html").read_text()
+    assert "INTERRUPTED" in (run / "report.html").read_text()
 
 
 def test_a_run_leaves_a_report_and_names_it(tmp_path: Path) -> None:

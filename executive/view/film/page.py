@@ -91,7 +91,7 @@ def draw_result(page: Image.Image, result: Result | RunEnded | None) -> Image.Im
 def describe_result(result: Result | RunEnded | None) -> tuple[str, str, str]:
     """Return status, message and item counts of a run as texts; `result` None: the run was interrupted."""
     if result is None:
-        return "CUT OFF", "the record ends here; the result of the run is unknown", ""
+        return "INTERRUPTED", "the record ends here; the result of the run is unknown", ""
     if isinstance(result, RunEnded):
         return result.status, result.message, ""
     counts = ", ".join(f"{count} {end}" for end, count in asdict(result.items).items() if count)

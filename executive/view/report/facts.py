@@ -16,7 +16,7 @@ from executive.view.report.activity_times import compute_activity_times
 from executive.view.report.pictures import collect_pictures
 from executive.view.terminal.summary import format_repeat_command
 
-CUT_OFF = "CUT OFF"
+INTERRUPTED = "INTERRUPTED"
 """Status of a run whose journal has no end: the run was killed, or is still running."""
 
 
@@ -31,7 +31,7 @@ class ReportFacts:
         start: Event of the start of the run.
         result: Content of `result.json`; None if the file is missing or belongs to another run.
         end: The result; without it, the event of the end of the run; None if neither exists.
-        status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `CUT OFF`.
+        status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `INTERRUPTED`.
         nodes: Nodes of the tree.
         timeline: Timeline of the run.
         objects: Last change of each item that is not a phantom.
@@ -53,7 +53,7 @@ class ReportFacts:
         self.start = find_start(events, path, "there is nothing to report")
         self.result = read_result(directory, events)
         self.end = self.result or find_end(events)
-        self.status = CUT_OFF if self.end is None else self.end.status
+        self.status = INTERRUPTED if self.end is None else self.end.status
         self.nodes = read_tree(directory.tree)
         self.timeline = Timeline.from_events(events)
         items = self.timeline.items.list_items()

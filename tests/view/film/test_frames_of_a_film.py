@@ -127,7 +127,7 @@ STORY = SimpleNamespace(verdict="Grasp failed: no seal")
             ("FAILURE", "Grasp failed: no seal", "6 seen, 5 placed, 1 rejected; 15.5 s"),
         ),
         (run_ended("HALTED", message="by the user"), ("HALTED", "by the user", "")),
-        (None, ("CUT OFF", "the record ends here; the result of the run is unknown", "")),
+        (None, ("INTERRUPTED", "the record ends here; the result of the run is unknown", "")),
     ],
 )
 def test_the_end_shows_the_diagnosis_or_the_message_and_the_items(result, ending) -> None:

@@ -19,7 +19,7 @@ from executive.record.journal_format import encode_event
 from executive.record.recorded_run import RecordOptions
 from executive.record.resumed_run import resume_run
 from executive.run.assembly import RunOptions
-from executive.view.report.facts import CUT_OFF, ReportFacts
+from executive.view.report.facts import INTERRUPTED, ReportFacts
 
 
 def append(run: Path, tick: int, event: Event) -> None:
@@ -44,7 +44,7 @@ def test_a_run_that_ended_is_described_by_its_result(failed):
 @pytest.mark.slow
 def test_an_interrupted_and_resumed_run_is_described_as_one(killed, copy):
     run = copy(killed)
-    assert ReportFacts(run).status == CUT_OFF
+    assert ReportFacts(run).status == INTERRUPTED
     resume_run(run, discover(), RunOptions(3, kind=FakeCell), RecordOptions(saves_pictures=False))
     facts = ReportFacts(run)
     assert (facts.status, facts.resume_command) == ("SUCCESS", "")
@@ -60,7 +60,7 @@ def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, 
     run = copy(failed)
     append(run, 312, RunResumed(310, "", {}))
     facts = ReportFacts(run)
-    assert (facts.status, facts.end, facts.timeline.clock) == (CUT_OFF, None, 1.3)
+    assert (facts.status, facts.end, facts.timeline.clock) == (INTERRUPTED, None, 1.3)
     append(run, 400, run_ended("HALTED", reason="halted", message="halted by the user", ticks=400))
     facts = ReportFacts(run)
     assert (facts.status, facts.end.message) == ("HALTED", "halted by the user")
@@ -83,7 +83,7 @@ def test_a_result_that_is_none_tells_nothing(failed, copy, content):
     facts = ReportFacts(run)
     assert (facts.status, facts.end) == ("FAILURE", facts.timeline.ended)
     without_end(run)
-    assert (ReportFacts(run).status, ReportFacts(run).end) == (CUT_OFF, None)
+    assert (ReportFacts(run).status, ReportFacts(run).end) == (INTERRUPTED, None)
 
 
 def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(done, copy):

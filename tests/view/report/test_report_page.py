@@ -111,7 +111,7 @@ def test_a_killed_run_is_reported_up_to_its_end_with_the_command_to_resume_it(ki
     assert not (killed / "result.json").exists()
     found = page(killed)
     assert found.texts["header"].startswith(
-        "CUT OFF The journal has no end: the run was killed, or is still running."
+        "INTERRUPTED The journal has no end: the run was killed, or is still running."
     )
     assert f"resume executive run --resume {shlex.quote(str(killed))}" in found.texts["commands"]
     assert "Transit Transit of sphere-1: RUNNING" in found.texts["timeline"]
