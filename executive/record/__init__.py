@@ -1,1 +1,1 @@
-"""What a run leaves behind: observers of its events."""
+"""Record of a run: observers of its events, run directory, result, replay and resumption."""

@@ -20,7 +20,7 @@ LOCK_LIST = Path("/proc/locks")
 
 
 class Journal:
-    """Observer that appends each event to a file, which it locks until the end of the process.
+    """Observer that appends each event to a file, which is locked for other processes.
 
     Commands to the tool, placements of items and the end of the run are synced to the disk before the run
     continues. Therefore the journal shows after a power cut which item the tool may hold, and which items are

@@ -31,7 +31,7 @@ _KEYS_BY_KIND: Mapping[str, KeysView[str]] = {
     kind: dict.fromkeys([*_TIME_KEYS, *(field.name for field in fields(cls))]).keys()
     for kind, cls in EVENT_CLASSES.items()
 }
-"""Keys in a line of each kind."""
+"""Keys in the line of an event, by the kind of the event."""
 
 _ADAPTER_BY_KIND: Mapping[str, TypeAdapter[Event]] = {k: TypeAdapter(cls) for k, cls in EVENT_CLASSES.items()}
 

@@ -1,4 +1,4 @@
-"""Recorder of the pictures of a run: one file for each selected target and for certain failures."""
+"""Recorder of the pictures of a run: one file for each selected target and each failed attempt."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from executive.events import (
 UNKNOWN_ACTION = "unknown"
 """Value of `Interruption.last_action` if the journal may lack the last action."""
 _COMMAND_EVENTS = (ToolCommanded, MotionPlanned)
-"""Kinds of events of which one precedes each command to tool and arm."""
+"""Kinds of events that precede the commands: each command to tool or arm follows one such event."""
 
 
 class RecordedInput(NamedTuple):

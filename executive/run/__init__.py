@@ -1,1 +1,1 @@
-"""Assembly, tick loop, control and end of a run, and its operator."""
+"""Execution of a run: assembly, tick loop, control, operator, resumption and end."""

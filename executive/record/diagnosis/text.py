@@ -68,9 +68,9 @@ def list_facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "last look", _format_look(diagnosis.look)
     if diagnosis.picture:
         yield "picture", diagnosis.picture
-    holds = {"": "is empty", "something": "holds an unknown object"}
+    tool_texts = {"": "is empty", "something": "holds an unknown object"}
     arm = "the arm is at rest" if diagnosis.arm == "at rest" else f"the arm: {diagnosis.arm}"
-    yield "now", f"{arm}, the tool {holds.get(diagnosis.holds, 'holds ' + diagnosis.holds)}"
+    yield "now", f"{arm}, the tool {tool_texts.get(diagnosis.holds, 'holds ' + diagnosis.holds)}"
     if diagnosis.left:
         yield "left to do", f"{len(diagnosis.left)}: {', '.join(diagnosis.left)}"
     for sentence in diagnosis.next:
@@ -88,9 +88,9 @@ def _format_passed_nodes(diagnosis: Diagnosis) -> list[str]:
     shown = [*passed[-MAX_SHOWN_NODES:], (node.name, node.path, node.place)]
     width = max(len(name) for name, _, _ in shown)
     lines = [f"why no node in {diagnosis.mission} handled it, from the root down{omitted}:"]
-    for name, why, place in shown:
+    for name, explanation, place in shown:
         line = f"line {place.removeprefix(mission_prefix)}" if place.startswith(mission_prefix) else place
-        lines += wrap_lines(f"{why} ({line})", f"  {name:{width}}  ", " " * (width + 4))
+        lines += wrap_lines(f"{explanation} ({line})", f"  {name:{width}}  ", " " * (width + 4))
     return lines
 
 

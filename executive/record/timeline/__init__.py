@@ -1,1 +1,1 @@
-"""Timeline of a run: the fold of its events."""
+"""Timeline of a run: state and history of nodes and items, computed from the events."""
