@@ -13,7 +13,7 @@ from executive.cell.config import CellConfig, DetectorConfig
 from executive.cell.layout import build_object_class
 from executive.cell.protocols import Localizer
 from executive.cells.sim.scene_file import load_scene
-from executive.cells.sim.spawn import find_max_count
+from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import list_choices
 from executive.perception.detectors.registry import find_problems
@@ -188,7 +188,7 @@ def _open_images(
                 )  # fmt: skip
             yield Samples(Path(folder))
     else:
-        table = {"objects": (0, find_max_count(config, MAX_OBJECT_COUNT))}
+        table = {"objects": (0, find_max_object_count(config, MAX_OBJECT_COUNT))}
         limited_config = config.model_copy(update={"table": config.table.model_copy(update=table)})
         with progress(f"rendering {config.cell}") as update:
             frames = render_run_frames(

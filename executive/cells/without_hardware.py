@@ -47,14 +47,8 @@ class CellWithoutHardware:
         del seed
         self.config, self.routes = config, dict(routes)
         self.steps = self.last_command = 0
-        self.accounts = Tracker(
-            config.ledger,
-            config.table,
-            build_bins(config),
-            self.routes,
-            emit,
-            find_classes_distinct_by_touch(config),
-        )
+        bins, distinct = build_bins(config), find_classes_distinct_by_touch(config)
+        self.accounts = Tracker(config.ledger, config.table, bins, self.routes, emit, distinct)
         missing: Any = None
 
         def emit_decision(target: Target, bin: str) -> None:
@@ -68,7 +62,7 @@ class CellWithoutHardware:
             detectors=dict.fromkeys(config.detectors, missing),
             ledger=self.accounts,
             operator=options.operator,
-            bins=build_bins(config),
+            bins=bins,
             classes=build_object_classes(config),
             routes=self.routes,
             localizer=missing,

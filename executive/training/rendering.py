@@ -126,7 +126,7 @@ def _draw_samples(
         for number in numbers:
             cell_index = number % len(cells)
             sample_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
-            yield number, cameras[cell_index], renderers[cell_index].sample(sample_seed)
+            yield number, cameras[cell_index], renderers[cell_index].render_sample(sample_seed)
 
 
 def _render_block(
@@ -161,7 +161,7 @@ def _make_entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEn
         "visible_fraction": sample.visible_fraction.round(4).tolist(),
     }
     boxes, ignored = _to_boxes(sample.boxes), _to_boxes(sample.ignored)
-    truth = {**_collect_truth(sample, camera, sample.part), **rounded}
+    truth = {**_collect_truth(sample, camera, sample.region), **rounded}
     return DatasetEntry(split, file, (IMAGE_SIZE, IMAGE_SIZE), sample.labels, boxes, ignored, truth)
 
 
@@ -169,7 +169,7 @@ def to_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
     """Return the full frame of a sample of an initial scene; `sample.image` is a scaled part of it."""
     assert sample.frame is not None
     height, width = sample.frame.shape[:2]
-    left, top, right, _ = sample.part
+    left, top, right, _ = sample.region
     scale, corner = (right - left) / IMAGE_SIZE, [left, top, left, top]
     return LabelledImage(
         file=file,
@@ -178,9 +178,9 @@ def to_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
         boxes=_to_boxes(sample.boxes * scale + corner),
         ignored=_to_boxes(sample.ignored * scale + corner),
         truth=_collect_truth(sample, camera, (0, 0, width, height)),
-        region=sample.part,
+        region=sample.region,
         depth=sample.depth,
-        second_image=sample.second,
+        second_image=sample.second_frame,
     )
 
 

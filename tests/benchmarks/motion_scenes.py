@@ -14,7 +14,7 @@ from executive.cell.layout import build_bin
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.models import load_mesh, object_class_with_mass
-from executive.cells.sim.spawn import spawn
+from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.suction import compute_breakaway_force, measure_contact
 from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.cells.sim.world import World
@@ -108,7 +108,7 @@ class SceneGenerator:
         for _ in range(MAX_TRIES):
             for body in tuple(self._world.bodies):
                 self._world.remove_object(body)
-            bodies = spawn(self._world, self._cell, int(self._random.integers(2**31)))
+            bodies = spawn_objects(self._world, self._cell, int(self._random.integers(2**31)))
             if not bodies:
                 continue
             try:

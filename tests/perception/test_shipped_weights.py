@@ -40,10 +40,10 @@ def test_fresh_scenes_of_a_shipped_cell_are_read_almost_without_error(
     renderer = SceneRenderer(config, next(iter(config.cameras)), randomized=randomized)
     samples = []
     for seed in scenes:
-        drawn = renderer.sample(seed)
+        drawn = renderer.render_sample(seed)
         boxes, ignored = (tuple(map(tuple, found.tolist())) for found in (drawn.boxes, drawn.ignored))
         truth = {
-            "part": drawn.part, "matrix": drawn.matrix.tolist(), "X_WC": drawn.X_WC.to_rounded_list(9),
+            "part": drawn.region, "matrix": drawn.matrix.tolist(), "X_WC": drawn.X_WC.to_rounded_list(9),
             "positions": drawn.positions.tolist(),
         }  # fmt: skip
         samples.append(LabelledImage(str(seed), drawn.image, drawn.labels, boxes, ignored, truth))

@@ -169,10 +169,7 @@ class FakeArm:
             held.position = self._tool.position - np.array([0.0, 0.0, height / 2])
 
     def _find_load_collision(self, pose: Pose) -> Collision | None:
-        """Return the collision of the held object in a motion to `pose`, or None.
-
-        The plan may lack this object, so `_plan_motion` may not have found the collision.
-        """
+        """Return the collision of the held object in a motion to `pose`, or None; plans may lack it."""
         held = self._world.held
         if held is None:
             return None
@@ -274,9 +271,7 @@ class FakeTool:
 def compute_named_poses(config: CellConfig) -> dict[str, Pose]:
     """Return the tool pose of each named pose of a cell file."""
     kinematics = build_kinematics(config)
-    return {
-        name: kinematics.compute_tool_pose(np.radians(pose)) for name, pose in config.arm.poses_deg.items()
-    }
+    return {name: kinematics.compute_tool_pose(np.radians(q)) for name, q in config.arm.poses_deg.items()}
 
 
 def check_reachable(position: Array) -> None:

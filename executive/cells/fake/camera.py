@@ -134,9 +134,8 @@ class FakeDetector:
                 continue
             column, row = x / depth, y / depth
             if left <= column < right and top <= row < bottom:
-                true_detections.append(
-                    self._make_detection(fake_object.label, column, row, frame.matrix[0, 0] / depth)
-                )
+                scale = frame.matrix[0, 0] / depth
+                true_detections.append(self._make_detection(fake_object.label, column, row, scale))
         return FakeRequest(
             self.clock.now + self.config.latency,
             self.clock,

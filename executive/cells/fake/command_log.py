@@ -24,13 +24,7 @@ class FakeLog(LogFile):
         self._length = 0
 
     def write_state(self, steps: int, last_command: int, world: FakeWorld, arm: FakeArm) -> None:
-        """Replace the content of the file by the current state; do nothing if the file is closed.
-
-        Args:
-            steps: Number of control steps of the run.
-            last_command: Control step of the last command to arm or tool.
-            world: The world.
-            arm: The arm.
+        """Replace the content of the file by the state after `steps` control steps; ignored if closed.
 
         Raises:
             Fault: The disk does not accept the state.

@@ -210,13 +210,7 @@ class SimArm:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
     def _check_distance(self, q: Array, tolerance: float, text: str) -> None:
-        """Store a fault, to be raised later, if the position of a joint differs too much from `q`.
-
-        Args:
-            q: Required joint positions `(n,)` [rad].
-            tolerance: Maximum difference [rad].
-            text: Start of the message of the fault.
-        """
+        """Store a fault to be raised if a joint position differs from `q` by more than `tolerance` [rad]."""
         errors = np.abs(self.q - q)
         joint = int(np.argmax(errors))
         if errors[joint] > tolerance:

@@ -51,20 +51,11 @@ class ArmOcclusion:
         self._corners = np.array([(x, y, z) for x in config.table.x for y in config.table.y for z in heights])
 
     def compute_visibility_mask(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return a mask `(H, W)` of the pixels that are certainly not occluded.
-
-        Args:
-            matrix: Camera matrix `(3, 3)` [pixel].
-            X_WC: Pose of the camera.
-            size: Width and height of the image [pixel].
-        """
+        """Return a mask `(H, W)` of the pixels that are not occluded; `size` is width and height."""
         q = self._arm.q
         flange, X_WT = self._kinematics.compute_flange_pose(q).position, self._kinematics.compute_tool_pose(q)
-        joints = [
-            np.zeros(3),
-            *(frame.position for frame in self._kinematics.compute_joint_frames(q)),
-            flange,
-        ]
+        frames = self._kinematics.compute_joint_frames(q)
+        joints = [np.zeros(3), *(frame.position for frame in frames), flange]
         parts: list[ArmPart] = [(joints, self._link_radius), ([flange, X_WT.position], TOOL_SPHERE_RADIUS)]
         if self._is_loaded():
             load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
@@ -72,9 +63,6 @@ class ArmOcclusion:
         return ~compute_occlusion_mask(parts, matrix, X_WC, size)
 
     def is_table_visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
-        """Return True if the whole workspace, up to the height of a pile, is in the image and not occluded.
-
-        The arguments are those of `compute_visibility_mask`.
-        """
+        """Return True if the workspace, up to the height of a pile, is in the image and not occluded."""
         table = compute_hull_mask(self._corners, matrix, X_WC, size)
         return table is not None and bool(np.all(self.compute_visibility_mask(matrix, X_WC, size)[table]))

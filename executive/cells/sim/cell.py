@@ -69,16 +69,13 @@ class SimCell(CellWithoutHardware):
         clock, bins = self.cell.clock, self.cell.bins.values()
         seeds = PartSeeds.of(seed)
         scene = load_scene(options.scene, config)
-        self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
-        bodies = self._world.bodies
-        self._initial_positions = {body: self._world.get_object_pose(body).position for body in bodies}
+        world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
+        self._initial_positions = {body: world.get_object_pose(body).position for body in world.bodies}
         self._clearance_checker = ClearanceChecker(config)
         planner = build_planner(config, self._clearance_checker.check)
-        self._tool = SuctionTool(self._world, config.tool)
+        self._tool = SuctionTool(world, config.tool)
         interrupted = None if options.resume is None else self._rebuild_world(options.resume.log)
-        self._arm = SimArm(
-            self._world, planner, config, clock, lambda: self._tool.held_body, emit, interrupted
-        )
+        self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, interrupted)
         name, camera_config = next(iter(config.cameras.items()))
         self._camera = camera(
             self._world,

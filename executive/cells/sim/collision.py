@@ -96,11 +96,7 @@ class ClearanceChecker:
         return closest
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
-        """Return the closest approach of the arm without a load that violates the margin, or None.
-
-        Args:
-            q: Joint positions `(n,)` [rad].
-        """
+        """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], None without a violation."""
         closest = min(self._find_approaches(q, None), key=lambda approach: approach.distance, default=None)
         return closest if closest and closest.distance < closest.min_distance - ROUNDING_ERROR else None
 

@@ -13,7 +13,7 @@ from executive.geometry import Array, make_tool_down_pose
 from executive.motion.arms import build_kinematics
 from executive.motion.limits import JointLimits, compute_min_time
 
-REDUNDANCY_ANGLE_STEP = np.radians(20.0)
+ANGLE_STEP = np.radians(20.0)
 """Difference between neighbouring samples of the redundancy angle [rad]."""
 SAFETY_FACTOR = 0.8
 """Factor on the computed transport time, because other joint configurations and heights may be faster."""
@@ -52,10 +52,7 @@ class SimMinTimes(CellMinTimes):
         return self._transport_times[bin]
 
     def _compute_min_time(self, positions: Array, slots: Array) -> float:
-        """Return the minimum time [s] from a position to its slot, both in the same row of `(N, 2)` [m].
-
-        The row is that with the smallest distance.
-        """
+        """Return the minimum time [s] from `positions` to `slots`, both `(N, 2)` [m], for the nearest row."""
         nearest = np.argmin(np.linalg.norm(positions - slots, axis=1))
         starts, ends = (self._solve_configurations(points[nearest]) for points in (positions, slots))
         return float(compute_min_time(ends - starts[:, None], self._limits).min())
@@ -69,8 +66,7 @@ class SimMinTimes(CellMinTimes):
             Unreachable: No joint configuration is within the limits.
         """
         pose = make_tool_down_pose(np.array([*position, self._pile_height]))
-        start = np.zeros(self._limits.joint_count)
-        qs = self._kinematics.solve_all(pose, start, REDUNDANCY_ANGLE_STEP).qs
+        qs = self._kinematics.solve_all(pose, np.zeros(self._limits.joint_count), ANGLE_STEP).qs
         qs[:, -1] = 0.0
         allowed = qs[self._limits.position.contains(qs)]
         if not len(allowed):

@@ -66,9 +66,7 @@ def find_mesh(urdf: Path, mesh: ElementTree.Element) -> Path:
     """
     path = find_model(str(urdf.parent / _check_name(urdf, mesh.get("filename", ""))))
     if _count_triangles(path) > MAX_TRIANGLE_COUNT:
-        raise InputError(
-            f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles; simplify the mesh"
-        )
+        raise _make_count_error(path)
     return path
 
 
@@ -98,6 +96,12 @@ def _count_triangles(path: Path) -> int:
     return sum(len(words) - 3 for words in lines if words[:1] == [b"f"])
 
 
+def _make_count_error(path: Path) -> InputError:
+    return InputError(
+        f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles; simplify the mesh"
+    )
+
+
 def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
     """Return vertices `(N, 3)` and triangles `(M, 3)` of a Wavefront file; polygons are split into triangles.
 
@@ -116,9 +120,7 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
                 indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
                 triangles += [(indices[0], a, b) for a, b in pairwise(indices[1:])]
         if len(triangles) > MAX_TRIANGLE_COUNT:
-            raise InputError(
-                f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles; simplify the mesh"
-            )
+            raise _make_count_error(path)
         faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
         return _check_mesh(np.array(vertices, dtype=float), faces)
     except (OSError, ValueError, IndexError, OverflowError) as error:

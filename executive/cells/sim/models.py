@@ -50,10 +50,7 @@ class Mesh:
 
     @property
     def radius(self) -> float:
-        """Radius [m] of the circle that contains all vertices in the view from above.
-
-        The centre of the circle is the centre of the bounding box.
-        """
+        """Radius [m] of the vertical cylinder around the mesh, about the centre of the bounding box."""
         points = self.vertices[:, :2]
         return float(np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max())
 
@@ -98,10 +95,7 @@ def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
 
 
 def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
-    """Add a mesh of uniform density and return the body.
-
-    The collision shape of each group of the mesh is its convex hull, enlarged by 1 mm.
-    """
+    """Add a mesh of uniform density and return its body; groups collide as convex hulls, enlarged by 1 mm."""
     shape = {"fileName": str(find_model(config.mesh)), "meshScale": [config.scale] * 3}
     centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
     return int(

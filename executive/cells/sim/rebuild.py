@@ -88,7 +88,7 @@ class WorldRebuilder:
             world.command_arm(self._command, self._time)
         elif kind == log.MOTION:
             duration, guarded_start_time, _ = numbers
-            self._motion = make_sampled_trajectory(to_joint_states(command), duration, guarded_start_time)
+            self._motion = to_trajectory(to_joint_states(command), duration, guarded_start_time)
             self._time = 0.0
         elif kind == log.MOTION_END:
             self._motion = None
@@ -138,8 +138,6 @@ class SampledPiece:
         return q, q.derivative(), q.derivative(2)
 
 
-def make_sampled_trajectory(
-    states: JointState, duration: float, guarded_start_time: float = math.inf
-) -> Trajectory:
+def to_trajectory(states: JointState, duration: float, guarded_start_time: float = math.inf) -> Trajectory:
     """Return the trajectory through `states`, which are the `samples` of the original trajectory."""
     return Trajectory([SampledPiece(states, duration)], guarded_start_time)

@@ -1,4 +1,4 @@
-"""Schema of scene files: changes to the simulated world that the cell file does not declare."""
+"""Schema of scene files, each of which changes the simulated world of a cell file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field
 
 from executive.cell.config import CameraConfig, CellConfig, Colour, NoiseConfig, Section
 from executive.cell.config.section import Fraction, Natural, check_ascending
-from executive.cells.sim.arrangements import DAMAGED_MODEL, UNKNOWN_COUNT
+from executive.cells.sim.arrangements import DAMAGED_MODEL, UNKNOWN_MODEL_COUNT
 from executive.cells.sim.camera import Light
 from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
 from executive.errors import InputError
@@ -20,10 +20,10 @@ from executive.mission.text.files import read_source
 from executive.mission.text.yaml_text import YamlNode, parse_yaml
 from executive.perception.camera_model import compute_calibration, compute_field_of_view
 
-ANY = "any"
-"""Key of `objects` for every class without a section."""
+ANY_CLASS = "any"
+"""Key in `objects` of the section for all classes without a section of their own."""
 MAX_FOV_DEG = 178.0
-"""Largest vertical field of view of a camera [degree]."""
+"""Maximum vertical field of view of a camera [degree]."""
 
 
 def check_texture(name: str) -> str:
@@ -33,13 +33,13 @@ def check_texture(name: str) -> str:
         ValueError: There is no such texture.
     """
     if name not in TEXTURES:
-        known = f'"{WOOD}", "{PLAIN}", or "pattern 0" to "pattern {PATTERN_COUNT - 1}"'
-        raise ValueError(f'must be {known}, not "{name}"')
+        choices = f'"{WOOD}", "{PLAIN}", or "pattern 0" to "pattern {PATTERN_COUNT - 1}"'
+        raise ValueError(f'must be {choices}, not "{name}"')
     return name
 
 
-def check_models(numbers: tuple[int, int]) -> tuple[int, int]:
-    """Return a range of model numbers unchanged.
+def check_model_range(numbers: tuple[int, int]) -> tuple[int, int]:
+    """Return first and last number of a range of models unchanged.
 
     Raises:
         ValueError: The range contains only the damaged model.
@@ -60,11 +60,13 @@ def check_palette(colours: tuple[Colour, ...]) -> tuple[Colour, ...]:
     return colours
 
 
-Shift = Annotated[float, Field(ge=-1, le=1)]
+Displacement = Annotated[float, Field(ge=-1, le=1)]
 AngleDeg = Annotated[float, Field(ge=-90, le=90)]
-Counts = Annotated[tuple[Natural, Natural], AfterValidator(check_ascending)]
-ModelId = Annotated[int, Field(ge=0, lt=UNKNOWN_COUNT)]
-Models = Annotated[tuple[ModelId, ModelId], AfterValidator(check_ascending), AfterValidator(check_models)]
+CountRange = Annotated[tuple[Natural, Natural], AfterValidator(check_ascending)]
+ModelNumber = Annotated[int, Field(ge=0, lt=UNKNOWN_MODEL_COUNT)]
+ModelRange = Annotated[
+    tuple[ModelNumber, ModelNumber], AfterValidator(check_ascending), AfterValidator(check_model_range)
+]
 Palette = Annotated[tuple[Colour, ...], AfterValidator(check_palette)]
 
 
@@ -79,17 +81,17 @@ class SceneTableConfig(Section):
     """The surface of the table and the arrangement of the objects."""
 
     colour: Colour = (1.0, 1.0, 1.0)
-    """Factor on the brightness of the texture: r, g, b, each 0 to 1."""
+    """Factors on the texture: r, g, b, each 0 to 1."""
     texture: Annotated[str, AfterValidator(check_texture)] = WOOD
     """`wood`, `plain` (white), or a generated texture, `pattern 0` to `pattern 23`."""
-    objects: Counts | None = None
-    """Smallest and largest number of objects of the cell's classes; by default as in the cell file."""
+    objects: CountRange | None = None
+    """Minimum and maximum number of objects of the cell's classes; by default as in the cell file."""
     gap: float | None = Field(None, ge=0, le=0.5)
-    """Smallest distance between the outlines of two objects [m]; 0: outlines may touch. By default
+    """Minimum distance between the outlines of two objects [m]; 0: outlines may touch. By default
     as in the cell file."""
     stacked: Fraction | None = None
-    """Share of the objects that are put on top of another one, 0 to 1; unstable stacks are undone. By
-    default as in the cell file."""
+    """Fraction of the objects that are put on top of another object, 0 to 1; unstable stacks are undone.
+    By default as in the cell file."""
 
 
 class SceneObjectConfig(Section):
@@ -105,11 +107,11 @@ class SceneObjectConfig(Section):
 class UnknownConfig(Section):
     """Objects without a class, in addition to the other objects; they are never stacked."""
 
-    count: Counts
-    """Smallest and largest number of these objects."""
-    models: Models = (800, 999)
-    """First and last number of the random shapes in pybullet_data, 0 to 999; the shipped detector was
-    trained with 0 to 799."""
+    count: CountRange
+    """Minimum and maximum number of these objects."""
+    models: ModelRange = (800, 999)
+    """First and last number of the shapes in `random_urdfs` of pybullet_data, 0 to 999; the shipped detector
+    was trained with 0 to 799."""
     scale: float = Field(0.6, ge=0.1, le=2)
     """Factor on the size of the shapes; most shapes are 0.12 m long at 1."""
     colours: Palette = ((1.0, 1.0, 1.0),)
@@ -117,9 +119,9 @@ class UnknownConfig(Section):
 
 
 class SceneCameraConfig(Section):
-    """Errors of the camera; its frames carry the matrix and the pose that the cell file declares."""
+    """Errors of the camera; its frames contain the matrix and the pose that the cell file declares."""
 
-    shift: tuple[Shift, Shift, Shift] = (0.0, 0.0, 0.0)
+    shift: tuple[Displacement, Displacement, Displacement] = (0.0, 0.0, 0.0)
     """Displacement x, y, z [m], each -1 to 1: in the world, or for a wrist camera in the flange frame."""
     turn_deg: tuple[AngleDeg, AngleDeg, AngleDeg] = (0.0, 0.0, 0.0)
     """Rotation vector about the optical centre [degree], each -90 to 90; axes of the camera: x to the
@@ -141,28 +143,28 @@ class SceneConfig(Section):
     light: LightConfig = LightConfig()
     """The lamp and the ambient light."""
     table: SceneTableConfig = SceneTableConfig()
-    """The table, and the number and places of the objects."""
+    """The table, and the number and positions of the objects."""
     objects: dict[str, SceneObjectConfig] = Field(default_factory=dict)
     """Colours and sizes by class; `any`: every class without a section."""
     unknown: UnknownConfig | None = None
-    """Objects of no class; none by default."""
+    """Objects without a class; none by default."""
     camera: SceneCameraConfig = SceneCameraConfig()
     """Errors of the camera."""
 
 
 DECLARED_SCENE = SceneConfig(scene="as declared")
-"""The scene that changes nothing."""
+"""The scene without changes to the world of the cell file."""
 
 
 def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
     """Return the content of a scene file, checked against the cell whose world it changes.
 
     Args:
-        path: The file; None: `DECLARED_SCENE` is returned.
+        path: The file, or None for `DECLARED_SCENE`.
         config: The cell file.
 
     Raises:
-        MissionError: The file is invalid; the error lists each finding.
+        MissionError: The file is invalid; the error lists all findings.
         InputError: There is no such file, or the cell is not simulated.
     """
     if path is None:
@@ -179,18 +181,18 @@ def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
     validated = validate(root, SceneConfig)
     scene = validated.model
     mismatches = () if scene is None else _find_mismatches(scene, root, config)
-    found = (*findings, *validated.findings, *mismatches)
-    if scene is None or found:
-        raise MissionError(sort_findings(found, source.path))
+    all_findings = (*findings, *validated.findings, *mismatches)
+    if scene is None or all_findings:
+        raise MissionError(sort_findings(all_findings, source.path))
     return scene
 
 
 def _find_mismatches(scene: SceneConfig, root: YamlNode, config: CellConfig) -> Iterator[Finding]:
-    """Yield a finding for every value that does not fit the cell."""
+    """Yield a finding for every value of a scene that the cell does not allow."""
     for label in scene.objects:
-        if label not in (ANY, *config.objects):
+        if label not in (ANY_CLASS, *config.objects):
             mark = find_mark(root, ("objects", label), of_key=True)
-            hint = list_choices(label, (*config.objects, ANY), "Valid keys")
+            hint = list_choices(label, (*config.objects, ANY_CLASS), "Valid keys")
             yield make_error(mark, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
     name, camera = next(iter(config.cameras.items()))
     if any(scene.camera.orbit_deg) and camera.mount != "fixed":
@@ -203,11 +205,11 @@ def _find_mismatches(scene: SceneConfig, root: YamlNode, config: CellConfig) -> 
 
 
 def _check_field_of_view(scene: SceneConfig, root: YamlNode, camera: CameraConfig) -> Iterator[Finding]:
-    """Yield a finding if the field of view of the scene exceeds `MAX_FOV_DEG`."""
+    """Yield a finding if the field of view of the camera in the scene exceeds `MAX_FOV_DEG`."""
     declared = compute_field_of_view(compute_calibration(camera)[0], camera.height)
     if declared * scene.camera.fov_factor > MAX_FOV_DEG:
         yield make_error(
             find_mark(root, ("camera", "fov_factor")), "out-of-range",
-            f"camera.fov_factor must be at most {MAX_FOV_DEG / declared:.2f}, for the declared field of "
+            f"camera.fov_factor must be at most {MAX_FOV_DEG / declared:.2f}, because the declared field of "
             f"view is {declared:.1f} degrees, and no lens has more than {MAX_FOV_DEG:g}",
         )  # fmt: skip

@@ -34,13 +34,7 @@ def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
 
 
 def compute_visible_fraction(mesh: Mesh, pixels: Array, visible: NDArray[np.bool_]) -> float:
-    """Return the fraction (0 to 1) of the silhouette of a mesh that is visible.
-
-    Args:
-        mesh: The mesh.
-        pixels: Projected vertices of the mesh `(N, 2)` [pixel].
-        visible: Mask of the pixels that show the object `(H, W)`.
-    """
+    """Return the fraction (0 to 1) of the silhouette of a mesh that the mask `visible` `(H, W)` contains."""
     return min(1.0, float(visible.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))
 
 

@@ -143,10 +143,7 @@ class SuctionTool:
             self._set_collision(contact.body, False)
 
     def _attach(self, body: int) -> int:
-        """Fix a body to the tool at its current pose and return the constraint.
-
-        The frames of a constraint are in the centres of mass.
-        """
+        """Fix a body to the tool at its current pose and return the constraint, between centres of mass."""
         world = self._world
         X_WI = Pose.of(*world.client.getLinkState(world.arm, world.tool, computeForwardKinematics=True)[:2])
         X_IB = X_WI.inverse() @ Pose.of(*world.client.getBasePositionAndOrientation(body))

@@ -69,10 +69,9 @@ def _make_shapes(world: World, names: Mapping[int, str]) -> Iterator[Shape]:
             if not owner:
                 X_BS = X_WB @ X_BS
             # PyBullet returns height and radius of a cylinder, and the radius of a sphere.
-            lengths = tuple(size)
-            if geometry == pybullet.GEOM_CYLINDER:
-                lengths = (2 * size[1], 2 * size[1], size[0])
-            elif geometry == pybullet.GEOM_SPHERE:
+            is_cylinder = geometry == pybullet.GEOM_CYLINDER
+            lengths = (2 * size[1], 2 * size[1], size[0]) if is_cylinder else tuple(size)
+            if geometry == pybullet.GEOM_SPHERE:
                 lengths = (2 * size[0],) * 3
             rgb = TABLE_COLOUR if body == world.table else tuple(colour[:3])
             yield Shape(owner, _SHAPE_KINDS[geometry], lengths, X_BS, rgb, file.decode())

@@ -170,12 +170,7 @@ class World:
         return self.get_flange_pose() @ Pose.of([0, 0, self.config.tool.length])
 
     def cast_ray(self, origin: Array, direction: Array) -> Array | None:
-        """Return the first point `(3,)` [m] of a ray on a body other than arm and tool, or None.
-
-        Args:
-            origin: Start of the ray `(3,)` [m].
-            direction: Direction of the ray `(3,)`, of any length above 0.
-        """
+        """Return the first point `(3,)` [m] of a ray on a body other than arm and tool, or None."""
         end = origin + MAX_RAY_LENGTH * direction / np.linalg.norm(direction)
         start = origin
         while True:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from executive.cells.sim.shots import Shoot, count_steps, take_pictures
+from executive.cells.sim.pictures import PictureSource, count_steps, render_pictures
 from executive.cells.sim.viewpoint import compute_viewpoint
 from executive.view.film.formats import FilmFormat
 from executive.view.film.page import SCENE_SIZE, draw_page, draw_result
@@ -68,8 +68,8 @@ def _draw_frames(
     duration = steps[-1] * start.step
     state = FilmRunState(source.events, source.nodes, list(directory.pictures.glob("*.jpg")))
     view = compute_viewpoint(source.config, SCENE_SIZE, CELL_BOX)
-    shoot = Shoot(source.config, start.seed, directory.world_log, view, directory.scene)
-    with closing(take_pictures(shoot, steps, workers)) as pictures:
+    picture_source = PictureSource(source.config, start.seed, directory.world_log, view, directory.scene)
+    with closing(render_pictures(picture_source, steps, workers)) as pictures:
         for step, picture in zip(steps, pictures, strict=True):
             state.advance_to(step, step * start.step)
             yield draw_page(source, picture, state, subtitle, duration)

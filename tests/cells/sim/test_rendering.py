@@ -14,11 +14,11 @@ from executive.cell.config import CellConfig, DepthConfig, ObjectConfig
 from executive.cells.sim.arrangements import (
     UNKNOWN,
     SceneObject,
-    arrange,
-    draw_items,
-    make_held_object,
-    resize,
-    settle,
+    draw_arrangement,
+    draw_held_object,
+    draw_objects,
+    drop_objects,
+    scale_model,
 )
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
@@ -32,7 +32,7 @@ from executive.training.rendering import generate_dataset, render_run_frames, to
 def samples(config: CellConfig, seeds: range, *, randomized: bool = True) -> list[Sample]:
     renderer = SceneRenderer(config, next(iter(config.cameras)), randomized=randomized)
     try:
-        return [renderer.sample(seed) for seed in seeds]
+        return [renderer.render_sample(seed) for seed in seeds]
     finally:
         renderer.close()
 
@@ -76,16 +76,16 @@ def test_samples_are_labelled_inside_the_image_and_localize_near_the_object(over
 def test_an_arrangement_follows_from_its_generator(overhead: CellConfig) -> None:
     footprint, table, items = np.array([[0.3, -0.4], [0.8, 0.4]]), (0.9, 0.8, 0.7), []
     for seed in range(30):
-        items += arrange(overhead, footprint, seed % 2 == 0, table, np.random.default_rng(seed))
+        items += draw_arrangement(overhead, footprint, seed % 2 == 0, table, np.random.default_rng(seed))
     total = sum(item.X_WO.position for item in items)
     # Piles settle a little differently on another kind of processor.
     assert (len(items), total) == (231, pytest.approx([115.338, 0.73359, 4.55237], abs=1e-3))
-    item = make_held_object(Pose.of([0.5, 0.1, 0.3]), overhead, np.random.default_rng(1))
+    item = draw_held_object(Pose.of([0.5, 0.1, 0.3]), overhead, np.random.default_rng(1))
     assert item.X_WO.position == pytest.approx([0.5, 0.1, 0.3 - load_mesh(item.model).top])
 
 
 def test_some_scenes_have_objects_of_unknown_kinds_or_other_sizes(overhead: CellConfig) -> None:
-    scenes = [draw_items(overhead, 20, (0.9, 0.8, 0.7), np.random.default_rng(seed)) for seed in range(20)]
+    scenes = [draw_objects(overhead, 20, (0.9, 0.8, 0.7), np.random.default_rng(seed)) for seed in range(20)]
     unknown = [sum(item.label == UNKNOWN for item in scene) for scene in scenes]
     resized_ones = [
         sum(item.label != UNKNOWN and item.model != overhead.objects[item.label] for item in scene)
@@ -96,7 +96,7 @@ def test_some_scenes_have_objects_of_unknown_kinds_or_other_sizes(overhead: Cell
 
 
 def test_a_resized_model_has_the_size_that_it_states(overhead: CellConfig) -> None:
-    model = resize(overhead.objects["duck"], 1.2)
+    model = scale_model(overhead.objects["duck"], 1.2)
     mesh = load_mesh(model)
     assert (mesh.top - mesh.bottom, mesh.radius) == pytest.approx(
         (model.height, model.radius), abs=0.003 * 1.2
@@ -121,7 +121,7 @@ def test_what_is_dropped_comes_to_lie_on_the_table_or_in_a_bin(overhead: CellCon
     tilted = Pose.of([0.5, 0.0, 0.06], [0.3, 0.1, 0.2, 0.9])
     starts = [("cube", tilted), ("duck", Pose.of([0.6, 0.1, 0.01])), ("cube", Pose.of([0.52, 0.46, 0.1]))]
     items = [SceneObject(label, overhead.objects[label], X_WO, (1.0, 1.0, 1.0)) for label, X_WO in starts]
-    cube, duck, above = (item.X_WO for item in settle(overhead, items))
+    cube, duck, above = (item.X_WO for item in drop_objects(overhead, items))
     assert cube.position[2] == pytest.approx(0.025, abs=1e-3)
     assert duck.rotation[2, 2] == pytest.approx(1.0, abs=1e-2)
     assert above.position[2] == pytest.approx(0.03, abs=1e-3), "the bin's floor is 5 mm thick"
@@ -196,7 +196,7 @@ def test_a_frame_is_the_cameras_whole_image_labelled_where_a_run_searches_it(ove
     frame = to_labelled_frame(drawn, "overhead", "a")
     left, top, right, bottom = frame.region or ()
     assert frame.image.shape == (480, 640, 3)
-    twice = to_labelled_frame(replace(drawn, part=(10, 20, 522, 532)), "overhead", "a")
+    twice = to_labelled_frame(replace(drawn, region=(10, 20, 522, 532)), "overhead", "a")
     assert twice.boxes == pytest.approx(drawn.boxes * 2 + [10, 20, 10, 20])
     assert frame.depth is not None
     assert (left, top, right, bottom) == camera.table_view

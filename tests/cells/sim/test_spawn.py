@@ -15,7 +15,7 @@ from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.spawn import PartSeeds, build_initial_world, spawn
+from executive.cells.sim.spawn import PartSeeds, build_initial_world, spawn_objects
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.events import discard_event
@@ -54,11 +54,11 @@ def placed(world: World) -> list[tuple[str, float, float, float]]:
 
 def test_a_seed_decides_everything(build: Build, overhead: CellConfig) -> None:
     plain, stacked = build(overhead), build(with_stacks(overhead, 1.0))
-    assert spawn(plain, overhead, 1) == tuple(plain.bodies)
+    assert spawn_objects(plain, overhead, 1) == tuple(plain.bodies)
     for body, label in plain.bodies.items():
         colour = plain.client.getVisualShapeData(body)[0][7][:3]
         assert tuple(round(value, 3) for value in colour) in overhead.objects[label].colours
-    spawn(stacked, stacked.config, 2, count=4)
+    spawn_objects(stacked, stacked.config, 2, count=4)
     assert placed(plain) == [
         ("sphere", 0.6287, -0.0828, 0.03), ("duck", 0.5131, 0.1442, -0.0023), ("duck", 0.51, 0.0218, -0.0023),
         ("cube", 0.4261, 0.1115, 0.025),
@@ -75,7 +75,7 @@ def test_objects_stand_still_apart_and_inside_the_workspace(
 ) -> None:
     config = with_stacks(overhead, share)
     world, table = build(config), overhead.table
-    bodies = spawn(world, config, 0, count=6 if share else None)
+    bodies = spawn_objects(world, config, 0, count=6 if share else None)
     assert table.objects[0] <= len(bodies) <= table.objects[1]
     poses, pairs = {body: world.get_object_pose(body) for body in bodies}, carried(world)
     assert bool(pairs) is bool(share)
@@ -97,7 +97,7 @@ def test_objects_stand_still_apart_and_inside_the_workspace(
 
 def test_too_many_objects_are_refused_with_what_to_change(build: Build, overhead: CellConfig) -> None:
     with pytest.raises(InputError, match=r"100 objects found no room .* ask for fewer or widen table\.x"):
-        spawn(build(overhead), overhead, seed=1, count=100)
+        spawn_objects(build(overhead), overhead, seed=1, count=100)
 
 
 def test_a_load_travels_over_stacks_and_starts_from_their_tops(overhead: CellConfig) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.spawn import spawn
+from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.visuals import SimVisuals
 from executive.cells.sim.world import World
 
@@ -16,7 +16,7 @@ from executive.cells.sim.world import World
 @pytest.fixture
 def world(overhead: CellConfig):
     world = World(overhead)
-    spawn(world, overhead, 3)
+    spawn_objects(world, overhead, 3)
     yield world
     world.close()
 

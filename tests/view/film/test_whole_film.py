@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from executive.cells.sim.command_log import RUN_STEP, read_commands
+from executive.cells.sim.pictures import count_steps
 from executive.cells.sim.rebuild import WorldRebuilder
-from executive.cells.sim.shots import count_steps
 from executive.cells.sim.spawn import build_initial_world
 from executive.cells.sim.tool import SuctionTool
 from executive.errors import InputError

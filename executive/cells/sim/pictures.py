@@ -1,0 +1,125 @@
+"""Pictures of the world of a recorded run, rendered in several processes that rebuild the world."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from executive.cell.config import CellConfig
+from executive.cells.sim.camera import Image, Light, Render, render
+from executive.cells.sim.command_log import RUN_STEP, read_commands
+from executive.cells.sim.rebuild import WorldRebuilder
+from executive.cells.sim.scene_file import load_scene
+from executive.cells.sim.spawn import build_initial_world
+from executive.cells.sim.tool import SuctionTool
+from executive.cells.sim.viewpoint import Viewpoint
+from executive.processes import WorkerPool
+
+FILM_LIGHT = Light(direction=(0.5, -0.6, 1.2), ambient=0.6, diffuse=0.4, shadow=True)
+"""Light with contrast between objects: from the right, with shadows."""
+TOP_COLOUR, BOTTOM_COLOUR = (226, 231, 237), (172, 182, 194)
+"""Colours of the background at the top and at the bottom of a picture, RGB, each 0 to 255."""
+MIN_EDGE_CONTRAST = 24
+"""Minimum difference in brightness of neighbouring pixels at an edge, 0 to 255."""
+PICTURES_PER_BLOCK = 24
+"""Maximum number of pictures of a block; each block rebuilds its own world from the start of the run."""
+PICTURES_IN_FIRST_BLOCK = 2
+"""Maximum number of pictures of the first block, which is small to get the first picture early."""
+
+
+@dataclass(frozen=True, eq=False)
+class PictureSource:
+    """Run and viewpoint of pictures.
+
+    Attributes:
+        config: The cell file of the run.
+        seed: Seed of the run.
+        log: Command log of the world.
+        viewpoint: Viewpoint of the pictures.
+        scene: Scene file of the run, or None. The light of the scene does not affect the pictures.
+    """
+
+    config: CellConfig
+    seed: int
+    log: Path
+    viewpoint: Viewpoint
+    scene: Path | None = None
+
+
+def count_steps(log: Path) -> int:
+    """Return the number of control steps of a run by the command log of its world.
+
+    Raises:
+        InputError: The file cannot be read, or is no valid log.
+    """
+    return sum(command.kind == RUN_STEP for command in read_commands(log))
+
+
+def render_pictures(
+    source: PictureSource, steps: Sequence[int], worker_count: int
+) -> Generator[Image, None, None]:
+    """Yield pictures `(H, W, 3)` uint8 RGB of the world after the given control steps of the run, in order.
+
+    Args:
+        source: Run and viewpoint.
+        steps: Numbers of control steps, ascending.
+        worker_count: Number of processes.
+    """
+    bounds = [0, *range(PICTURES_IN_FIRST_BLOCK, len(steps), PICTURES_PER_BLOCK), len(steps)]
+    blocks = [steps[first:end] for first, end in pairwise(bounds)]
+    with WorkerPool(worker_count) as pool:
+        pending: deque[Future[list[Image]]] = deque()
+        # The number of pending blocks is limited, because completed pictures occupy memory.
+        for block in blocks:
+            pending.append(pool.submit(_render_block, source, block))
+            if len(pending) > worker_count:
+                yield from pending.popleft().result()
+        while pending:
+            yield from pending.popleft().result()
+
+
+def _render_block(source: PictureSource, steps: Sequence[int]) -> list[Image]:
+    """Return the pictures after the given steps; this function runs in a process of its own."""
+    return list(render_pictures_in_process(source, steps))
+
+
+def render_pictures_in_process(source: PictureSource, steps: Sequence[int]) -> Iterator[Image]:
+    """Yield the pictures of `render_pictures`, rendered in one world in this process."""
+    scene = load_scene(source.scene, source.config)
+    world, viewpoint = build_initial_world(source.config, source.seed, scene=scene), source.viewpoint
+    try:
+        # The floor is made transparent, so that its pattern is not rendered.
+        world.client.changeVisualShape(world.floor, -1, rgbaColor=[1, 1, 1, 0])
+        rebuilder = WorldRebuilder(world, SuctionTool(world, source.config.tool))
+        commands = read_commands(source.log)
+        completed = 0
+        for step in steps:
+            while completed < step:
+                command = next(commands)
+                rebuilder.execute(command)
+                completed += command.kind == RUN_STEP
+            yield _compose_picture(
+                render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, *viewpoint.size), FILM_LIGHT)
+            )
+    finally:
+        world.close()
+
+
+def _compose_picture(rendered: Render) -> Image:
+    """Return a rendered image with a background and blurred edges, because PyBullet has no antialiasing."""
+    height = len(rendered.image)
+    fraction = np.linspace(0, 1, height)[:, None, None]
+    background = (1 - fraction) * np.array(TOP_COLOUR) + fraction * np.array(BOTTOM_COLOUR)
+    is_empty = rendered.bodies == -1
+    image = np.where(is_empty[..., None], np.rint(background).astype(np.uint8), rendered.image)
+    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+    kernel = np.ones((3, 3), np.uint8)
+    is_edge = cv2.dilate(grey, kernel).astype(np.int16) - cv2.erode(grey, kernel) > MIN_EDGE_CONTRAST
+    return np.asarray(np.where(is_edge[..., None], cv2.GaussianBlur(image, (3, 3), 0), image))
