@@ -12,7 +12,7 @@ from executive.mission.outline import OutlineNode
 from executive.view.film import style
 from executive.view.film.run_state import FilmRunState
 from executive.view.film.style import FAILURE, INACTIVE, LINE, MINOR_TEXT, RUNNING, SUCCESS, TEXT
-from executive.view.tree.outline import draw_line_prefixes, select_running
+from executive.view.tree.outline import draw_line_prefixes, select_active_nodes
 
 TEXT_SIZE, HEADING_SIZE, MARK_SIZE = 14, 12, 11
 """Font sizes of text and of column headings, and side of a status mark [pixel]."""
@@ -66,7 +66,7 @@ def select_nodes(nodes: Sequence[OutlineNode], state: FilmRunState, max_count: i
     Nodes that never ran are omitted first, then inactive nodes; of these, the last nodes of the tree first.
     """
     active_paths = state.active_paths
-    shown = select_running(nodes, active_paths)
+    shown = select_active_nodes(nodes, active_paths)
 
     def rank(index: int) -> tuple[bool, bool, int]:
         path = shown[index].path

@@ -36,6 +36,7 @@ from executive.view.live.messages import (
 from executive.view.tree.svg import NodeNote, draw_svg
 
 LOOPBACK = "127.0.0.1"
+"""Network address at which the page is served."""
 POSE_PERIOD = 1 / 10
 """Period at which poses are sent while a browser shows the page [s]."""
 CPU_RENDERING_POSE_PERIOD = 2.5

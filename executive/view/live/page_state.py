@@ -14,7 +14,7 @@ from executive.cell.frame import Frame
 from executive.record.timeline.timeline import Timeline
 from executive.view.live.messages import CameraImage, Message, PageChange
 
-QUALITY = 80
+JPEG_QUALITY = 80
 """JPEG quality of the camera image, 0 to 100."""
 OCCLUSION_DARKENING = 0.45
 """Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
@@ -96,7 +96,7 @@ def _encode_look(frame: Frame, look: events.FrameSearched) -> Json:
     if frame.visible is not None:
         occluded = ~frame.visible
         image[occluded] = (image[occluded] * (1 - OCCLUSION_DARKENING)).astype(np.uint8)
-    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     height, width = frame.image.shape[:2]
     return {
         "source": "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode(),

@@ -48,7 +48,7 @@ class LineView:
         """Do nothing: every line is already flushed."""
 
     def show_message(self, message: str) -> None:
-        """Write a note about the record of the run on a separate line."""
+        """Write a message about the record of the run on a separate line."""
         self._stream.write(f"note: {message}\n")
 
     def _describe(self, event: events.Event) -> str:

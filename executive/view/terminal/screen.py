@@ -17,7 +17,7 @@ from executive.record.timeline.timeline import Timeline
 from executive.run.run import Run
 from executive.run.run_control import RunControl
 from executive.view.terminal.keys import HELP, HELP_PAUSED, KeyReader
-from executive.view.tree.outline import draw_line_prefixes, select_running
+from executive.view.tree.outline import draw_line_prefixes, select_active_nodes
 
 REDRAWS_PER_SECOND = 10
 """Frequency at which the view is drawn [1/s]."""
@@ -76,7 +76,7 @@ class TerminalView:
         self._set_visible(False)
 
     def show_message(self, message: str) -> None:
-        """Write a note about the record of the run on a separate line."""
+        """Write a message about the record of the run on a separate line."""
         text = escape_control_characters(message)
         self._console.print(Text(f"note: {text}", style="yellow"))
 
@@ -103,7 +103,7 @@ class TerminalView:
 
     def _render_tree(self) -> RenderableType:
         """Return a drawing of the running nodes and their children; a whole tree does not fit."""
-        shown = select_running(self._nodes, {running.node for running in self.timeline.find_running()})
+        shown = select_active_nodes(self._nodes, {running.node for running in self.timeline.find_running()})
         lines = Text()
         for node, prefix in zip(shown, draw_line_prefixes(shown), strict=True):
             last = self.timeline.activation_by_path.get(node.path)

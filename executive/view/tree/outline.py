@@ -65,7 +65,7 @@ def draw_line_prefixes(nodes: Sequence[OutlineNode]) -> list[str]:
 
 
 def find_skill_names(nodes: Sequence[OutlineNode]) -> dict[str, str]:
-    """Return the names of the skills by path, each without the key of its parent (`recover: Grasp`)."""
+    """Return the names of skills by path, each without the key before it: `Grasp` for `recover: Grasp`."""
     leaves = (node for node, below in zip(nodes, list_child_indices(nodes), strict=True) if not below)
     return {node.path: node.name.rpartition(": ")[2] for node in leaves}
 
@@ -87,12 +87,12 @@ def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
             index += 1
         else:
             is_equal = first_uses[known] == _list_content(branch)
-            folded.append(_make_use(node, known, "as above" if is_equal else "as above, other params"))
+            folded.append(_make_use_node(node, known, "as above" if is_equal else "as above, other params"))
             index = end
     return folded
 
 
-def select_running(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[OutlineNode]:
+def select_active_nodes(nodes: Sequence[OutlineNode], running: Collection[str]) -> list[OutlineNode]:
     """Return the root and all children of running nodes; `running` contains the paths of running nodes."""
     selected = []
     # True for each ancestor of the current node that is running, by depth.
@@ -137,7 +137,7 @@ def _list_content(branch: Sequence[OutlineNode]) -> list[tuple[int, str, str]]:
     return [(node.depth - branch[0].depth, node.title, node.detail) for node in branch]
 
 
-def _make_use(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
+def _make_use_node(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
     """Return a node with the name of a subtree, which replaces the subtree whose first node is `node`."""
     outer = node.subtrees[: node.subtrees.index(subtree)]
     return OutlineNode(

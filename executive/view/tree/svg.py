@@ -57,12 +57,12 @@ def draw_svg(nodes: Sequence[OutlineNode], name: str, notes: Mapping[str, NodeNo
     sizes = [_compute_size(*parts) for parts in zip(nodes, cards, lines, strict=True)]
     layout = compute_layout([node.depth for node in nodes], child_lists, sizes)
     edges = [_draw_edge(layout, parents.get(index), index, node.depth) for index, node in enumerate(nodes)]
-    ids, indents = map(make_id, (node.path for node in nodes)), map(_compute_indent, cards)
+    ids, indents = map(make_group_id, (node.path for node in nodes)), map(_compute_indent, cards)
     drawings = list(zip(nodes, cards, node_notes, lines, layout.boxes, edges, ids, indents, strict=True))
     return render_template("tree/tree.svg", name=name, layout=layout, nodes=nodes, drawings=drawings)
 
 
-def make_id(path: str) -> str:
+def make_group_id(path: str) -> str:
     """Return the id of the group of a node: its path with `-` for `/` and `--hex-` for other characters."""
     return "node-" + _INVALID_IN_ID.sub(lambda match: f"--{ord(match[0]):x}-", path).replace("/", "-")
 

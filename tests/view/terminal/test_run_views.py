@@ -20,7 +20,7 @@ from executive.run.run_control import RunControl
 from executive.view.terminal.lines import LineView
 from executive.view.terminal.screen import TerminalView
 from executive.view.terminal.summary import format_repeat_command, format_summary
-from executive.view.tree.outline import find_skill_names, select_running
+from executive.view.tree.outline import find_skill_names, select_active_nodes
 
 GRASP = "tree/sort/repeat/Grasp"
 
@@ -53,14 +53,14 @@ def test_skills_are_the_leaves_and_what_rests_is_folded():
     nodes = make_outline(TREE)
     leaves = {"tree/sort/repeat/Detect": "Detect", GRASP: "Grasp", "tree/sort/Release": "Release"}
     assert find_skill_names(nodes) == leaves
-    assert [node.path for node in select_running(nodes, set())] == ["tree/sort"]
-    assert [node.name for node in select_running(nodes, {"tree/sort"})] == [
+    assert [node.path for node in select_active_nodes(nodes, set())] == ["tree/sort"]
+    assert [node.name for node in select_active_nodes(nodes, {"tree/sort"})] == [
         "sort",
         "repeat",
         "Release",
     ]
-    assert select_running(nodes, {"tree/sort", "tree/sort/repeat"}) == nodes
-    assert [node.name for node in select_running(nodes, {"tree/sort/repeat"})] == ["sort"]
+    assert select_active_nodes(nodes, {"tree/sort", "tree/sort/repeat"}) == nodes
+    assert [node.name for node in select_active_nodes(nodes, {"tree/sort/repeat"})] == ["sort"]
 
 
 MISSED = {"item": "cube-1", "reason": "missed", "message": "no seal 0.1 s after contact"}

@@ -13,7 +13,7 @@ from executive.tree.registry import load_control_nodes
 from executive.view.text import replace_invalid_characters
 from executive.view.tree.card import make_card
 from executive.view.tree.dot import draw_dot
-from executive.view.tree.svg import NodeNote, draw_svg, make_id
+from executive.view.tree.svg import NodeNote, draw_svg, make_group_id
 
 NASTY = """<b onload="x">&amp; 'quoted' "twice" \\ ]]> --> größer ≥ 日本 \x00\x1b \ud800"""
 RETRY = "up to 3 attempts, on Grasp.missed, Grasp.blocked"
@@ -93,7 +93,7 @@ def test_every_node_is_a_group_with_its_symbol_title_and_short_lines_and_a_subtr
 
 def test_an_id_says_its_path_and_no_two_are_alike():
     paths = ["a/b", "a-b", "a_b", "a:b", "a.b", "a b", "a/ü", "a/:b", 'a"b']
-    found = [make_id(path) for path in paths]
+    found = [make_group_id(path) for path in paths]
     assert len(set(found)) == len(paths)
     assert all(re.fullmatch(r"node-[A-Za-z0-9_-]+", each) for each in found)
 
