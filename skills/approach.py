@@ -1,4 +1,4 @@
-"""Approach of a target until the tool touches it."""
+"""Skill that moves the tool down to a target until contact."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from executive.perception.evidence import describe_wrong_height, may_miss_top
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY_CONTACT_MARGIN = 0.001
-"""A contact more than this height [m] above the guarded part of the descent is a collision."""
+"""Height above the guarded descent [m] from which a contact counts as a collision."""
 
 
 class Approach(Skill):
     """Touch the target with the cup from above.
 
-    One motion: fast above and towards the target, then a slow guarded descent, because the camera does not
-    measure the height of the surface exactly. Succeeds on contact near the expected height. Each further
-    attempt is offset from the previous one: along a spiral, or along the ring of an object with a hole. From
-    the fourth attempt on, the descent ends only 5 mm above the table, to tell a false detection from an
-    object.
+    The arm makes one motion: fast to a position above the target, then a slow, guarded descent, because the
+    camera does not measure the height of the surface exactly. The skill succeeds on contact near the expected
+    height. Each further attempt is offset from the previous attempt: along a spiral, or along the ring of an
+    object with a hole. From the fourth attempt on, the descent ends only 5 mm above the table, to distinguish
+    a false detection from an object.
 
-    A touch at a wrong height contradicts the target's class. There are two exceptions: an earlier touch
+    A touch at a wrong height contradicts the class of the target. There are two exceptions: an earlier touch
     matched the class; or this touch is the first one that is too low, it matches no other class, and looks
-    alone prove the class. A touch more than `overtravel` too low, or below the middle of the object, is never
-    a touch of the target: it fails with `no_contact` if an earlier touch matched the class, and contradicts
-    the class otherwise.
+    alone prove the class. A touch more than `overtravel` too low, or below the middle of the object, is not a
+    touch of the target: the skill fails with `no_contact` if an earlier touch matched the class, otherwise
+    the touch contradicts the class.
     """
 
     target: In[Target] = port(doc="the target to touch")
@@ -50,7 +50,7 @@ class Approach(Skill):
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the duration of the guarded descent [s]; the arm may already be above the target."""
+        """Return the time of the guarded descent [s]; the arm may already be above the target."""
         del values
         return min_times.descent_time
 
@@ -58,8 +58,8 @@ class Approach(Skill):
         """Move to the target and descend until the cup touches something."""
         item, tool = self.target.item, cell.tool
         if not cell.ledger.is_fresh(self.target):
-            seen = f"{item} was seen at {self.target.stamp:.2f} s"
-            raise self.failure("stale", f"{seen}, and the robot may have moved it since; look again")
+            detected = f"{item} was detected at {self.target.stamp:.2f} s"
+            raise self.failure("stale", f"{detected}, and the robot may have moved it since; look again")
 
         def find_goal() -> tuple[Goal, Task]:
             return make_approach(cell, self.target, self.overtravel, self.offset)
@@ -72,16 +72,16 @@ class Approach(Skill):
         expected = f"expected at {(highest - cell.descent) * 1000:.0f} mm"
         if not tool.touching:
             cell.ledger.record_miss(item, found_table=_proves_absence(goal, self.target, kind))
-            felt = f"no contact down to {height * 1000:.0f} mm"
-            raise self.failure("no_contact", f"{felt}, {item} was {expected}")
+            no_contact = f"no contact down to {height * 1000:.0f} mm"
+            raise self.failure("no_contact", f"{no_contact}, {item} was {expected}")
         if height > highest + EARLY_CONTACT_MARGIN:
             cell.ledger.invalidate_positions()
-            met = f"the tool met something at {height * 1000:.0f} mm"
-            raise self.failure("blocked", f"{met}, on its way to {item}, which was {expected}")
+            collision = f"the tool touched something at {height * 1000:.0f} mm"
+            raise self.failure("blocked", f"{collision} on its way to {item}, which was {expected}")
         contradiction = describe_wrong_height(self.target.label, height, cell.classes)
         is_near_top = height >= compute_lowest_contact(kind, middle, self.overtravel)
-        missed_top = is_near_top and may_miss_top(self.target.label, height, cell.classes)
-        if not cell.ledger.record_touch(item, contradiction, may_miss_top=missed_top):
+        may_have_missed = is_near_top and may_miss_top(self.target.label, height, cell.classes)
+        if not cell.ledger.record_touch(item, contradiction, may_miss_top=may_have_missed):
             raise self.failure("contradicted", f"{item} may be no {self.target.label}: {contradiction}")
         if contradiction and not is_near_top:
             cell.ledger.record_miss(item)
@@ -89,7 +89,7 @@ class Approach(Skill):
 
 
 def _proves_absence(goal: Goal, target: Target, kind: ObjectClass) -> bool:
-    """Return True if a descent to `goal` without a contact proves that no object is at the target's place.
+    """Return True if a descent to `goal` without contact proves that there is no object at the target.
 
     The descent must end near the table, below the middle of the object, and within half of its radius.
     """

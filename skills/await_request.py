@@ -1,4 +1,4 @@
-"""Request of the operator for a class."""
+"""Skill that asks the operator for the next class."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class AwaitRequest(Skill):
     senses: ClassVar = True
 
     def run(self, cell: Cell) -> None:
-        """Ask once."""
+        """Ask the operator once, and wait for the answer."""
         answer = cell.operator.ask(tuple(cell.routes))
         if answer is None:
-            raise self.failure("quit", "the operator asked for nothing more")
+            raise self.failure("quit", "the operator ended the requests")
         if answer == "rescan":
-            raise self.failure("rescan", "the operator asked for a fresh look")
+            raise self.failure("rescan", "the operator requested a new look")
         self.wanted = answer

@@ -1,4 +1,4 @@
-"""Search of a new camera image for objects."""
+"""Skill that captures an image and detects the objects in it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.skill import Out, Skill, param, port
 
 
 class Detect(Skill):
-    """Detect the objects in a new image without blocking the tick loop.
+    """Detect the objects in a new image, without blocking the tick loop.
 
     Succeeds with all detections that are not in doubt. A detection is in doubt if it is below the detector's
     threshold or if its second class is more than half as likely. An empty list is a result, not a failure.
@@ -39,11 +39,11 @@ class Detect(Skill):
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the time until the detector's answer [s]."""
+        """Return the minimum time from the frame to the answer of the detector [s]."""
         return min_times.get_answer_time(values["detector"])
 
     def run(self, cell: Cell) -> Steps:
-        """Take a frame, ask the detector, wait for its answer."""
+        """Capture a frame, request the detector to search it, and wait for the answer."""
         camera = cell.camera
         if self.hidden == "fail" and not camera.sees_table():
             raise self.failure("hidden", f"the arm hides part of the workspace from camera {camera.name}")

@@ -1,4 +1,4 @@
-"""Grasp of the object that the tool touches."""
+"""Skill that grasps the object that the tool touches."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Grasp(Skill):
     waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Close the tool, wait, and read the sensor."""
+        """Close the tool, wait, and read the vacuum sensor."""
         cell.tool.close()
         is_sealed = False
         try:

@@ -1,4 +1,4 @@
-"""Question whether the tool holds an item."""
+"""Skill that checks if the tool holds an item."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class IsHolding(Skill):
     tool_left: ClassVar = {"empty": EMPTY}
 
     def run(self, cell: Cell) -> None:
-        """Compare the sensor with the ledger."""
+        """Compare the vacuum sensor with the ledger."""
         item = cell.ledger.find_held_item()
         if cell.tool.holding and item is not None:
             self.held = item

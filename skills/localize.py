@@ -1,4 +1,4 @@
-"""Localization of detections in the world, and their assignment to items."""
+"""Skill that localizes detections in the world and assigns them to items."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Localize(Skill):
         frame = self.detections.frame
         if not cell.ledger.is_current(frame):
             raise self.failure(
-                "stale", f"frame {frame.id} shows the table before change {cell.ledger.epoch}; look again"
+                "stale", f"the robot may have moved objects after frame {frame.id} was captured; look again"
             )
         try:
             observations = cell.localizer.localize(self.detections)

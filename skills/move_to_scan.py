@@ -1,4 +1,4 @@
-"""Motion to a pose of the cell, mostly for a look."""
+"""Skill that moves the arm to a named pose of the cell, for instance to a scan pose."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class MoveToScan(Skill):
         yield from wait_for_rest(cell.arm)
         if self.pose == "auto" and cell.camera.sees_table():
             return
-        name = self._name(cell)
+        name = self._choose_pose(cell)
         motion = yield from plan(self, cell.arm, lambda: (name, make_task(cell)))
         yield from follow(self, cell, motion)
 
-    def _name(self, cell: Cell) -> str:
+    def _choose_pose(self, cell: Cell) -> str:
         if self.pose == "auto":
             return cell.camera.scan_poses[0]
         if self.pose == "next":

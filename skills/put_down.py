@@ -1,4 +1,4 @@
-"""Return of the held item to a free place on the table."""
+"""Skill that puts the held item down on a free position of the table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.manipulation.tool_goals import make_put_down_goal
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, SkillFailed, param, port
 
 MIN_LIFT_HEIGHT = 0.003
-"""Height of the item's underside above the table from which the item counts as lifted [m]."""
+"""Minimum height of the underside of a lifted item above the table [m]."""
 
 
 class PutDown(Skill):
@@ -34,7 +34,7 @@ class PutDown(Skill):
     waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Carry the item to the place, lower it, release it."""
+        """Transport the item to the free position, and release it."""
         kind = cell.classes[cell.ledger.get_label(self.held)]
         goal, height = make_put_down_goal(cell, kind, self.drop, self.held), kind.height
         lying_height = float(cell.safe_place[2]) + height

@@ -1,4 +1,4 @@
-"""Rejection of an item."""
+"""Skill that rejects an item."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Release of the held item in a bin."""
+"""Skill that releases the held item in a bin."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Release(Skill):
     waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Open the tool, wait, and read the sensor."""
+        """Open the tool, wait, and read the vacuum sensor."""
         item, bin = self.held, self.bin
         if cell.ledger.find_held_item() == item:
             yield from release_item(
@@ -35,5 +35,5 @@ class Release(Skill):
             )
         elif cell.ledger.is_open(item):
             raise self.failure("dropped", f"{item} is not in the tool any more")
-        # Otherwise the item was released already, before a halt and a new start of this skill.
+        # Otherwise the item was already released, before this skill was halted and started again.
         self.placed = item

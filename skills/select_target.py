@@ -1,4 +1,4 @@
-"""Selection of the next target."""
+"""Skill that selects the next target and its bin."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from executive.skill import In, Out, Skill, SkillFailed, param, port
 class SelectTarget(Skill):
     """Select the next target to pick, and its bin.
 
-    A target is no candidate if its item is not open, its class has no route, the robot may have moved it
-    since its last detection, or too few looks agree for the error rates of the detector. While the arm moves,
-    its destination counts as its position.
+    A target is no candidate if its item is no longer to be sorted, its class has no route, the robot may have
+    moved it since its last detection, or too few looks agree on its class, given the error rates of the
+    detector. While the arm moves, distances are measured from its destination.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
@@ -32,7 +32,7 @@ class SelectTarget(Skill):
     reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
 
     def run(self, cell: Cell) -> None:
-        """Take the first candidate in the preferred order."""
+        """Select the first candidate in the preferred order."""
         candidates = [
             target
             for target in sort_pickable_targets(cell, self.targets)
@@ -57,7 +57,7 @@ class SelectTarget(Skill):
         )
 
     def _explain_none(self, cell: Cell) -> SkillFailed:
-        """Return the failure that states why there is no candidate."""
+        """Return the failure with the reason why there is no candidate."""
         uncertain = [item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item)]
         if uncertain:
             names = ", ".join(uncertain)

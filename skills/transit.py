@@ -1,4 +1,4 @@
-"""Transport of the held item into a bin."""
+"""Skill that transports the held item into a bin."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 
 class Transit(Skill):
-    """Carry the held item to a free slot of a bin, just above the floor or the layer of objects there.
+    """Transport the held item to a free slot of a bin, just above the floor or the layer of objects there.
 
-    One motion: up, across above all walls, and down into the bin, with accelerations that the seal withstands
-    with a safety factor of two. The tool's sensor is read during the whole motion.
+    The arm makes one motion: up, over all walls, and down into the bin, with accelerations that the seal
+    withstands with a safety factor of two. The vacuum sensor is read during the whole motion.
     """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
@@ -35,10 +35,10 @@ class Transit(Skill):
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the time of the shortest transit from the workspace to the bin, if it is known [s]."""
+        """Return the minimum time of a transport to the bin, or to the nearest bin if it is unknown [s]."""
         return min_times.get_transport_time(values.get("bin"))
 
     def run(self, cell: Cell) -> Steps:
-        """Plan the motion, then follow it while the seal holds."""
+        """Plan the motion, and follow it while the seal holds."""
         goal = make_bin_goal(cell, self.bin, self.held, self.drop)
         yield from transport(self, cell, self.held, goal, self.bin)

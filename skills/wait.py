@@ -1,4 +1,4 @@
-"""Pause of a fixed duration."""
+"""Skill that waits for a fixed duration."""
 
 from __future__ import annotations
 
@@ -16,5 +16,5 @@ class Wait(Skill):
     waits: ClassVar = "seconds"
 
     def run(self, cell: Cell) -> Steps:
-        """Sleep on the clock."""
+        """Wait on the clock of the run."""
         yield from cell.clock.sleep(self.seconds)

@@ -17,7 +17,7 @@ from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import list_choices
 from executive.perception.detectors.registry import find_problems
-from executive.perception.envelope.fingerprint import take_fingerprint
+from executive.perception.envelope.fingerprint import compute_fingerprint
 from executive.perception.envelope.measurement import (
     SUFFIX,
     ErrorCounts,
@@ -241,7 +241,7 @@ def store_evaluation(
     table = evaluation.confusion
     measurement = Measurement(
         detector=detector.name,
-        fingerprint=dict(take_fingerprint(detector.cell, detector.name, detector.base)),
+        fingerprint=dict(compute_fingerprint(detector.cell, detector.name, detector.base)),
         command=command,
         seconds=round(seconds, 1),
         images=evaluation.images,

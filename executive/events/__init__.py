@@ -1,7 +1,7 @@
 """Events of a run: one frozen dataclass per kind of event.
 
 The parts of a run emit events; observers (journal, trace, pictures, views) receive each event with its time.
-A journal holds one JSON object per event; its keys are the fields of these classes.
+The journal has one JSON object per event, whose keys are the fields of these classes.
 """
 
 from executive.events.cell import FaultInjected, InputRead, MotionPlanned, ToolCommanded

@@ -1,4 +1,4 @@
-"""Events of the cell: motions, commands of the tool, answers, and faults that a test injects."""
+"""Events of the cell: planned motions, tool commands, values read from the cell, and injected faults."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class MotionPlanned(Event):
     """The arm planned a motion.
 
     Attributes:
-        ahead: True if the motion was planned before a skill asked for it.
-        waits: Time until the motion may begin [s].
-        duration: Duration of the motion [s]; 0 if there is none.
+        ahead: True if the motion was planned before a skill requested it.
+        waits: Time from this event until the motion may start [s].
+        duration: Duration of the motion [s]; 0 if there is no motion.
     """
 
     ahead: bool
@@ -38,13 +38,13 @@ class ToolCommanded(Event):
 
 @dataclass(frozen=True)
 class InputRead(Event):
-    """The cell gave an answer that differs from its last answer to the same question.
+    """A value was read from the cell that differs from the previous value of the same input.
 
     Attributes:
-        name: Name of the input.
-        nth: Number of times that the input had been read in this control step, this time included.
-        value: The answer, or the message of the exception.
-        raised: Name of the exception that the cell raised; "" for an answer.
+        name: Name of the input, for instance `tool.holding`.
+        nth: How many times the input has been read in this control step, including this time.
+        value: The value, or the message of the exception.
+        raised: Name of the exception that the cell raised; "" for a value.
     """
 
     name: str
@@ -55,14 +55,14 @@ class InputRead(Event):
 
 @dataclass(frozen=True)
 class FaultInjected(Event):
-    """A test disturbed the cell.
+    """A test injected a fault into the cell.
 
     Attributes:
         name: Name of the injected fault.
         node: Path of the node during which the fault was injected, or "".
-        item: Item that this node works on, or "".
-        object: Class of the object concerned, or "".
-        position: Position of this object `(3,)` [m]; empty if there is none.
+        item: Item on which this node works, or "".
+        object: Class of the affected object, or "".
+        position: Position of the affected object `(3,)` [m]; empty if no object is affected.
     """
 
     name: str

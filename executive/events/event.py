@@ -1,4 +1,4 @@
-"""Base of the events, and an event with its time."""
+"""Base class of the events, and an event with its time."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from pydantic import ConfigDict
 
 @dataclass(frozen=True)
 class Event:
-    """Base of the events.
+    """Base class of the events.
 
     Attributes:
-        is_recorded: True if the journal holds the events of this kind.
+        is_recorded: True if events of this class are written to the journal.
     """
 
     is_recorded: ClassVar[bool] = True
 
-    # Pydantic validates the events of a journal without converting types.
+    # Pydantic reads the events of a journal without type conversions.
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True)
 
 
@@ -42,8 +42,8 @@ Emit = Callable[[Event], None]
 """Function that adds the time to an event and passes the timed event to all observers."""
 
 Observer = Callable[[TimedEvent], None]
-"""Function that receives an event on the tick thread and returns at once."""
+"""Function that receives an event in the thread of the tick loop, and returns at once."""
 
 
 def discard_event(event: Event) -> None:
-    """Do nothing: the `emit` of a part without observers."""
+    """Ignore an event: the `emit` function of a part that has no observers."""

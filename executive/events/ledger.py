@@ -1,4 +1,4 @@
-"""Events of the ledger: looks, items and targets."""
+"""Events of the ledger: looks (searches of a frame), items and targets."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class DetectedObject:
     """A localized detection in a frame.
 
     Attributes:
-        label: Class.
+        label: Detected class.
         confidence: Confidence of the detector, 0 to 1.
         box: Left, top, right and bottom side [pixel].
-        position: Position in the world `(3,)` [m].
-        contradiction: Evidence against the class besides the detector's score, or "".
+        position: Position of the object in the world `(3,)` [m].
+        contradiction: Sentence with evidence against the class from size or height, or "".
     """
 
     label: str
@@ -40,10 +40,10 @@ class FrameSearched(Event):
         frame: Number of the frame.
         camera: Name of the camera.
         detector: Name of the detector.
-        view: Searched part of the frame: `table` or `full`.
+        view: Name of the searched region of the frame: `table` or `full`.
         found: Confident detections.
-        unsure: Detections of low confidence.
-        unknown: Labels that the cell file does not declare, one for each detection.
+        unsure: Doubtful or contradicted detections.
+        unknown: Labels of the detections whose class the cell file does not declare.
     """
 
     frame: int
@@ -64,9 +64,9 @@ class ItemChanged(Event):
         label: Class of the item.
         state: `seen`, `held`, `dropped`, `placed`, `rejected`, `skipped`, `lost` or `phantom`.
         position: Position of the item `(3,)` [m].
-        looks: Number of looks that showed the item.
+        looks: Number of looks in which the item was detected.
         attempts: Number of failed attempts to pick the item.
-        bin: Bin that contains the placed item, or "".
+        bin: Name of the bin that contains a placed item, or "".
         why: Reason of the state, or "".
     """
 
@@ -82,13 +82,13 @@ class ItemChanged(Event):
 
 @dataclass(frozen=True)
 class TargetSelected(Event):
-    """A skill selected the next target.
+    """A skill selected the next item to pick.
 
     Attributes:
         item: Name of the item.
         label: Class of the item.
-        frame: Number of the last frame that showed the item.
-        bin: Destination of the item.
+        frame: Number of the last frame in which the item was detected.
+        bin: Name of the bin into which the item is to be placed.
     """
 
     item: str

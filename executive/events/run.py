@@ -1,4 +1,4 @@
-"""Events of a whole run: start, requests of the operator, halt, resumption, faults and end."""
+"""Events of a run: start, requests of the operator, halt, resumption, faults and end."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import Field, JsonValue
 from executive.events.event import Event
 
 JOURNAL_FORMAT = 2
-"""Version of the format of journals; format 1 stated no version."""
+"""Version of the journal format; journals of format 1 contain no version."""
 
 RunStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|INCOMPLETE|FAILURE|FAULT|HALTED)$")]
 
@@ -23,14 +23,14 @@ class RunStarted(Event):
     Attributes:
         mission: Name of the mission.
         file: Path of the mission file.
-        seed: Seed of all random numbers.
+        seed: Seed of all random number generators.
         params: Values of the params of the mission.
-        overrides: Params as given on the command line.
-        requests: Scripted answers of the operator; None if a person answers.
+        overrides: Params from the command line.
+        requests: Scripted requests of the operator; None if a person makes the requests.
         base: Folder of the cell file.
-        step: Length of a control step [s].
+        step: Duration of a control step [s].
         versions: Versions of this project, Python, the machine and the required packages.
-        format: Version of the format of the journal.
+        format: Version of the journal format.
     """
 
     mission: str
@@ -50,7 +50,7 @@ class OperatorAsked(Event):
     """The run waits for a request of the operator.
 
     Attributes:
-        choices: Classes that can be requested.
+        choices: Classes that the operator can request.
     """
 
     choices: Sequence[str]
@@ -58,10 +58,10 @@ class OperatorAsked(Event):
 
 @dataclass(frozen=True)
 class RequestGiven(Event):
-    """The operator gave a request.
+    """The operator made a request.
 
     Attributes:
-        wanted: The class, `rescan`, or None to quit.
+        wanted: The requested class; `rescan` for a new look; None to quit.
     """
 
     wanted: str | None
@@ -69,7 +69,7 @@ class RequestGiven(Event):
 
 @dataclass(frozen=True)
 class RunHalted(Event):
-    """The tick loop ended, and the arm begins to brake.
+    """The run was halted: the tick loop ended, and the arm starts to brake.
 
     Attributes:
         ticked: True if the tree was ticked in this control step.
@@ -83,9 +83,9 @@ class RunResumed(Event):
     """An interrupted run was resumed.
 
     Attributes:
-        ticked: Number of control steps before the interruption that remain valid.
-        intent: Last action of the tool before the interruption, `open` or `close`; "" if there was none;
-            `unknown` if arm or tool did more than the journal knows.
+        ticked: Number of control steps before the interruption that are still valid.
+        intent: Last command to the tool before the interruption, `open` or `close`; "" if there was none;
+            `unknown` if arm or tool executed commands that the journal lacks.
         versions: Versions of this project, Python, the machine and the required packages.
     """
 
@@ -107,17 +107,17 @@ class FaultRaised(Event):
 
 @dataclass(frozen=True)
 class RunEnded(Event):
-    """A run ended, and its arm is at rest.
+    """A run ended; the arm is at rest.
 
     Attributes:
-        status: `SUCCESS`; `INCOMPLETE` if the tree succeeded and items were rejected; `FAILURE`, `FAULT` or
-            `HALTED`.
+        status: `SUCCESS`, `FAILURE`, `FAULT`, `HALTED`, or `INCOMPLETE` if the tree succeeded but items were
+            rejected.
         reason: Reason of the failure, for instance `Transit.dropped`; "" on success.
-        message: One sentence with the measured values that explain the status, or "".
+        message: Sentence that explains the status, with measured values, or "".
         node: Path of the node that determined the status, or "".
-        empty: True if the ledger believed that no object with a route was left, and no look had shown a label
-            that the cell does not know.
-        holds: Item that the tool holds, `something` if the ledger knows no such item, or "".
+        empty: True if by the ledger no object with a route was left, and no look showed a label that the cell
+            file does not declare.
+        holds: Item in the tool; `something` if the ledger has no such item; "" for an empty tool.
         ticks: Number of control steps.
         robot_time: Time on the clock of the run [s].
     """

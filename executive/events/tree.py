@@ -1,4 +1,4 @@
-"""Events of the nodes of the tree."""
+"""Events of the nodes of the behaviour tree."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class NodeStarted(Event):
     Attributes:
         node: Path of the node.
         skill: Name of the skill; "" for a control node.
-        item: Item that the skill works on, or "".
+        item: Item on which the skill works, or "".
     """
 
     node: str
@@ -36,12 +36,12 @@ class NodeEnded(Event):
         node: Path of the node.
         status: Final status; INVALID if the node was halted or raised a fault.
         skill: Name of the skill; "" for a control node.
-        item: Item that the skill worked on, or "".
-        reason: Reason of the failure: `missed` for a skill, `Grasp.missed` for a control node; "fault" for a
-            fault of a skill; "" otherwise.
+        item: Item on which the skill worked, or "".
+        reason: Reason of a failure, for instance `missed` for a skill, `Grasp.missed` for a control node;
+            `fault` for a fault of a skill; "" otherwise.
         message: Message of the failure or fault, or "".
-        origin: Path of the node in which the failure of a control node began, or "".
-        outputs: Values of the outputs of a skill that succeeded; None for any other end.
+        origin: Path of the node that caused the failure of a control node, or "".
+        outputs: Values of the outputs of a skill that succeeded, otherwise None.
     """
 
     node: str
@@ -56,11 +56,11 @@ class NodeEnded(Event):
 
 @dataclass(frozen=True)
 class BranchChosen(Event):
-    """A control node decided what to run next.
+    """A control node decided which child it runs next.
 
     Attributes:
         node: Path of the control node.
-        choice: The decision in words.
+        choice: Description of the decision.
         reason: Failure that caused the decision, for instance `Grasp.missed`, or "".
         message: Message of this failure, or "".
     """

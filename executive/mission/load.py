@@ -23,7 +23,7 @@ from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import MissionFiles, RecordedCell, read_mission
 from executive.mission.parse.validate import find_mark
 from executive.mission.text.files import find_mission, get_shipped_folder
-from executive.perception.envelope.rated_detectors import find_unmeasured
+from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
 from executive.skill import Skill
 from executive.tree.registry import load_control_nodes
 
@@ -126,7 +126,7 @@ def _find_unmeasured(cell: CellFile, folder: Path) -> Iterator[Finding]:
     """Yield a warning for each detector of the cell file in `folder` whose error rates were not measured."""
     assert cell.config is not None
     measurement_folders = (folder, get_shipped_folder() / "cells")
-    for keys, text in find_unmeasured(cell.config, folder, measurement_folders):
+    for keys, text in find_unmeasured_detectors(cell.config, folder, measurement_folders):
         mark = find_mark(cell.root, keys, of_key=True) if cell.root else cell.source.make_mark()
         yield make_warning(mark, "not-measured", text)
 

@@ -28,7 +28,7 @@ from executive.cells.sim.silhouette import compute_bounding_box
 from executive.cells.sim.world import World
 from executive.geometry import Array
 from executive.perception.camera_model import NEAR, project
-from executive.perception.detectors.requests import Pending
+from executive.perception.detectors.requests import PendingSearch
 
 ORACLE_CONFIDENCE = 0.9
 """Confidence of all detections of an oracle."""
@@ -127,7 +127,7 @@ class Oracle:
     box_std: float
     seed: int
 
-    def request(self, frame: Frame, view: str) -> Pending:
+    def request(self, frame: Frame, view: str) -> PendingSearch:
         """Request the true detections of `frame`, which are available after the latency of the detector."""
         assert isinstance(frame, TrueFrame), "an oracle requires frames of a TruthCamera"
         random = np.random.default_rng([self.seed, frame.id])
@@ -142,7 +142,7 @@ class Oracle:
         answer: Future[list[Detection]] = Future()
         answer.set_result(found)
         answer_time = self.clock.now + self.config.latency
-        return Pending(answer, answer_time, self.clock, self.name, self.config.error_rates)
+        return PendingSearch(answer, answer_time, self.clock, self.name, self.config.error_rates)
 
     def close(self) -> None:
         """Do nothing: an oracle holds no resources."""

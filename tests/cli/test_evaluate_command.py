@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.perception.detectors.embedded import LABELS, MODEL
+from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
 from executive.perception.envelope.measurement import StoredErrorRates, read_measurements
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 
@@ -71,7 +71,7 @@ def test_a_detector_is_measured_in_the_world_of_a_scene_file(tmp_path):
     [
         ((), "grey", "embedded"),
         (("--cell", "wrist", "--detector", "embedded", "--out", "wrist.json"), "wrist on grey", "embedded"),
-        (("--weights", MODEL, "--labels", LABELS, "--threshold", 0.9), "grey", "model"),
+        (("--weights", MODEL_PATH, "--labels", LABELS_PATH, "--threshold", 0.9), "grey", "model"),
     ],
 )
 def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset, arguments, where, detector):
@@ -80,7 +80,7 @@ def test_a_dataset_is_measured_on_with_or_without_a_cell_or_a_model_file(dataset
     assert (called, measured["detector"], measured["images"], measured["objects"]) == (where, detector, 1, 1)
     assert (measured["recall"], measured["confusion"]) == (0, {"cube": {"nothing": 1}})
     model = detector == "model"
-    assert (printed["weights"], measured["threshold"]) == ((str(MODEL), 0.9) if model else (None, 0.5))
+    assert (printed["weights"], measured["threshold"]) == ((str(MODEL_PATH), 0.9) if model else (None, 0.5))
 
 
 def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(missions, tmp_path):
@@ -115,7 +115,7 @@ def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(mi
             "fruit is of kind fake; measure its detector on your own images",
         ),
         (("--dataset", "."), ". contains no labelled images"),
-        (("--weights", "no.onnx", "--labels", LABELS, "--dataset", "grey"), "there is no model file"),
+        (("--weights", "no.onnx", "--labels", LABELS_PATH, "--dataset", "grey"), "there is no model file"),
         (("--sheet", "sheet.gif"), '"sheet.gif" is no picture; its name must end in .png, .jpg, .jpeg'),
     ],
 )

@@ -20,8 +20,8 @@ from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell
 from executive.mission.load import load_mission
-from executive.perception.detectors.requests import Pending
-from executive.perception.detectors.screening import screen_detectors
+from executive.perception.detectors.requests import PendingSearch
+from executive.perception.detectors.screening import make_screened_detectors
 from executive.plugins import discover, load_cell_kind
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.result import Result
@@ -52,7 +52,7 @@ class CrowdedDetector:
         self._count, self._confidence = count, confidence
         self._overlapping, self._moving = overlapping, moving
 
-    def request(self, frame: Frame, view: str) -> Pending:
+    def request(self, frame: Frame, view: str) -> PendingSearch:
         """Return boxes within the searched part of the image, whatever it shows."""
         assert frame.id == 1, "the mission goes on with a look that cannot be right"
         answer: Future[list[Detection]] = Future()
@@ -60,7 +60,7 @@ class CrowdedDetector:
         area = camera.table_view if view == "table" else (0, 0, camera.width, camera.height)
         answer.set_result(self._boxes(area, np.random.default_rng(frame.id if self._moving else 0)))
         due = self._clock.now + self._config.latency
-        return Pending(answer, due, self._clock, self._name, self._config.error_rates)
+        return PendingSearch(answer, due, self._clock, self._name, self._config.error_rates)
 
     def close(self) -> None:
         """Have nothing to give back."""
@@ -88,7 +88,7 @@ def _fake(config: Any, *, crowd: Mapping[str, Any], **given: Any) -> FakeCell:
         name: CrowdedDetector(name, detector, camera, fake.cell.clock, **crowd)
         for name, detector in config.detectors.items()
     }
-    fake.cell.detectors.update(screen_detectors(parts, fake.cell.classes))  # type: ignore[attr-defined]
+    fake.cell.detectors.update(make_screened_detectors(parts, fake.cell.classes))  # type: ignore[attr-defined]
     return fake
 
 

@@ -10,7 +10,7 @@ import yaml
 from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.mission.parse.cell_file import load_cell
-from executive.perception.envelope.rated_detectors import find_unmeasured
+from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
 from executive.plugins import load_cell_kind
 
 CELLS = sorted((Path(__file__).parents[2] / "missions" / "cells").glob("*.yaml"))
@@ -76,6 +76,6 @@ def test_every_shipped_detector_is_measured_but_those_behind_a_server(missions: 
     unmeasured = {
         (file.stem, keys[1])
         for file in sorted(folder.glob("*.yaml"))
-        for keys, _ in find_unmeasured(load_cell(file), folder, [folder])
+        for keys, _ in find_unmeasured_detectors(load_cell(file), folder, [folder])
     }
     assert unmeasured == {("hosted", "server"), ("roboflow", "server")}

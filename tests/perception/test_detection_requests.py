@@ -11,7 +11,7 @@ import pytest
 from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
 from executive.errors import DeadlinePassed, Unavailable
-from executive.perception.detectors.requests import Pending
+from executive.perception.detectors.requests import PendingSearch
 
 FOUND = [Detection("cube", 0.9, (0.0, 0.0, 1.0, 1.0))]
 ERROR_RATES = ErrorRates(threshold=0.5, miss_rate=0.1, confusion_rate=0.1, false_detections=0.1, jitter=1.0)
@@ -29,7 +29,7 @@ def ended(clock):
     def ended(result, **options):
         work = Future()
         (work.set_exception if isinstance(result, Exception) else work.set_result)(result)
-        return Pending(work, 0.05, clock, "eye", ERROR_RATES, **options)
+        return PendingSearch(work, 0.05, clock, "eye", ERROR_RATES, **options)
 
     return ended
 
@@ -48,7 +48,7 @@ def test_the_clock_waits_for_an_answer_that_is_late(clock):
     release = threading.Event()
     clock.now = 0.05
     with ThreadPoolExecutor(1) as thread:
-        request = Pending(thread.submit(release.wait), 0.05, clock, "eye", ERROR_RATES)
+        request = PendingSearch(thread.submit(release.wait), 0.05, clock, "eye", ERROR_RATES)
         threading.Timer(0.08, release.set).start()
         assert request.ready
         assert release.is_set()
@@ -56,7 +56,7 @@ def test_the_clock_waits_for_an_answer_that_is_late(clock):
 
 @pytest.mark.parametrize("error", [Unavailable("the model is gone"), ZeroDivisionError("a bug")])
 def test_what_the_search_raises_comes_out_of_the_result_as_it_is(ended, clock, error):
-    request = ended(error, expiry=1.0)
+    request = ended(error, expiry_time=1.0)
     clock.now = 0.05
     assert request.ready
     with pytest.raises(type(error)) as raised:
@@ -65,7 +65,7 @@ def test_what_the_search_raises_comes_out_of_the_result_as_it_is(ended, clock, e
 
 
 def test_that_a_deadline_has_passed_shows_when_it_has_passed_on_the_runs_clock_too(ended, clock):
-    request = ended(DeadlinePassed("no answer within 1.0 s"), expiry=1.0)
+    request = ended(DeadlinePassed("no answer within 1.0 s"), expiry_time=1.0)
     clock.now = 0.9
     assert not request.ready
     clock.now = 1.0 - 1e-12

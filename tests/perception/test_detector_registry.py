@@ -10,7 +10,7 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.errors import InputError
 from executive.perception.detectors import registry
-from executive.perception.detectors.registry import build_detectors, find_known_labels, find_problems
+from executive.perception.detectors.registry import build_detectors, find_detectable_labels, find_problems
 
 INSTALLED = ", ".join(sorted(registry.find_detector_kinds()))
 
@@ -22,7 +22,7 @@ class Oracle:
 
     def __init__(self, config, setting):
         self.config, self.setting, self.closed = config, setting, False
-        self.other = setting.other(config.options["beside"]) if "beside" in config.options else None
+        self.other = setting.get_detector(config.options["beside"]) if "beside" in config.options else None
         Oracle.made.append(self)
         if config.options.get("broken"):
             raise InputError("it is broken")
@@ -47,7 +47,7 @@ def build(base=None, **configs):
 def oracle_installed(monkeypatch):
     """The kind `oracle` is installed beside the shipped ones."""
     found = registry.find_detector_kinds()
-    oracle = EntryPoint("oracle", f"{__name__}:Oracle", registry.GROUP)
+    oracle = EntryPoint("oracle", f"{__name__}:Oracle", registry.DETECTOR_GROUP)
     monkeypatch.setattr(registry, "find_detector_kinds", lambda: {**found, "oracle": oracle})
     monkeypatch.setattr(Oracle, "made", [])
 
@@ -70,7 +70,7 @@ def test_a_wrong_option_is_found_at_its_key(tmp_path):
 
 def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, oracle_installed):
     configs = {kind: DetectorConfig(kind=kind) for kind in ("embedded", "oracle", "yolo")}
-    known = find_known_labels(configs, tmp_path)
+    known = find_detectable_labels(configs, tmp_path)
     assert known == {"embedded": ("cube", "sphere", "duck"), "oracle": None, "yolo": None}
     assert [keys for keys, _ in find_problems(configs, tmp_path)] == [("detectors", "yolo", "kind")]
 
@@ -79,7 +79,7 @@ def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypa
     info = tmp_path / "theirs-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\noracle = {__name__}:Oracle\n")
+    (info / "entry_points.txt").write_text(f"[{registry.DETECTOR_GROUP}]\noracle = {__name__}:Oracle\n")
     monkeypatch.syspath_prepend(tmp_path)
     mine = build(tmp_path, mine=oracle(wish=3))["mine"]
     assert mine.config.options == {"wish": 3}

@@ -7,13 +7,13 @@ import pytest
 
 from executive.cell.detection import Detection
 from executive.errors import InputError
-from executive.perception.detectors.embedded import LABELS, MODEL
+from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
 from executive.perception.detectors.onnx_model import OnnxModel, read_labels
 
 
 @pytest.fixture(scope="module")
 def model():
-    return OnnxModel(MODEL, read_labels(LABELS), threads=1)
+    return OnnxModel(MODEL_PATH, read_labels(LABELS_PATH), threads=1)
 
 
 @pytest.fixture
@@ -63,14 +63,14 @@ def test_what_is_under_the_floor_is_dropped_and_the_most_confident_comes_first(d
 def test_the_input_is_normalized_rgb_of_the_models_size(model, decoded):
     red = np.full((50, 50, 3), (255, 0, 0), np.uint8)
     _, given = decoded([[0.5] * 4], [[-9.0] * 4], red)
-    assert given.shape == (1, 3, model.size, model.size)
+    assert given.shape == (1, 3, model.input_size, model.input_size)
     assert given[0, 0] == pytest.approx((1 - 0.485) / 0.229, abs=1e-5)
     assert given[0, 2] == pytest.approx((0 - 0.406) / 0.225, abs=1e-5)
 
 
 def test_a_file_that_is_no_model_of_these_classes_is_refused(tmp_path):
-    with pytest.raises(InputError, match="has 3 classes and 2 labels were given: cat, dog"):
-        OnnxModel(MODEL, ("cat", "dog"))
+    with pytest.raises(InputError, match="has 3 classes, but there are 2 labels: cat, dog"):
+        OnnxModel(MODEL_PATH, ("cat", "dog"))
     (tmp_path / "model.onnx").write_bytes(b"not a model")
     with pytest.raises(InputError, match="not a model that onnxruntime can run"):
         OnnxModel(tmp_path / "model.onnx", ("cube",))

@@ -10,18 +10,18 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Detection
 from executive.errors import InputError
-from executive.perception.detectors.embedded import LABELS, MODEL, EmbeddedDetector
+from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH, EmbeddedDetector
 from executive.perception.detectors.rfdetr import RfdetrDetector
 from executive.perception.detectors.setting import DetectorSetting
 
-ONNX = str(MODEL)
+ONNX = str(MODEL_PATH)
 
 
 class BrightSpots:
     """A model that finds the bounding box of what is brighter than half."""
 
     def __init__(self, size):
-        self.size = size
+        self.input_size = size
         self.shapes = []
 
     def detect(self, image, floor):
@@ -41,7 +41,7 @@ def frame_with_spot(left, top):
 
 def setting(base=None):
     camera = SimpleNamespace(table_view=(192, 100, 448, 356))
-    return DetectorSetting("eye", camera, SimpleNamespace(now=0.0), base, seed=0, other=None)
+    return DetectorSetting("eye", camera, SimpleNamespace(now=0.0), base, seed=0, get_detector=None)
 
 
 def found_by(detector, frame, view):
@@ -82,7 +82,7 @@ def configured(kind, **options):
 
 
 def test_any_exported_model_can_be_used_by_path_and_the_embedded_one_needs_no_options(tmp_path):
-    (tmp_path / "model.onnx").symlink_to(MODEL)
+    (tmp_path / "model.onnx").symlink_to(MODEL_PATH)
     (tmp_path / "names.txt").write_text("one\ntwo\nthree\n")
     mine = configured(RfdetrDetector, model_path="model.onnx", labels="names.txt", threshold=0.6)
     for kind, config in ((RfdetrDetector, mine), (EmbeddedDetector, configured(EmbeddedDetector))):
@@ -117,9 +117,9 @@ WRONG = [
         RfdetrDetector,
         {"model_path": ONNX, "labels": ["a"], "class_map": {"b": "cube"}},
         "class_map",
-        "class_map .* names b, which the model does not know; it knows a",
+        "class_map .* contains b, which the model cannot find; the classes of the model are a",
     ),
-    (EmbeddedDetector, {"model_path": ONNX}, "model_path", 'option "model_path".*its options: none'),
+    (EmbeddedDetector, {"model_path": ONNX}, "model_path", 'option "model_path".*the options are none'),
 ]
 
 
@@ -154,4 +154,4 @@ def test_the_labels_are_the_cells_names_and_no_model_is_read_for_them(tmp_path):
     assert labels(model_path="m.onnx", labels="names.txt", class_map={"one": "cube"}) == ("cube", "two")
     assert labels() is labels(model_path="m.onnx", labels="no.txt") is None
     shipped = EmbeddedDetector.labels(configured(EmbeddedDetector), tmp_path)
-    assert shipped == tuple(LABELS.read_text().split())
+    assert shipped == tuple(LABELS_PATH.read_text().split())

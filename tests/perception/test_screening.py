@@ -13,7 +13,7 @@ from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.errors import Crowded, Unavailable
 from executive.geometry import Pose
-from executive.perception.detectors.screening import MAX_BOXES, screen, screen_detectors
+from executive.perception.detectors.screening import MAX_BOXES, make_screened_detectors, screen_answer
 
 RATES = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.7)
 VISIBLE = np.ones((20, 20), bool)
@@ -28,13 +28,13 @@ def detect(label: str = "cube", confidence: float = 0.9, right: float = 9.0, riv
 def test_detections_are_divided_by_confidence_second_class_and_label() -> None:
     cube, weak, torn = detect(), detect(confidence=0.4), detect(confidence=0.7, rival=0.4)
     mug, weak_mug = detect("mug"), detect("mug", confidence=0.4)
-    answer = screen(Answer("eye", (cube, mug, torn, weak, weak_mug), RATES), FRAME, "table", ["cube"])
+    answer = screen_answer(Answer("eye", (cube, mug, torn, weak, weak_mug), RATES), FRAME, "table", ["cube"])
     assert (answer.found, answer.doubtful, answer.unknown) == ((cube,), (torn, weak), (mug,))
 
 
 def test_a_box_that_the_arm_hides_is_left_out() -> None:
     shown, hidden = detect(right=12.0), detect(right=16.0)
-    assert screen(Answer("eye", (shown, hidden), RATES), FRAME, "table", ["cube"]).found == (shown,)
+    assert screen_answer(Answer("eye", (shown, hidden), RATES), FRAME, "table", ["cube"]).found == (shown,)
 
 
 def raise_unavailable() -> Answer:
@@ -48,7 +48,7 @@ def raise_unavailable() -> Answer:
         (
             lambda: Answer("eye", (detect(confidence=1.5),), RATES),
             Unavailable,
-            "detector eye gave an invalid box: 'cube' 1.5 at (0.0, 0.0, 9.0, 9.0)",
+            "detector eye returned an invalid box: 'cube' 1.5 at (0.0, 0.0, 9.0, 9.0)",
         ),
         (
             lambda: Answer("eye", (detect(),) * (MAX_BOXES + 1), RATES),
@@ -60,7 +60,7 @@ def raise_unavailable() -> Answer:
 )
 def test_an_unusable_answer_names_the_detector(result: Any, error: type[Exception], message: str) -> None:
     eye: Any = SimpleNamespace(request=lambda frame, view: SimpleNamespace(ready=True, result=result))
-    request = screen_detectors({"eye": eye}, ["cube"])["eye"].request(FRAME, "full")
+    request = make_screened_detectors({"eye": eye}, ["cube"])["eye"].request(FRAME, "full")
     with pytest.raises(error) as raised:
         request.result()
     assert str(raised.value) == message

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.views import (
-    ViewDetection,
-    list_parts,
-    merge_findings,
+    RegionDetection,
+    list_regions,
+    merge_detections,
     remove_duplicates,
-    search_parts,
+    search_regions,
 )
 
 TABLE = (192, 100, 448, 356)
@@ -22,19 +22,19 @@ SIZE = (640, 480)
 
 
 def found(box, confidence=0.9, part=(0, 0, 256, 256), label="cube"):
-    return ViewDetection(Detection(label, confidence, box), part)
+    return RegionDetection(Detection(label, confidence, box), part)
 
 
 def test_the_table_view_is_the_square_of_the_cell_file_and_a_smaller_frame_is_one_tile():
-    assert list_parts("table", TABLE, SIZE) == [TABLE]
-    assert list_parts("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
-    with pytest.raises(InputError, match='no view "ceiling"; there are table and full'):
-        list_parts("ceiling", TABLE, SIZE)
+    assert list_regions("table", TABLE, SIZE) == [TABLE]
+    assert list_regions("full", TABLE, (200, 150)) == [(0, 0, 200, 150)]
+    with pytest.raises(InputError, match='no view "ceiling"; the views are table and full'):
+        list_regions("ceiling", TABLE, SIZE)
 
 
 def test_a_detection_keeps_the_confidence_of_its_second_class_and_gets_the_name_of_the_cell():
     ball = Detection("ball", 0.6, (1, 2, 3, 4), rival=0.5)
-    (kept,) = search_parts(
+    (kept,) = search_regions(
         np.zeros((480, 640, 3), np.uint8), [TABLE], lambda part: [ball], {"ball": "sphere"}
     )
     assert kept == Detection("sphere", 0.6, (193, 102, 195, 104), rival=0.5)
@@ -51,7 +51,7 @@ def test_every_small_object_is_whole_in_some_tile_of_the_full_view(sizes, data):
     extent = side // 5
     left = data.draw(st.integers(0, width - extent))
     top = data.draw(st.integers(0, height - extent))
-    parts = list_parts("full", (0, 0, side, side), (width, height))
+    parts = list_regions("full", (0, 0, side, side), (width, height))
     assert all(part[2] - part[0] == side and part[3] - part[1] == side for part in parts)
     assert any(
         part[0] <= left and part[1] <= top and left + extent <= part[2] and top + extent <= part[3]
@@ -83,8 +83,8 @@ OTHER = (192, 0, 448, 256)
 )
 def test_an_object_in_two_tiles_is_reported_once(one, other, kept):
     expected = [(one, other)[number].detection for number in kept]
-    assert merge_findings([one, other], SIZE) == expected
-    assert merge_findings([other, one], SIZE) == expected
+    assert merge_detections([one, other], SIZE) == expected
+    assert merge_detections([other, one], SIZE) == expected
 
 
 def test_of_boxes_that_overlap_by_more_than_seven_tenths_the_most_confident_is_kept():
@@ -98,4 +98,4 @@ def test_of_boxes_that_overlap_by_more_than_seven_tenths_the_most_confident_is_k
     assert [one.label for one in remove_duplicates(detections[1:])] == ["again", "far"]
     equals = [Detection(label, 0.9, (0, 0, 10, 10)) for label in "abc"]
     assert remove_duplicates(equals) == equals[:1]
-    assert remove_duplicates([]) == merge_findings([], SIZE) == []
+    assert remove_duplicates([]) == merge_detections([], SIZE) == []

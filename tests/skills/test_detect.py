@@ -51,13 +51,13 @@ def test_only_what_is_sure_is_found(
         ("no answer within 1.0 s", "unavailable", "detector embedded: no answer within 1.0 s"),
         *(
             ([Detection("duck", 0.9, box)], "unavailable",
-             "detector embedded gave an invalid box: 'duck' 0.9 at (")
+             "detector embedded returned an invalid box: 'duck' 0.9 at (")
             for box in ((math.nan, 0, 9, 9), (0, 0, math.inf, 9), (9, 0, 0, 9), (-1e30, 0, 9, 9))
         ),
         ([Detection("\x1b[31mduck", 0.9, (0, 0, 9, 9))], "unavailable",
-         "detector embedded gave an invalid box: '\\x1b[31mduck' 0.9 at ("),
+         "detector embedded returned an invalid box: '\\x1b[31mduck' 0.9 at ("),
         ([Detection("d" * 101, 0.9, (0, 0, 9, 9))], "unavailable",
-         f"detector embedded gave an invalid box: '{'d' * 100}' 0.9 at ("),
+         f"detector embedded returned an invalid box: '{'d' * 100}' 0.9 at ("),
     ],
 )  # fmt: skip
 def test_an_answer_that_is_of_no_use_is_a_failure(

@@ -30,7 +30,10 @@ def test_a_frame_from_before_a_missed_grasp_is_stale(fake: FakeCell, look) -> No
     old = run_skill(Detect(), fake).outputs["detections"]
     fake.ledger.record_miss("cube-1")
     result = run_skill(Localize(detections=old), fake)
-    assert (result.reason, result.message) == ("stale", "frame 2 shows the table before change 1; look again")
+    assert (result.reason, result.message) == (
+        "stale",
+        "the robot may have moved objects after frame 2 was captured; look again",
+    )
 
 
 def test_a_frame_stays_good_after_a_pick_elsewhere(fake: FakeCell, look) -> None:

@@ -54,7 +54,7 @@ def a_lamp(fake: FakeCell) -> None:
     [
         (nothing_there, "no_contact", "no contact down to 35 mm, cube-1 was expected at 50 mm", 1, False),
         (something_higher, "blocked",
-         "the tool met something at 91 mm, on its way to cube-1, which was expected at 50 mm", 0, False),
+         "the tool touched something at 91 mm on its way to cube-1, which was expected at 50 mm", 0, False),
         (a_lamp, "blocked", "link 4 ran into the lamp", 0, False),
     ],
 )  # fmt: skip
@@ -77,7 +77,9 @@ def test_it_does_not_go_where_something_may_have_moved_since(fake: FakeCell, tar
     fake.ledger.invalidate_positions()
     result = run_skill(Approach(target=target), fake)
     assert (result.status, result.reason, fake.arm.commands) == ("FAILURE", "stale", [])
-    assert result.message == ("cube-1 was seen at 0.00 s, and the robot may have moved it since; look again")
+    assert result.message == (
+        "cube-1 was detected at 0.00 s, and the robot may have moved it since; look again"
+    )
 
 
 def test_every_further_attempt_comes_down_elsewhere(fake: FakeCell, target: Target, look: Look) -> None:

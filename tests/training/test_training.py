@@ -78,13 +78,13 @@ def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):
     onnx = pytest.importorskip("onnx")
     import onnxruntime
 
-    from executive.perception.detectors.embedded import MODEL
+    from executive.perception.detectors.embedded import MODEL_PATH
     from executive.training.compress import export_model
     from executive.training.restore import restore_model
 
-    onnx.save(export_model(restore_model(MODEL), tmp_path), str(tmp_path / "again.onnx"))
+    onnx.save(export_model(restore_model(MODEL_PATH), tmp_path), str(tmp_path / "again.onnx"))
     image = np.random.default_rng(0).normal(size=(1, 3, 256, 256)).astype(np.float32)
-    first, again = (onnxruntime.InferenceSession(str(path)) for path in (MODEL, tmp_path / "again.onnx"))
+    first, again = (onnxruntime.InferenceSession(str(path)) for path in (MODEL_PATH, tmp_path / "again.onnx"))
     (name,) = (one.name for one in first.get_inputs())
     for ours, theirs in zip(first.run(None, {name: image}), again.run(None, {name: image}), strict=True):
         assert ours == pytest.approx(theirs, abs=1e-5)

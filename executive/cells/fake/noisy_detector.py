@@ -15,7 +15,7 @@ from executive.cell.protocols import Detector
 from executive.perception.detectors.requests import ChangedRequest
 from executive.perception.detectors.setting import (
     DetectorSetting,
-    OptionFaults,
+    OptionErrors,
     find_wrong_options,
     read_options,
 )
@@ -53,7 +53,7 @@ class NoisyDetector:
         self._config = config
         self._options = options
         self._setting = setting
-        self._other: Detector = setting.other(options.of)
+        self._other: Detector = setting.get_detector(options.of)
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> NoisyDetector:
@@ -65,7 +65,7 @@ class NoisyDetector:
         return cls(config, read_options(NoisyOptions, config), setting)
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
+    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
         del base
         invalid_options = list(find_wrong_options(NoisyOptions, config))

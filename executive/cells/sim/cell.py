@@ -29,8 +29,8 @@ from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.text.files import get_shipped_folder
 from executive.motion.arms import build_planner, find_arm_errors
-from executive.perception.detectors.registry import find_known_labels, find_problems
-from executive.perception.detectors.screening import screen_detectors
+from executive.perception.detectors.registry import find_detectable_labels, find_problems
+from executive.perception.detectors.screening import make_screened_detectors
 from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.rated_detectors import build_rated_detectors
 from executive.perception.localization import build_localizer
@@ -103,7 +103,7 @@ class SimCell(CellWithoutHardware):
             arm=self._arm,
             tool=self._tool,
             camera=self._camera,
-            detectors=screen_detectors(self._detectors, classes),
+            detectors=make_screened_detectors(self._detectors, classes),
             classes=classes,
             localizer=localizer,
         )
@@ -131,7 +131,7 @@ class SimCell(CellWithoutHardware):
     @staticmethod
     def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
         """Return the classes of each detector, None if they are unknown, without loading a model."""
-        return find_known_labels(config.detectors, base)
+        return find_detectable_labels(config.detectors, base)
 
     @staticmethod
     def min_times(config: CellConfig) -> SimMinTimes:

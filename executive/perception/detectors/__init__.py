@@ -1,1 +1,1 @@
-"""Detectors: who finds objects in a frame, beside the tick loop."""
+"""Detectors, which find objects in frames in parallel with the control loop."""

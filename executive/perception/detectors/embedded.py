@@ -10,14 +10,14 @@ from executive.perception.detectors.onnx_model import OnnxModel, read_labels
 from executive.perception.detectors.rfdetr import RfdetrDetector
 from executive.perception.detectors.setting import (
     DetectorSetting,
-    OptionFaults,
+    OptionErrors,
     find_wrong_options,
     read_options,
 )
 
-WEIGHTS = Path(__file__).parent.parent / "weights"
-MODEL = WEIGHTS / "embedded.onnx"
-LABELS = WEIGHTS / "embedded.labels.txt"
+WEIGHTS_FOLDER = Path(__file__).parent.parent / "weights"
+MODEL_PATH = WEIGHTS_FOLDER / "embedded.onnx"
+LABELS_PATH = WEIGHTS_FOLDER / "embedded.labels.txt"
 
 
 class EmbeddedDetector(RfdetrDetector):
@@ -28,25 +28,25 @@ class EmbeddedDetector(RfdetrDetector):
         """Return the detector with the shipped weights.
 
         Raises:
-            InputError: The cell file gives an option; this kind of detector has none.
+            InputError: The cell file has an option; this kind of detector has no options.
         """
         read_options(Section, config)
-        return cls(OnnxModel(MODEL, read_labels(LABELS)), config, setting)
+        return cls(OnnxModel(MODEL_PATH, read_labels(LABELS_PATH)), config, setting)
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
-        """Yield each given option with an error message: this kind of detector has no options."""
+    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
+        """Yield each option in the cell file with an error message: this kind of detector has no options."""
         del base, others
         yield from find_wrong_options(Section, config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
-        """Return the classes that the shipped weights were trained on."""
+        """Return the classes on which the shipped model was trained."""
         del config, base
-        return read_labels(LABELS)
+        return read_labels(LABELS_PATH)
 
     @staticmethod
     def weights(config: DetectorConfig, base: Path) -> Path | None:
         """Return the path of the shipped model."""
         del config, base
-        return MODEL
+        return MODEL_PATH

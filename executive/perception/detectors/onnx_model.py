@@ -1,6 +1,6 @@
-"""Exported RF-DETR model, run by onnxruntime, with its pre-processing and post-processing.
+"""Exported RF-DETR model in onnxruntime, with pre-processing and post-processing.
 
-Conventions of rfdetr's export: input `(1, 3, R, R)`, RGB in 0..1, normalized with ImageNet's mean and
+Conventions of an export by rfdetr: input `(1, 3, R, R)`, RGB in 0..1, normalized with ImageNet's mean and
 standard deviation; outputs `dets` `(1, Q, 4)`, centre x, y, width, height in 0..1, and `labels`
 `(1, Q, C + 1)`, logits with the background last.
 """
@@ -20,8 +20,10 @@ from executive.errors import InputError, Unavailable
 from executive.geometry import Array
 from executive.perception.detectors.views import remove_duplicates
 
-MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
-STANDARD_DEVIATION = np.array([0.229, 0.224, 0.225], dtype=np.float32)
+CHANNEL_MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
+"""Mean of ImageNet's images, for each channel, 0 to 1."""
+CHANNEL_STD = np.array([0.229, 0.224, 0.225], dtype=np.float32)
+"""Standard deviation of ImageNet's images, for each channel, 0 to 1."""
 
 
 class OnnxModel:
@@ -33,11 +35,11 @@ class OnnxModel:
         threads: Maximum number of threads of one inference.
 
     Raises:
-        InputError: The file cannot be read, is no RF-DETR, or has another number of classes.
+        InputError: The file cannot be read, is not an RF-DETR model, or has another number of classes.
     """
 
     def __init__(self, path: Path, labels: Sequence[str], threads: int = 2) -> None:
-        # The import takes 0.1 s and 40 MB, which only runs with a model need.
+        # The import takes 0.1 s and 40 MB, and many runs use no model.
         import onnxruntime
 
         if not path.is_file():
@@ -45,7 +47,7 @@ class OnnxModel:
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
-        # Threads that spin while they wait take the processor from the simulation.
+        # Threads that spin while they wait would slow down the simulation.
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         options.log_severity_level = 3
         try:
@@ -55,12 +57,12 @@ class OnnxModel:
         except Exception as error:
             raise InputError(f"{path} is not a model that onnxruntime can run: {error}") from error
         self.labels = tuple(labels)
-        self.size = self._check_shapes(path)
+        self.input_size = self._check_shapes(path)
 
     def detect(self, image: NDArray[np.uint8], floor: float) -> list[Detection]:
-        """Return the detections in an RGB image `(H, W, 3)`, most confident first.
+        """Return the detections with a confidence of at least `floor` in an RGB image `(H, W, 3)`.
 
-        Detections with a confidence below `floor` are left out.
+        The most confident detection is the first.
 
         Raises:
             Unavailable: onnxruntime failed.
@@ -74,11 +76,12 @@ class OnnxModel:
         return remove_duplicates(found)
 
     def _prepare(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
-        if image.shape[:2] != (self.size, self.size):
+        if image.shape[:2] != (self.input_size, self.input_size):
             image = np.asarray(
-                cv2.resize(image, (self.size, self.size), interpolation=cv2.INTER_LINEAR), dtype=np.uint8
+                cv2.resize(image, (self.input_size, self.input_size), interpolation=cv2.INTER_LINEAR),
+                dtype=np.uint8,
             )
-        normalized = (image.astype(np.float32) / 255 - MEAN) / STANDARD_DEVIATION
+        normalized = (image.astype(np.float32) / 255 - CHANNEL_MEAN) / CHANNEL_STD
         return np.ascontiguousarray(normalized.transpose(2, 0, 1)[None])
 
     def _decode(
@@ -96,21 +99,21 @@ class OnnxModel:
         return sorted(found, key=lambda detection: -detection.confidence)
 
     def _check_shapes(self, path: Path) -> int:
-        """Return the side of the input [pixel], after a check of all inputs and outputs."""
+        """Check names and shapes of inputs and outputs, and return the side of the input image [pixel]."""
         inputs = {node.name: node.shape for node in self._session.get_inputs()}
         outputs = {node.name: node.shape for node in self._session.get_outputs()}
         if list(inputs) != ["input"] or not {"dets", "labels"} <= set(outputs):
             raise InputError(
-                f"{path} is no exported RF-DETR: it takes {', '.join(inputs)} and gives "
-                f"{', '.join(outputs)}, where input, dets and labels were expected"
+                f"{path} is not an exported RF-DETR model: it has the inputs {', '.join(inputs)} and the "
+                f"outputs {', '.join(outputs)}; expected are the input input and the outputs dets and labels"
             )
         size, classes = inputs["input"][-1], outputs["labels"][-1]
         if not isinstance(size, int):
-            raise InputError(f"{path} has an input of variable size; export it with a fixed one")
+            raise InputError(f"{path} has an input of variable size; export it with a fixed size")
         if classes != len(self.labels) + 1:
             raise InputError(
-                f"{path} has {classes - 1} classes and {len(self.labels)} labels were given: "
-                f"{', '.join(self.labels)}; give one label per class, in the model's order"
+                f"{path} has {classes - 1} classes, but there are {len(self.labels)} labels: "
+                f"{', '.join(self.labels)}; give one label per class, in the order of the model"
             )
         return size
 
@@ -127,12 +130,14 @@ def read_labels(path: Path) -> tuple[str, ...]:
         InputError: The file does not exist, is not a text file, or is empty.
     """
     if not path.is_file():
-        raise InputError(f"there is no label file {path}; it has one class name a line, in the model's order")
+        raise InputError(
+            f"there is no label file {path}; it needs one class name per line, in the order of the model"
+        )
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"the label file {path} cannot be read: {error}") from error
     names = tuple(line.strip() for line in lines if line.strip())
     if not names:
-        raise InputError(f"the label file {path} is empty; it has one class name a line")
+        raise InputError(f"the label file {path} is empty; it needs one class name per line")
     return names

@@ -12,14 +12,15 @@ from executive.errors import InputError
 from executive.perception.detectors.setting import ClosableDetector, DetectorSetting
 from executive.plugins import PluginEntry, list_entries
 
-GROUP = "executive.detectors"
-FAKE_ERROR_RATES = frozenset({"miss_rate", "confusion_rate", "false_detections", "jitter"})
-"""Keys of the error rates that only the section of a fake detector may have."""
+DETECTOR_GROUP = "executive.detectors"
+"""Entry-point group of kinds of detectors."""
+FAKE_ERROR_RATE_KEYS = frozenset({"miss_rate", "confusion_rate", "false_detections", "jitter"})
+"""Keys of error rates; only the section of a fake detector may contain them."""
 
 
 def find_detector_kinds() -> dict[str, PluginEntry]:
     """Return the installed kinds of detectors by name."""
-    return list_entries(GROUP, "kind of detector")
+    return list_entries(DETECTOR_GROUP, "kind of detector")
 
 
 def build_detectors(
@@ -28,9 +29,9 @@ def build_detectors(
     """Return the detectors of a cell file by name, in its order.
 
     Args:
-        configs: The detectors section of the cell file.
+        configs: The section `detectors` of the cell file.
         camera: The camera whose frames the detectors search.
-        clock: Clock of the run, for the times at which answers become visible.
+        clock: Clock of the run, which determines when answers become available.
         base: Folder to which paths in options are relative.
         seed: Random seed of the detectors.
 
@@ -66,7 +67,7 @@ def build_detectors(
 
 
 def find_problems(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key in the cell file and an error message for each reason why a detector cannot be built.
+    """Yield the key in the cell file and an error message for each error that prevents a detector.
 
     A kind may check its options in a static method `check(config, base, others)`, where `others` are the
     sections of all detectors of the cell. No model is loaded.
@@ -77,8 +78,8 @@ def find_problems(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator
             yield ("detectors", name, "kind"), _describe_missing_kind(name, config.kind, kinds)
             continue
         kind = kinds[config.kind].load()
-        measured = FAKE_ERROR_RATES if not getattr(kind, "is_fake", False) else frozenset()
-        for key in sorted(measured & config.model_fields_set):
+        forbidden_keys = FAKE_ERROR_RATE_KEYS if not getattr(kind, "is_fake", False) else frozenset()
+        for key in sorted(forbidden_keys & config.model_fields_set):
             remedy = "remove the key and run `executive evaluate --cell` with this cell"
             yield ("detectors", name, key), f"error rates of this kind of detector are measured; {remedy}"
         check = getattr(kind, "check", None)
@@ -86,17 +87,19 @@ def find_problems(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator
             yield ("detectors", name, option), message
 
 
-def find_known_labels(configs: Mapping[str, DetectorConfig], base: Path) -> dict[str, tuple[str, ...] | None]:
-    """Return the labels of the classes that each detector of a cell file finds, None if unknown.
+def find_detectable_labels(
+    configs: Mapping[str, DetectorConfig], base: Path
+) -> dict[str, tuple[str, ...] | None]:
+    """Return, by detector of a cell file, the labels of the classes that it can find; None if unknown.
 
-    A kind may return them from a static method `labels(config, base)`. No model is loaded.
+    A kind of detector may have a static method `labels(config, base)` that returns them. No model is loaded.
     """
     kinds = find_detector_kinds()
-    known: dict[str, tuple[str, ...] | None] = {}
+    labels: dict[str, tuple[str, ...] | None] = {}
     for name, config in configs.items():
-        find = getattr(kinds[config.kind].load(), "labels", None) if config.kind in kinds else None
-        known[name] = find(config, base) if find else None
-    return known
+        find_labels = getattr(kinds[config.kind].load(), "labels", None) if config.kind in kinds else None
+        labels[name] = find_labels(config, base) if find_labels else None
+    return labels
 
 
 def _describe_missing_kind(name: str, kind: str, kinds: Mapping[str, PluginEntry]) -> str:

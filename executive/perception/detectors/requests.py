@@ -1,4 +1,4 @@
-"""Searches of frames in another thread, whose answers become visible at a time of the run."""
+"""Searches of frames in another thread, whose answers become available at defined times of the run."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from executive.cell.frame import Frame
 from executive.cell.protocols import Clock, Request
 from executive.errors import DeadlinePassed, Unavailable
 from executive.perception.detectors.setting import DetectorSetting
-from executive.perception.detectors.views import Part, list_parts
+from executive.perception.detectors.views import Region, list_regions
 
 MAX_BLOCKING_TIME = 0.05
-"""Longest uninterrupted wait for an overdue answer [s]; a second Ctrl-C ends the wait."""
+"""Maximum uninterrupted wait for an overdue answer [s]; a second Ctrl-C takes effect after it."""
 CLOCK_ROUNDING_ERROR = 1e-9
-"""Rounding error allowed in comparisons of two times on the clock [s]."""
+"""Maximum rounding error of a time on the clock [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ChangedRequest:
-    """Request whose answer is changed before it is returned; implements `executive.cell.protocols.Request`.
+    """Request with a changed answer; implements `executive.cell.protocols.Request`.
 
     Attributes:
-        request: The request.
-        change: Takes the answer and returns the changed one.
-        detector: Name of the detector, which is put before the text of an error; "" for no change.
+        request: The original request.
+        change: Function that returns the changed answer for the original answer.
+        detector: Name of the detector, which is inserted before error messages; "" for unchanged messages.
     """
 
     request: Request
@@ -60,38 +60,38 @@ class ChangedRequest:
 
 
 @dataclass(eq=False)
-class Pending:
-    """Search in progress; implements `executive.cell.protocols.Request`.
+class PendingSearch:
+    """Running search; implements `executive.cell.protocols.Request`.
 
     Attributes:
-        work: Future detections of the thread.
-        due: Time from which the answer is visible [s].
+        future: Future detections of the thread.
+        due_time: Time from which the answer is available [s].
         clock: Clock of the run.
         detector: Name of the detector.
         error_rates: Error rates of the detector.
-        expiry: Time from which a missed deadline is visible [s].
+        expiry_time: Time from which the error is available if the detector misses its deadline [s].
     """
 
-    work: Future[list[Detection]]
-    due: float
+    future: Future[list[Detection]]
+    due_time: float
     clock: Clock
     detector: str
     error_rates: ErrorRates
-    expiry: float = -math.inf
+    expiry_time: float = -math.inf
 
     @property
     def ready(self) -> bool:
-        """True from the control step at which the answer is due.
+        """True from `due_time`, or after a missed deadline from `expiry_time`.
 
-        At that control step the property waits for the thread, so that the time at which an answer becomes
-        visible does not depend on the computer's speed. A missed deadline is visible from `expiry`.
+        At `due_time`, this property waits for the thread, so that the time at which an answer becomes
+        available does not depend on the speed of the computer.
         """
-        if self.clock.now < self.due - CLOCK_ROUNDING_ERROR:
+        if self.clock.now < self.due_time - CLOCK_ROUNDING_ERROR:
             return False
-        while not self.work.done():
-            wait([self.work], MAX_BLOCKING_TIME)
-        is_late = isinstance(self.work.exception(), DeadlinePassed)
-        return not is_late or self.clock.now >= self.expiry - CLOCK_ROUNDING_ERROR
+        while not self.future.done():
+            wait([self.future], MAX_BLOCKING_TIME)
+        is_late = isinstance(self.future.exception(), DeadlinePassed)
+        return not is_late or self.clock.now >= self.expiry_time - CLOCK_ROUNDING_ERROR
 
     def result(self) -> Answer:
         """Return the answer of the detector.
@@ -101,41 +101,41 @@ class Pending:
         """
         if not self.ready:
             raise RuntimeError(
-                f"the answer is due at {self.due:.3f} s, and the time is {self.clock.now:.3f} s; "
+                f"the answer is due at {self.due_time:.3f} s, and the time is {self.clock.now:.3f} s; "
                 "wait until `ready` is true"
             )
-        return Answer(self.detector, tuple(self.work.result()), self.error_rates)
+        return Answer(self.detector, tuple(self.future.result()), self.error_rates)
 
 
 class ThreadedDetector:
-    """Detector that searches in its own thread, beside the control loop; base of `ClosableDetector`s.
+    """Base class of detectors that search in their own thread; implements `ClosableDetector`.
 
     Args:
-        config: Threshold, floor and latency.
-        setting: Parts of the run that the detector needs.
-        deadline: Time from a request until a missed deadline is visible [s].
+        config: Section of the detector in the cell file.
+        setting: Parts of the cell and of the run that the detector uses.
+        deadline: Time after a request from which the error of a missed deadline is available [s].
     """
 
     def __init__(self, config: DetectorConfig, setting: DetectorSetting, deadline: float = -math.inf) -> None:
         self._config, self._setting, self._deadline = config, setting, deadline
         self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
 
-    def request(self, frame: Frame, view: str) -> Pending:
-        """Start a search of the `table` part of a frame or of the `full` image."""
-        parts = self._parts(view, frame.image.shape[1::-1])
-        work = self._thread.submit(lambda: self._search(frame.image, parts))
+    def request(self, frame: Frame, view: str) -> PendingSearch:
+        """Start to search a view of a frame: `table` (the workspace) or `full` (the whole image)."""
+        regions = self._list_regions(view, frame.image.shape[1::-1])
+        future = self._thread.submit(lambda: self._search(frame.image, regions))
         clock, config = self._setting.clock, self._config
-        due, expiry = clock.now + config.latency, clock.now + self._deadline
-        return Pending(work, due, clock, self._setting.name, config.error_rates, expiry)
+        due_time, expiry_time = clock.now + config.latency, clock.now + self._deadline
+        return PendingSearch(future, due_time, clock, self._setting.name, config.error_rates, expiry_time)
 
     def close(self) -> None:
-        """End the thread after the search in progress; waiting searches are cancelled."""
+        """End the thread after the running search; cancel all searches that have not started."""
         self._thread.shutdown(cancel_futures=True)
 
-    def _parts(self, view: str, size: tuple[int, ...]) -> list[Part]:
-        """Return the parts of a frame to search, for a view and the width and height of the frame [pixel]."""
-        return list_parts(view, self._setting.camera.table_view, (size[0], size[1]))
+    def _list_regions(self, view: str, size: tuple[int, ...]) -> list[Region]:
+        """Return the regions to search for a view; `size` is the width and height of the image [pixel]."""
+        return list_regions(view, self._setting.camera.table_view, (size[0], size[1]))
 
-    def _search(self, image: NDArray[np.uint8], parts: Sequence[Part]) -> list[Detection]:
-        """Return the objects in the parts of a frame, most confident first; runs in the thread."""
+    def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
+        """Return the detections in the regions of an image, most confident first; runs in the thread."""
         raise NotImplementedError

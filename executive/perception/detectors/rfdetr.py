@@ -18,12 +18,12 @@ from executive.perception.detectors.onnx_model import OnnxModel, describe_missin
 from executive.perception.detectors.requests import ThreadedDetector
 from executive.perception.detectors.setting import (
     DetectorSetting,
-    OptionFaults,
+    OptionErrors,
     find_wrong_class_map,
     find_wrong_options,
     read_options,
 )
-from executive.perception.detectors.views import Part, search_parts
+from executive.perception.detectors.views import Region, search_regions
 
 
 class RfdetrOptions(Section):
@@ -34,12 +34,12 @@ class RfdetrOptions(Section):
     labels: tuple[str, ...] | str
     """Class names in the order of the model's outputs, or the path of a text file with one name per line."""
     class_map: dict[str, str] = Field(default_factory=dict)
-    """Class names of the cell by those of the model, for names that differ."""
+    """Class names of the cell by class names of the model, if the names differ."""
     threads: int = Field(2, ge=1, le=64)
     """Maximum number of threads of one inference."""
 
     def read_names(self, base: Path) -> tuple[str, ...]:
-        """Return the model's class names; `base` is the folder to which paths are relative.
+        """Return the class names of the model; `base` is the folder to which paths are relative.
 
         Raises:
             InputError: The text file cannot be read.
@@ -48,13 +48,13 @@ class RfdetrOptions(Section):
 
 
 class RfdetrDetector(ThreadedDetector):
-    """Runs a model on parts of a frame, beside the control loop; implements `cell.protocols.Detector`.
+    """Runs a model on regions of a frame in a thread; implements `cell.protocols.Detector`.
 
     Args:
         model: The model.
-        config: Threshold, floor and latency.
+        config: Section of the detector in the cell file.
         setting: Parts of the cell and of the run that the detector uses.
-        class_map: Class names of the cell by those of the model, for names that differ.
+        class_map: Class names of the cell by class names of the model, if the names differ.
     """
 
     def __init__(
@@ -84,8 +84,8 @@ class RfdetrDetector(ThreadedDetector):
         return cls(model, config, setting, options.class_map)
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
-        """Yield each option that prevents the construction of the detector, with an error message.
+    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
+        """Yield each missing, unknown or invalid option, with an error message.
 
         The model is not loaded.
         """
@@ -106,7 +106,7 @@ class RfdetrDetector(ThreadedDetector):
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
-        """Return the cell's names of the classes that the model finds; None if the options are invalid."""
+        """Return the class names of the cell that the model can find; None if the options are invalid."""
         try:
             options = read_options(RfdetrOptions, config)
             return tuple(options.class_map.get(name, name) for name in options.read_names(base))
@@ -115,25 +115,26 @@ class RfdetrDetector(ThreadedDetector):
 
     @staticmethod
     def weights(config: DetectorConfig, base: Path) -> Path | None:
-        """Return the path of the model file, None if the options do not name it."""
+        """Return the path of the model file; None if the options are invalid."""
         try:
             return base / read_options(RfdetrOptions, config).model_path
         except InputError:
             return None
 
-    def _search(self, image: NDArray[np.uint8], parts: Sequence[Part]) -> list[Detection]:
-        return search_parts(image, parts, self._find, self._class_map)
+    def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
+        return search_regions(image, regions, self._find_in_crop, self._class_map)
 
-    def _find(self, crop: NDArray[np.uint8]) -> list[Detection]:
-        """Return the detections in a part of a frame, with boxes in pixels of the part."""
+    def _find_in_crop(self, crop: NDArray[np.uint8]) -> list[Detection]:
+        """Return the detections in a crop of a frame, with boxes in pixels of the crop."""
         height, width = crop.shape[:2]
-        size = self._model.size
+        size = self._model.input_size
         if height <= size or width <= size:
             return self._model.detect(crop, self._config.floor)
         # Area averaging uses all pixels and does not move edges; bilinear resizing would skip pixels.
-        small = np.asarray(cv2.resize(crop, (size, size), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        x, y = width / size, height / size
+        small_crop = np.asarray(cv2.resize(crop, (size, size), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        scale_x, scale_y = width / size, height / size
         return [
-            replace(one, box=(one.box[0] * x, one.box[1] * y, one.box[2] * x, one.box[3] * y))
-            for one in self._model.detect(small, self._config.floor)
+            replace(each, box=(left * scale_x, top * scale_y, right * scale_x, bottom * scale_y))
+            for each in self._model.detect(small_crop, self._config.floor)
+            for left, top, right, bottom in [each.box]
         ]

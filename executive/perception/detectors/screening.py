@@ -1,6 +1,6 @@
-"""Screening of detector answers: their validity, and the visibility, label and confidence of each box.
+"""Screening of the answers of detectors: validity, visibility, labels and confidences of the boxes.
 
-The answers of every kind of detector go through `screen` before a skill reads them.
+Every answer of every kind of detector is screened before a skill reads it.
 """
 
 from __future__ import annotations
@@ -14,34 +14,34 @@ from executive.cell.protocols import Detector
 from executive.errors import Crowded, Unavailable
 from executive.perception.detectors.requests import ChangedRequest
 
-MIN_VISIBLE_SHARE = 0.7
-"""Smallest visible share of a box that counts; the arm may hide the rest."""
+MIN_VISIBLE_FRACTION = 0.7
+"""Minimum fraction of a box that the arm must not occlude; other boxes are ignored."""
 MAX_BOXES = 60
-"""Largest number of boxes in one answer, doubtful ones and unknown labels included. Shipped cells hold at
-most 20 objects, and the time to match boxes with items grows faster than their number."""
-MAX_PIXEL = 1e5
-"""Largest valid coordinate of a box [pixel]: no image is larger, and the squares of much larger coordinates
+"""Maximum number of boxes in one answer, including doubtful boxes and unknown labels. Shipped cells have at
+most 20 objects, and the time for the assignment of boxes to items grows more than linearly."""
+MAX_COORDINATE = 1e5
+"""Maximum absolute coordinate of a box [pixel]: images are smaller, and squares of much larger coordinates
 overflow."""
-MAX_LABEL = 100
-"""Largest number of characters of a label: it appears in messages and on the terminal."""
-MAX_SECOND_RATIO = 0.5
-"""Largest ratio of the second to the first class confidence at which a detection counts."""
+MAX_LABEL_LENGTH = 100
+"""Maximum number of characters of a label, which appears in messages and on the terminal."""
+MAX_RIVAL_RATIO = 0.5
+"""Maximum ratio of the confidences of second and first class of a detection that is not doubtful."""
 
 
-def screen(answer: Answer, frame: Frame, view: str, labels: Collection[str]) -> Answer:
-    """Return an answer whose detections are divided into found, doubtful and unknown ones.
+def screen_answer(answer: Answer, frame: Frame, view: str, labels: Collection[str]) -> Answer:
+    """Return an answer with its detections divided into `found`, `doubtful` and `unknown`.
 
-    Boxes that the arm hides are left out, and so are detections of unknown labels below the threshold.
+    Boxes that the arm occludes, and detections with unknown labels below the threshold, are omitted.
 
     Args:
         answer: Answer with all detections in `found`.
-        frame: The searched image.
-        view: Searched part of the image, for an error message.
-        labels: Class names that the cell knows.
+        frame: The searched frame.
+        view: Name of the searched region, for an error message.
+        labels: Class names in the cell file.
 
     Raises:
-        Crowded: There are more boxes than there can be objects.
-        Unavailable: A box, a confidence or a label is impossible.
+        Crowded: There are more than `MAX_BOXES` boxes.
+        Unavailable: A box, a confidence or a label is invalid.
     """
     if len(answer.found) > MAX_BOXES:
         raise Crowded(
@@ -51,11 +51,11 @@ def screen(answer: Answer, frame: Frame, view: str, labels: Collection[str]) -> 
         )
     if invalid := next((one for one in answer.found if not _is_valid(one)), None):
         raise Unavailable(
-            f"detector {answer.detector} gave an invalid box: {invalid.label[:MAX_LABEL]!r} "
+            f"detector {answer.detector} returned an invalid box: {invalid.label[:MAX_LABEL_LENGTH]!r} "
             f"{invalid.confidence:g} at {invalid.box}"
         )
     threshold = answer.error_rates.threshold
-    visible = [one for one in answer.found if frame.compute_visible_fraction(one.box) >= MIN_VISIBLE_SHARE]
+    visible = [one for one in answer.found if frame.compute_visible_fraction(one.box) >= MIN_VISIBLE_FRACTION]
     known = [one for one in visible if one.label in labels]
     return replace(
         answer,
@@ -71,8 +71,8 @@ class ScreenedDetector:
 
     Attributes:
         detector: The detector.
-        name: Its name in the cell file.
-        labels: Class names that the cell knows.
+        name: Name of the detector in the cell file.
+        labels: Class names in the cell file.
     """
 
     detector: Detector
@@ -80,26 +80,30 @@ class ScreenedDetector:
     labels: Collection[str]
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Start to search `frame`: the `table` part or the `full` image."""
+        """Start to search a view of a frame: `table` (the workspace) or `full` (the whole image)."""
         request = self.detector.request(frame, view)
-        return ChangedRequest(request, lambda answer: screen(answer, frame, view, self.labels), self.name)
+        return ChangedRequest(
+            request, lambda answer: screen_answer(answer, frame, view, self.labels), self.name
+        )
 
 
-def screen_detectors(detectors: Mapping[str, Detector], labels: Collection[str]) -> dict[str, Detector]:
-    """Return the detectors of a cell by name, with screened answers; `labels` are the classes it knows."""
+def make_screened_detectors(
+    detectors: Mapping[str, Detector], labels: Collection[str]
+) -> dict[str, Detector]:
+    """Return detectors with screened answers, by name; `labels` are the class names in the cell file."""
     return {name: ScreenedDetector(detector, name, labels) for name, detector in detectors.items()}
 
 
 def _is_confident(detection: Detection, threshold: float) -> bool:
-    """Return True if a detection is confident enough, and its second class at most half as likely."""
+    """Return True if a detection is confident enough, and its second class is at most half as likely."""
     confidence = detection.confidence
-    return confidence >= threshold and detection.rival <= MAX_SECOND_RATIO * confidence
+    return confidence >= threshold and detection.rival <= MAX_RIVAL_RATIO * confidence
 
 
 def _is_valid(detection: Detection) -> bool:
-    """Return True if a detection has a possible box, a possible confidence and a printable label."""
+    """Return True if a detection has a valid box, a valid confidence and a printable label."""
     left, top, right, bottom = detection.box
-    # The comparisons are False for numbers that are not finite.
-    is_in_range = all(abs(edge) <= MAX_PIXEL for edge in detection.box)
-    is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL
+    # All comparisons with NaN are False.
+    is_in_range = all(abs(edge) <= MAX_COORDINATE for edge in detection.box)
+    is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL_LENGTH
     return is_in_range and left <= right and top <= bottom and 0 <= detection.confidence <= 1 and is_printable

@@ -1,4 +1,4 @@
-"""Settings of a detector: the parts of the run that it uses, and the options of its kind."""
+"""Inputs of a detector: parts of the cell and of the run, and the options of its kind."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from executive.cell.config import CameraConfig, DetectorConfig, Section
 from executive.cell.protocols import Clock, Detector
 from executive.errors import InputError
 
-OptionFaults = Iterator[tuple[str, str]]
-"""Missing, unknown or invalid options of a detector, each with an error message."""
+OptionErrors = Iterator[tuple[str, str]]
+"""Names of missing, unknown or invalid options of a detector, each with an error message."""
 OptionsT = TypeVar("OptionsT", bound=Section)
 
 
@@ -23,7 +23,7 @@ class ClosableDetector(Detector, Protocol):
     """A detector that holds resources, such as a thread, until it is closed."""
 
     def close(self) -> None:
-        """Wait for the search in progress and release the resources."""
+        """Wait for the running search, then release all resources."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,10 @@ class DetectorSetting:
     Attributes:
         name: Name of the detector in the cell file.
         camera: The camera whose frames the detector searches.
-        clock: Clock of the run, for the times at which answers become visible.
+        clock: Clock of the run, which determines when answers become available.
         base: Folder to which paths in options are relative.
         seed: Random seed of the detector.
-        other: Builds or returns another detector of the cell by name; the caller must not close it.
+        get_detector: Function that returns another detector of the cell by name, which must not be closed.
     """
 
     name: str
@@ -44,46 +44,46 @@ class DetectorSetting:
     clock: Clock
     base: Path
     seed: int
-    other: Callable[[str], Detector]
+    get_detector: Callable[[str], Detector]
 
 
-def find_wrong_options(options: type[Section], config: DetectorConfig) -> OptionFaults:
-    """Yield each missing, unknown or invalid option of a kind of detector, with an error message."""
+def find_wrong_options(options: type[Section], config: DetectorConfig) -> OptionErrors:
+    """Yield each missing, unknown or invalid option in the section of a detector, with an error message."""
     try:
         options.model_validate(config.options)
     except ValidationError as error:
         known = ", ".join(options.model_fields) or "none"
         problems: dict[str, ErrorDetails] = {}
-        for problem in error.errors():  # One per type if a value has none of several types.
+        for problem in error.errors():  # An option of several types has an error for each type.
             problems.setdefault(str(problem["loc"][0]), problem)
         for option, problem in problems.items():
             place = ".".join(map(str, problem["loc"]))
             yield (
                 option,
                 f'option "{place}" of a detector of kind {config.kind}: {problem["msg"].lower()}; '
-                f"its options: {known}",
+                f"the options are {known}",
             )
 
 
 def read_options(options: type[OptionsT], config: DetectorConfig) -> OptionsT:
-    """Validate and return the options of a kind of detector.
+    """Validate and return the options in the section of a detector.
 
     Raises:
         InputError: An option is missing, unknown or invalid.
     """
-    for _, sentence in find_wrong_options(options, config):
-        raise InputError(sentence)
+    for _, message in find_wrong_options(options, config):
+        raise InputError(message)
     return options.model_validate(config.options)
 
 
 def find_wrong_class_map(
     config: DetectorConfig, class_map: Mapping[str, str], labels: Collection[str]
-) -> OptionFaults:
-    """Yield the option `class_map` and an error message if it names a class unknown to the model."""
+) -> OptionErrors:
+    """Yield the option `class_map` with an error message if it has a class that the model lacks."""
     unknown = [name for name in class_map if name not in labels]
     if unknown:
         yield (
             "class_map",
-            f"class_map of a detector of kind {config.kind} names {', '.join(unknown)}, which the model "
-            f"does not know; it knows {', '.join(labels)}",
+            f"class_map of a detector of kind {config.kind} contains {', '.join(unknown)}, which the model "
+            f"cannot find; the classes of the model are {', '.join(labels)}",
         )

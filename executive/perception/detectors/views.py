@@ -1,4 +1,4 @@
-"""Parts of a frame for a search by a detector, and the merging of the detections of all parts."""
+"""Regions of an image for the search by a detector, and merging of the detections in all regions."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ from executive.cell.detection import Detection
 from executive.cell.frame import Box
 from executive.errors import InputError
 
-Part = tuple[int, int, int, int]
-"""Left, top, right, bottom [pixel] of a part of an image."""
+Region = tuple[int, int, int, int]
+"""Left, top, right and bottom side [pixel] of a region of an image."""
 
 TILE_OVERLAP = 0.25
-"""Overlap of neighbouring tiles, as a share of the side; larger than any object."""
-MAX_CUT_DISTANCE = 0.01
-"""Largest distance from a border of the tile, as a share of the side, at which a box may be cut off."""
+"""Minimum overlap of neighbouring tiles, as a fraction of their side; larger than any object."""
+MAX_TRUNCATION_DISTANCE = 0.01
+"""Maximum distance, as a fraction of the width of the region, of a truncated box from its border."""
 MIN_DUPLICATE_IOU = 0.7
-"""Intersection over union above which two boxes show one object; touching objects stay below this value."""
-MIN_SAME_IOU, MIN_CONTAINED_SHARE = 0.5, 0.7
-"""Intersection over union, or over the smaller box, above which boxes of two tiles show one object."""
+"""Minimum intersection over union of two boxes of one object; it is lower for touching objects."""
+MIN_SAME_IOU, MIN_CONTAINED_FRACTION = 0.5, 0.7
+"""Minimum intersection over union, or over the smaller box, of boxes of one object in two tiles."""
 
 
 @dataclass(frozen=True)
-class ViewDetection:
-    """A detection and the searched part of the frame.
+class RegionDetection:
+    """A detection and the searched region of the image.
 
     Attributes:
-        detection: Detection with the box in pixels of the frame.
-        part: Part of the frame that contains the detection.
+        detection: Detection with the box in pixels of the image.
+        region: Region in which the object was detected.
     """
 
     detection: Detection
-    part: Part
+    region: Region
 
 
-def list_parts(view: str, table_view: Part, size: tuple[int, int]) -> list[Part]:
-    """Return the parts of a frame to search.
+def list_regions(view: str, table_view: Region, size: tuple[int, int]) -> list[Region]:
+    """Return the regions of an image to search for a view.
 
     Args:
-        view: `table`, the square that shows the workspace, or `full`, tiles of that size over the frame.
-        table_view: Square that shows the workspace [pixel].
-        size: Width and height of the frame [pixel].
+        view: `table`, the region `table_view`, or `full`, tiles of the same size that cover the image.
+        table_view: Square region that shows the workspace.
+        size: Width and height of the image [pixel].
 
     Raises:
         InputError: The view is unknown.
@@ -53,7 +53,7 @@ def list_parts(view: str, table_view: Part, size: tuple[int, int]) -> list[Part]
     if view == "table":
         return [table_view]
     if view != "full":
-        raise InputError(f'a frame has no view "{view}"; there are table and full')
+        raise InputError(f'there is no view "{view}"; the views are table and full')
     side = table_view[2] - table_view[0]
     columns, rows = (_list_tile_starts(length, side) for length in size)
     return [
@@ -61,48 +61,48 @@ def list_parts(view: str, table_view: Part, size: tuple[int, int]) -> list[Part]
     ]
 
 
-def search_parts(
+def search_regions(
     image: NDArray[np.uint8],
-    parts: Sequence[Part],
-    find: Callable[[NDArray[np.uint8]], Iterable[Detection]],
+    regions: Sequence[Region],
+    detect: Callable[[NDArray[np.uint8]], Iterable[Detection]],
     class_map: Mapping[str, str],
 ) -> list[Detection]:
-    """Return the detections in parts of a frame, one per object, most confident first.
+    """Return the detections in regions of an image, one per object, most confident first.
 
     Args:
-        image: The frame `(H, W, 3)`, RGB.
-        parts: The parts to search.
-        find: Function that returns the detections in a part, with boxes in pixels of the part.
-        class_map: Class names of the cell by class names of `find`, if the names differ.
+        image: The image `(H, W, 3)`, RGB.
+        regions: The regions to search.
+        detect: Function that returns the detections in a crop, with boxes in pixels of the crop.
+        class_map: Class names of the cell by class names from `detect`, if the names differ.
     """
-    findings = []
-    for part in parts:
-        left, top, right, bottom = part
-        for found in find(image[top:bottom, left:right]):
-            x0, y0, x1, y1 = found.box
+    found = []
+    for region in regions:
+        left, top, right, bottom = region
+        for detection in detect(image[top:bottom, left:right]):
+            x0, y0, x1, y1 = detection.box
             box = left + x0, top + y0, left + x1, top + y1
-            label = class_map.get(found.label, found.label)
-            findings.append(ViewDetection(replace(found, label=label, box=box), part))
-    return merge_findings(findings, (image.shape[1], image.shape[0]))
+            label = class_map.get(detection.label, detection.label)
+            found.append(RegionDetection(replace(detection, label=label, box=box), region))
+    return merge_detections(found, (image.shape[1], image.shape[0]))
 
 
-def merge_findings(findings: Sequence[ViewDetection], size: tuple[int, int]) -> list[Detection]:
+def merge_detections(found: Sequence[RegionDetection], size: tuple[int, int]) -> list[Detection]:
     """Return one detection per object, most confident first.
 
-    If parts overlap, a box inside its part takes precedence over a box that the border of the part cuts off,
-    then the more confident box over the less confident box.
+    Of several boxes of one object in overlapping regions, a box that is not truncated by the border of its
+    region is preferred, then the more confident box.
 
     Args:
-        findings: Detections of all parts.
-        size: Width and height of the frame [pixel].
+        found: Detections in all regions.
+        size: Width and height of the image [pixel].
     """
-    ranked = sorted(findings, key=lambda finding: (_is_cut(finding, size), -finding.detection.confidence))
-    is_same = _find_same_objects([finding.detection.box for finding in ranked])
+    ranked = sorted(found, key=lambda each: (_is_truncated(each, size), -each.detection.confidence))
+    is_same = _find_same_objects([each.detection.box for each in ranked])
     kept: list[int] = []
-    for number, finding in enumerate(ranked):
-        if not any(is_same[number, other] and finding.part != ranked[other].part for other in kept):
-            kept.append(number)
-    return sorted((ranked[number].detection for number in kept), key=lambda found: -found.confidence)
+    for index, each in enumerate(ranked):
+        if not any(is_same[index, other] and each.region != ranked[other].region for other in kept):
+            kept.append(index)
+    return sorted((ranked[index].detection for index in kept), key=lambda detection: -detection.confidence)
 
 
 def remove_duplicates(found: Sequence[Detection]) -> list[Detection]:
@@ -111,38 +111,38 @@ def remove_duplicates(found: Sequence[Detection]) -> list[Detection]:
         return list(found)
     from supervision import box_non_max_suppression
 
-    # Ranks replace the confidences, so that the first of equally confident detections is kept.
+    # Ranks are used instead of confidences, so that the first of equally confident detections is kept.
     ranked = np.array([(*detection.box, -rank) for rank, detection in enumerate(found)])
     keep = box_non_max_suppression(ranked, MIN_DUPLICATE_IOU)
     return [detection for detection, is_kept in zip(found, keep, strict=True) if is_kept]
 
 
 def _find_same_objects(boxes: Sequence[Box]) -> NDArray[np.bool_]:
-    """Return an `(N, N)` matrix, True for each pair of boxes that shows one object, cut off or not."""
+    """Return a matrix `(N, N)` that is True for each pair of boxes of one object, truncated or not."""
     if len(boxes) < 2:
         return np.zeros((len(boxes), len(boxes)), dtype=np.bool_)
     from supervision import OverlapMetric, box_iou_batch
 
     corners = np.array(boxes)
-    contained = box_iou_batch(corners, corners, OverlapMetric.IOS) > MIN_CONTAINED_SHARE
+    contained = box_iou_batch(corners, corners, OverlapMetric.IOS) > MIN_CONTAINED_FRACTION
     return np.asarray((box_iou_batch(corners, corners) > MIN_SAME_IOU) | contained)
 
 
-def _is_cut(finding: ViewDetection, size: tuple[int, int]) -> bool:
-    """Return True if a box reaches a border of its part that is not a border of the frame."""
-    left, top, right, bottom = finding.detection.box
-    part = finding.part
-    margin = MAX_CUT_DISTANCE * (part[2] - part[0])
+def _is_truncated(found: RegionDetection, size: tuple[int, int]) -> bool:
+    """Return True if a box reaches a border of its region that is not a border of the image."""
+    left, top, right, bottom = found.detection.box
+    region = found.region
+    margin = MAX_TRUNCATION_DISTANCE * (region[2] - region[0])
     return (
-        (part[0] > 0 and left - part[0] < margin)
-        or (part[1] > 0 and top - part[1] < margin)
-        or (part[2] < size[0] and part[2] - right < margin)
-        or (part[3] < size[1] and part[3] - bottom < margin)
+        (region[0] > 0 and left - region[0] < margin)
+        or (region[1] > 0 and top - region[1] < margin)
+        or (region[2] < size[0] and region[2] - right < margin)
+        or (region[3] < size[1] and region[3] - bottom < margin)
     )
 
 
 def _list_tile_starts(length: int, side: int) -> list[int]:
-    """Return the first pixels of evenly spaced, overlapping tiles of width `side` that cover `length`."""
+    """Return the first pixels of evenly spaced tiles of width `side` that cover `length` pixels."""
     if length <= side:
         return [0]
     count = math.ceil((length - TILE_OVERLAP * side) / (side * (1 - TILE_OVERLAP)))

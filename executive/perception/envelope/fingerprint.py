@@ -1,4 +1,4 @@
-"""Fingerprint of a detector in its cell: the declared properties on which its errors depend."""
+"""Fingerprint of a detector in its cell: all declared properties that affect its error rates."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from executive.perception.camera_model import compute_calibration
 from executive.perception.detectors.registry import find_detector_kinds
 
 Fingerprint = Mapping[str, str]
-"""Text of each property by its name. A measurement applies to a detector if all texts are equal."""
+"""Value of each property as text, by name; a measurement applies to a detector if all values are equal."""
 
 
-def take_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerprint:
+def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerprint:
     """Return the fingerprint of a detector in its cell.
 
-    It contains the weights and settings of the detector, the localization method, the classes and their
-    sizes, and the pose, intrinsics, image size, `table_view` and depth settings of the camera. Bins, the
-    number of objects, light and colours are not part of it.
+    The fingerprint contains weights and settings of the detector, the localization method, the classes and
+    their sizes, and pose, intrinsics, image size, `table_view` and depth settings of the camera. It does not
+    contain bins, the number of objects, light and colours.
 
     Args:
-        config: The cell.
-        detector: Name of one of its detectors.
+        config: The cell file.
+        detector: Name of the detector in the cell file.
         base: Folder to which paths in the cell file are relative.
     """
     section = config.detectors[detector]
@@ -42,15 +42,15 @@ def take_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerpri
     }
 
 
-def describe_change(measured: Fingerprint, current: Fingerprint) -> str:
-    """Return the names of the properties that have changed since a measurement, or ""."""
+def describe_changes(measured: Fingerprint, current: Fingerprint) -> str:
+    """Return the names of the properties that differ between two fingerprints, or ""."""
     return ", ".join(
         name for name in dict.fromkeys([*measured, *current]) if measured.get(name) != current.get(name)
     )
 
 
 def _digest_weights(section: DetectorConfig, base: Path) -> str:
-    """Return a digest of a detector's model file, "" for a detector without one."""
+    """Return a digest of the model file of a detector; "" for a detector without a model file."""
     find_weights = getattr(find_detector_kinds()[section.kind].load(), "weights", None)
     path = find_weights(section, base) if find_weights else None
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path and path.is_file() else ""

@@ -17,7 +17,7 @@ from executive.perception.envelope.frame_statistics import FrameRange
 SUFFIX = ".measured.json"
 """Suffix of a measurement file; the name of the cell comes before it."""
 MAX_FILE_SIZE = 1_000_000
-"""Largest accepted size of a measurement file [byte]."""
+"""Maximum size of a measurement file [byte]."""
 
 
 class StoredErrorRates(Section):
@@ -31,12 +31,12 @@ class StoredErrorRates(Section):
     bias: float = Field(ge=0)
 
     def build_error_rates(self, threshold: float) -> ErrorRates:
-        """Return these rates with `threshold`, the confidence from which detections count."""
+        """Return these rates for a detector with `threshold` as the minimum confidence of its detections."""
         return ErrorRates(threshold, **self.model_dump())
 
 
 class ErrorCounts(Section):
-    """Numbers of objects and errors, for one class or one number of objects per scene."""
+    """Numbers of objects and errors, for one class or for scenes with one number of objects."""
 
     objects: int
     missed: int
@@ -50,9 +50,9 @@ class Measurement(Section):
     detector: str
     """Name of the detector in the cell."""
     fingerprint: dict[str, str]
-    """Declared properties on which its errors depend, by name."""
+    """Values of the properties that affect the error rates, by name (see `fingerprint.py`)."""
     command: str
-    """Command line that repeats the measurement."""
+    """Command line of the measurement."""
     seconds: float
     """Duration of the measurement [s]."""
     images: int
@@ -60,11 +60,11 @@ class Measurement(Section):
     """`miss_rate`, `confusion_rate`, `false_detections`: upper 95 % bounds; `repeated`: Laplace estimate;
     `jitter`, `bias`: standard deviations."""
     classes: dict[str, ErrorCounts]
-    """Errors by class; a false detection counts for the class that it was given."""
+    """Errors by class; a false detection counts for the class that the detector reported."""
     counts: dict[str, ErrorCounts]
-    """Errors by the number of objects in the scene."""
+    """Errors by number of objects in the scene."""
     frames: FrameRange | None
-    """Ranges of the statistics of the frames; None if no frame showed the whole workspace."""
+    """Ranges of the statistics of the measured frames; None if no frame showed the whole workspace."""
 
 
 class MeasurementFile(Section):
@@ -75,7 +75,7 @@ class MeasurementFile(Section):
 
 
 def read_measurements(path: Path) -> tuple[Measurement, ...]:
-    """Return the measurements in a file; empty if there is no such file.
+    """Return the measurements in a file; no measurements if the file does not exist.
 
     Raises:
         InputError: The file cannot be read or is invalid.
@@ -95,7 +95,7 @@ def read_measurements(path: Path) -> tuple[Measurement, ...]:
 
 def format_measurements(measurements: Iterable[Measurement], new: Measurement) -> str:
     """Return the text of a measurement file in which `new` replaces the measurement of its detector."""
-    others = [one for one in measurements if one.detector != new.detector]
-    ordered = sorted((*others, new), key=lambda one: one.detector)
+    others = [each for each in measurements if each.detector != new.detector]
+    ordered = sorted((*others, new), key=lambda each: each.detector)
     content = MeasurementFile(measurements=tuple(ordered)).model_dump(mode="json")
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"

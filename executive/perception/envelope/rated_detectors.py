@@ -1,4 +1,4 @@
-"""Detectors of a cell that report their error rates: measured, or assumed if no measurement applies."""
+"""Detectors of a cell with their error rates, which are measured, or assumed without a measurement."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from executive.errors import InputError
 from executive.perception.detectors.registry import build_detectors, find_detector_kinds
 from executive.perception.detectors.requests import ChangedRequest
 from executive.perception.detectors.setting import ClosableDetector
-from executive.perception.envelope.fingerprint import describe_change, take_fingerprint
-from executive.perception.envelope.frame_statistics import FrameRange, measure_frame
+from executive.perception.envelope.fingerprint import compute_fingerprint, describe_changes
+from executive.perception.envelope.frame_statistics import FrameRange, compute_frame_statistics
 from executive.perception.envelope.measurement import SUFFIX, Measurement, read_measurements
 
-FAKE = "fake"
-"""Kind of cell whose detectors are not measured: they know which objects there are."""
+FAKE_KIND = "fake"
+"""Kind of cell whose detectors are not measured, because they read the true positions of the objects."""
 MEASURING_MINUTES = 2
-"""Usual duration of a measurement on two cores [min]."""
+"""Typical duration of a measurement on two cores [min]."""
 
 
 @dataclass(frozen=True)
 class DetectorEnvelope:
-    """Error rates of one detector and the conditions for them.
+    """Error rates of one detector, and the measured conditions to which they apply.
 
     Attributes:
-        error_rates: Measured error rates, or assumed ones if `error_rates.doubt` is not "".
-        frame_range: Measured ranges of the frame statistics; None if unknown or if no measurement applies.
+        error_rates: Measured error rates, or assumed error rates if `error_rates.doubt` is not "".
+        frame_range: Ranges of the frame statistics in the measurement; None if unknown or not measured.
     """
 
     error_rates: ErrorRates
@@ -43,8 +43,8 @@ class RatedDetector:
 
     Attributes:
         detector: The detector.
-        envelope: Its error rates and the conditions for them.
-        config: Its cell; the image of the workspace is compared with the measured frames.
+        envelope: Error rates of the detector, and the measured conditions.
+        config: The cell file, which declares the workspace.
         name: Name of the detector.
     """
 
@@ -54,17 +54,17 @@ class RatedDetector:
     name: str
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Start to search `frame`; rates are assumed if the frame lies outside the measured ranges."""
+        """Start to search a frame; outside the measured conditions, the answer has assumed error rates."""
         error_rates, frame_range = self.envelope.error_rates, self.envelope.frame_range
-        statistics = measure_frame(frame, self.config.table) if frame_range else None
+        statistics = compute_frame_statistics(frame, self.config.table) if frame_range else None
         if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
             reason = (
-                f"the workspace looks different from all images that detector {self.name} was measured on: "
+                f"the workspace differs from all images with which detector {self.name} was measured: "
                 f"{difference}; {advise_measuring(self.config)}"
             )
             error_rates = assume_rates(error_rates.threshold, reason)
-        asked = self.detector.request(frame, view)
-        return ChangedRequest(asked, lambda answer: replace(answer, error_rates=error_rates))
+        request = self.detector.request(frame, view)
+        return ChangedRequest(request, lambda answer: replace(answer, error_rates=error_rates))
 
     def close(self) -> None:
         """Close the detector."""
@@ -77,11 +77,11 @@ def build_rated_detectors(
     """Return the detectors of a cell by name, in the order of the cell file, with their error rates.
 
     Args:
-        config: The cell.
+        config: The cell file.
         clock: Clock of the run.
         base: Folder to which paths in the cell file are relative.
         seed: Random seed of the detectors.
-        folders: Folders with files `CELL.measured.json`.
+        folders: Folders with measurement files `CELL.measured.json`.
 
     Raises:
         InputError: A detector cannot be built.
@@ -90,69 +90,69 @@ def build_rated_detectors(
     built = build_detectors(config.detectors, camera=camera, clock=clock, base=base, seed=seed)
     envelopes = find_envelopes(config, base, folders)
     return {
-        name: RatedDetector(one, envelopes[name], config, name) if name in envelopes else one
-        for name, one in built.items()
+        name: RatedDetector(detector, envelopes[name], config, name) if name in envelopes else detector
+        for name, detector in built.items()
     }
 
 
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, DetectorEnvelope]:
     """Return the envelope of each measurable detector of a cell, by name.
 
-    A measurement applies if its fingerprint equals that of the detector, even if made in another cell.
+    A measurement applies if its fingerprint is that of the detector, also if it was made in another cell.
 
     Args:
-        config: The cell.
+        config: The cell file.
         base: Folder to which paths in the cell file are relative.
-        folders: Folders with files `CELL.measured.json`.
+        folders: Folders with measurement files `CELL.measured.json`.
     """
-    names = list(measurable_detectors(config))
-    stored, problems = _read_all(folders) if names else ([], [])
+    names = list(find_measurable_detectors(config))
+    stored, problems = _read_all_measurements(folders) if names else ([], [])
     envelopes = {}
     for name in names:
         threshold = config.detectors[name].threshold
-        current = take_fingerprint(config, name, base)
-        match = next((one for _, one in stored if one.fingerprint == current), None)
+        current = compute_fingerprint(config, name, base)
+        match = next((each for _, each in stored if each.fingerprint == current), None)
         if match is not None:
             envelopes[name] = DetectorEnvelope(match.rates.build_error_rates(threshold), match.frames)
             continue
-        older = next((one for cell, one in stored if (cell, one.detector) == (config.cell, name)), None)
-        change = describe_change(older.fingerprint, current) if older else ""
-        was = f"was measured before a change of {change}" if change else "was never measured in this cell"
-        reason = f"detector {name} {was}, so high error rates are assumed; {advise_measuring(config)}"
+        older = next((each for cell, each in stored if (cell, each.detector) == (config.cell, name)), None)
+        changes = describe_changes(older.fingerprint, current) if older else ""
+        cause = f"was measured before a change of {changes}" if changes else "was never measured in this cell"
+        reason = f"detector {name} {cause}, so high error rates are assumed; {advise_measuring(config)}"
         envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([reason, *problems])))
     return envelopes
 
 
 def advise_measuring(config: CellConfig) -> str:
-    """Return the command that measures the detectors of a cell, as a part of a sentence."""
+    """Return the advice to measure a detector, with the command: a clause for messages."""
     return f"measure it with `executive evaluate --cell {config.cell}` (about {MEASURING_MINUTES} min)"
 
 
-def find_unmeasured(
+def find_unmeasured_detectors(
     config: CellConfig, base: Path, folders: Sequence[Path]
 ) -> Iterator[tuple[tuple[str, str], str]]:
-    """Yield each detector without a valid measurement: its keys in the cell file, and the reason."""
+    """Yield each detector without an applicable measurement: its keys in the cell file, and the reason."""
     for name, envelope in find_envelopes(config, base, folders).items():
         if envelope.error_rates.doubt:
             yield ("detectors", name), envelope.error_rates.doubt
 
 
-def measurable_detectors(config: CellConfig) -> Iterator[str]:
-    """Yield the names of the detectors whose errors can be measured: those installed and not fake."""
+def find_measurable_detectors(config: CellConfig) -> Iterator[str]:
+    """Yield the names of the detectors that can be measured: their kind is installed and not fake."""
     kinds = find_detector_kinds()
     for name, section in config.detectors.items():
-        is_known = config.kind != FAKE and section.kind in kinds
+        is_known = config.kind != FAKE_KIND and section.kind in kinds
         if is_known and not getattr(kinds[section.kind].load(), "is_fake", False):
             yield name
 
 
-def _read_all(folders: Sequence[Path]) -> tuple[list[tuple[str, Measurement]], list[str]]:
-    """Return each stored measurement with the name of its cell, and the problems of unreadable files."""
+def _read_all_measurements(folders: Sequence[Path]) -> tuple[list[tuple[str, Measurement]], list[str]]:
+    """Return all stored measurements, each with the name of its cell, and messages about unreadable files."""
     stored: list[tuple[str, Measurement]] = []
     problems = []
     for file in (file for folder in folders for file in sorted(folder.glob(f"*{SUFFIX}"))):
         try:
-            stored += [(file.name.removesuffix(SUFFIX), one) for one in read_measurements(file)]
+            stored += [(file.name.removesuffix(SUFFIX), each) for each in read_measurements(file)]
         except InputError as error:
             problems.append(str(error))
     return stored, problems

@@ -16,7 +16,11 @@ from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Box
 from executive.cell.protocols import Localizer
 from executive.errors import Unavailable
-from executive.perception.envelope.frame_statistics import FrameRange, FrameStatistics, measure_frame
+from executive.perception.envelope.frame_statistics import (
+    FrameRange,
+    FrameStatistics,
+    compute_frame_statistics,
+)
 from executive.training.evaluation.cell_detector import CellDetector
 from executive.training.evaluation.error_statistics import ErrorStatistics, RepeatedErrors
 from executive.training.evaluation.matching import BoxMatch, is_ignored, match_detections
@@ -73,7 +77,7 @@ def evaluate(
             with contextlib.suppress(Unavailable):
                 second_answer, _ = detector.detect(replace(frame, image=sample.second_image))
                 repeats.add(matches, _match(second_answer, sample, min_confidence), sample, frame)
-        if table is not None and (frame_statistics := measure_frame(frame, table)):
+        if table is not None and (frame_statistics := compute_frame_statistics(frame, table)):
             statistics_of_frames.append(frame_statistics)
         if worst is not None:
             worst.add(matches, sample)

@@ -7,8 +7,8 @@ from plain_frames import frame_of
 
 from executive.cell.error_rates import ErrorRates, assume_rates
 from executive.mission.parse.cell_file import load_cell
-from executive.perception.detectors.requests import Pending
-from executive.perception.envelope.fingerprint import describe_change, take_fingerprint
+from executive.perception.detectors.requests import PendingSearch
+from executive.perception.envelope.fingerprint import compute_fingerprint, describe_changes
 from executive.perception.envelope.frame_statistics import FrameRange
 from executive.perception.envelope.measurement import (
     Measurement,
@@ -20,7 +20,7 @@ from executive.perception.envelope.rated_detectors import (
     DetectorEnvelope,
     RatedDetector,
     find_envelopes,
-    find_unmeasured,
+    find_unmeasured_detectors,
 )
 
 RATES = StoredErrorRates(
@@ -38,7 +38,7 @@ def overhead(missions):
 def stored(tmp_path, overhead):
     """A folder with a measurement of the cell overhead."""
     one = Measurement(
-        detector="embedded", fingerprint=dict(take_fingerprint(overhead, "embedded", tmp_path)),
+        detector="embedded", fingerprint=dict(compute_fingerprint(overhead, "embedded", tmp_path)),
         command="", seconds=1.0, images=1, rates=RATES, classes={}, counts={}, frames=WOOD,
     )  # fmt: skip
     (tmp_path / "overhead.measured.json").write_text(format_measurements((), one))
@@ -51,13 +51,13 @@ def test_a_measurement_holds_for_other_bins_and_another_number_of_objects(overhe
     other = overhead.model_copy(update={"table": table, "bins": bins, "cell": "other"})
     envelope = find_envelopes(other, stored, [stored])["embedded"]
     assert envelope == DetectorEnvelope(RATES.build_error_rates(0.5), WOOD)
-    assert list(find_unmeasured(other, stored, [stored])) == []
+    assert list(find_unmeasured_detectors(other, stored, [stored])) == []
 
 
 def test_a_measurement_of_another_camera_pose_does_not_hold_and_the_change_is_named(overhead, stored):
     moved = overhead.cameras["overhead"].model_copy(update={"position": (0.5, 0.0, 1.3)})
     changed = overhead.model_copy(update={"cameras": {"overhead": moved}})
-    ((keys, text),) = find_unmeasured(changed, stored, [stored])
+    ((keys, text),) = find_unmeasured_detectors(changed, stored, [stored])
     assert keys == ("detectors", "embedded")
     assert text == (
         "detector embedded was measured before a change of camera pose, so high error rates are assumed; "
@@ -93,7 +93,7 @@ class Silent:
 
         work: Future = Future()
         work.set_result([])
-        return Pending(work, 0.0, Now(), "embedded", ErrorRates(0.5, 0.9, 0.9, 0.9, 9.0))
+        return PendingSearch(work, 0.0, Now(), "embedded", ErrorRates(0.5, 0.9, 0.9, 0.9, 9.0))
 
     def close(self):
         """Close nothing."""
@@ -106,7 +106,7 @@ def test_rates_are_assumed_for_frames_outside_the_measured_ranges(overhead, colo
     answered = detector.request(frame_of(colour), "table").result().error_rates
     doubt = answered.doubt
     assert answered == (assume_rates(0.5, doubt) if doubted else RATES.build_error_rates(0.5))
-    start = "the workspace looks different from all images that detector embedded was measured on: "
+    start = "the workspace differs from all images with which detector embedded was measured: "
     assert doubt.startswith(f"{start}brightness 60, measured 180 to 195; red 60") == doubted
     assert doubt.endswith("; measure it with `executive evaluate --cell overhead` (about 2 min)") == doubted
 
@@ -123,4 +123,4 @@ def test_measurements_of_other_detectors_in_a_file_are_kept(stored):
 
 
 def test_changed_properties_are_named():
-    assert describe_change({"a": "1", "b": "2"}, {"a": "1", "b": "3", "c": "4"}) == "b, c"
+    assert describe_changes({"a": "1", "b": "2"}, {"a": "1", "b": "3", "c": "4"}) == "b, c"

@@ -19,7 +19,7 @@ import pytest
 
 from executive.errors import Fault, Unavailable
 from executive.perception.detectors.roboflow import helper as module
-from executive.perception.detectors.roboflow.helper import Helper, NoAnswer
+from executive.perception.detectors.roboflow.helper import InferenceProcess, NoAnswer
 from executive.perception.detectors.roboflow.key import ApiKey
 
 HERE = Path(__file__).parent
@@ -36,7 +36,7 @@ def start(monkeypatch):
     started = []
 
     def start(how):
-        started.append(Helper({"how": how}, key))
+        started.append(InferenceProcess({"how": how}, key))
         return started[-1]
 
     yield start
@@ -51,7 +51,7 @@ def children():
 
 def ask(helper, patience=0.05):
     helper.wait_until_ready()
-    return helper.ask(IMAGE, time.monotonic() + patience)
+    return helper.request(IMAGE, time.monotonic() + patience)
 
 
 @pytest.mark.parametrize("how", ["deaf", "mute"])
@@ -61,7 +61,7 @@ def test_without_an_answer_it_gives_up_in_time_and_has_another_process(start, ho
     first, began = helper._process.pid, time.monotonic()
     assert os.getsid(first) != os.getsid(0), "Ctrl-C reaches it"
     with pytest.raises(NoAnswer):
-        helper.ask(IMAGE, began + 0.2)
+        helper.request(IMAGE, began + 0.2)
     assert 0.2 <= time.monotonic() - began < 1.0
     assert helper._process.pid != first
     with pytest.raises(ProcessLookupError):
@@ -127,7 +127,7 @@ def test_stopping_it_ends_a_call_under_way(start):
     helper = start("mute")
     helper.wait_until_ready()
     with ThreadPoolExecutor(1) as thread:
-        call = thread.submit(helper.ask, IMAGE, time.monotonic() + 60)
+        call = thread.submit(helper.request, IMAGE, time.monotonic() + 60)
         helper.stop()
         assert str(call.exception(5.0)) == "its helper process was ended by signal 9"
     with pytest.raises(Unavailable, match="not running: the detector is closed"):
@@ -163,11 +163,11 @@ def test_it_ends_with_its_parent_though_its_server_hangs():
 ORPHANING = """
 import sys, time
 import numpy as np
-from executive.perception.detectors.roboflow.helper import Helper
+from executive.perception.detectors.roboflow.helper import InferenceProcess
 from executive.perception.detectors.roboflow.key import ApiKey
 
-helper = Helper({"url": sys.argv[1], "model_id": "a/1", "api": "v1", "confidence": 0.5}, ApiKey())
+helper = InferenceProcess({"url": sys.argv[1], "model_id": "a/1", "api": "v1", "confidence": 0.5}, ApiKey())
 print(helper._process.pid, flush=True)
 helper.wait_until_ready()
-helper.ask(np.zeros((8, 8, 3), np.uint8), time.monotonic() + 60)
+helper.request(np.zeros((8, 8, 3), np.uint8), time.monotonic() + 60)
 """

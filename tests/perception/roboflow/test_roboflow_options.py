@@ -67,10 +67,10 @@ def configured(**options):
         (
             {"labels": ["a"], "class_map": {"b": "cube"}},
             "class_map",
-            "names b, .* it knows a$",
+            "contains b, .* the model are a$",
         ),
         ({"full": "half"}, "full", "'whole' or 'tiles'"),
-        ({"colour": 1}, "colour", "not permitted; its options: model_id"),
+        ({"colour": 1}, "colour", "not permitted; the options are model_id"),
         (
             {"api_key": SECRET},
             "api_key",

@@ -12,7 +12,7 @@ import pytest
 from stub_server import BODIES, SPOILT, StubServer, predictions
 
 from executive.mission.load import load_mission
-from executive.perception.detectors.embedded import LABELS, MODEL
+from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
 from executive.perception.detectors.onnx_model import OnnxModel, read_labels
 from executive.plugins import discover
 from executive.run.assembly import RunOptions, assemble
@@ -47,7 +47,7 @@ FALLBACK = f"""try: {SERVER}
 @pytest.fixture
 def stub():
     """A server with the shipped weights."""
-    model = OnnxModel(MODEL, read_labels(LABELS), threads=1)
+    model = OnnxModel(MODEL_PATH, read_labels(LABELS_PATH), threads=1)
     server = StubServer(lambda image: list(predictions(model.detect(image, 0.25))))
     yield server
     server.stop()

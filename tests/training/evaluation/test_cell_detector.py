@@ -10,7 +10,7 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.errors import Unavailable
-from executive.perception.detectors.views import list_parts
+from executive.perception.detectors.views import list_regions
 from executive.training.evaluation import cell_detector
 from executive.training.evaluation.cell_detector import WHOLE_IMAGE, CellDetector
 
@@ -99,6 +99,6 @@ def test_frames_of_a_camera_are_searched_as_in_a_run_and_other_images_as_a_whole
     detector.detect(frame)
     assert eye.views == ["full"]
     for size in ((300, 100), (64, 900)):
-        assert list_parts("full", eye.camera.table_view, size) == [(0, 0, *size)]
+        assert list_regions("full", eye.camera.table_view, size) == [(0, 0, *size)]
     detector.close()
     assert eye.closed

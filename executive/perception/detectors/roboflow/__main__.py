@@ -1,9 +1,9 @@
 """Client program of a Roboflow inference server: `python -m executive.perception.detectors.roboflow`.
 
-The argument is JSON with the server, the model or workflow, and the confidence. The standard input carries,
-for each image, a line of JSON with width and height, then the pixels. The standard output carries a line of
-JSON when the program is ready, and one for each image. An environment variable holds the API key. The program
-exits at the end of its input, even during a request.
+The argument is JSON with the server, the model or workflow, and the minimum confidence. The standard input
+has, for each image, a line of JSON with width and height, then the pixels. The standard output has a line of
+JSON when the program is ready, and at least one for each image. The API key is in an environment variable.
+The program exits at the end of its input, even during a request.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from inference_sdk import InferenceHTTPClient
 
 MAX_ANSWER_LENGTH = 1 << 20
-"""Largest number of characters of an answer; 300 predictions need a twentieth of this number."""
+"""Maximum number of characters of an answer; 300 predictions need about a twentieth of this number."""
 
 Write = Callable[..., None]
-"""Writes its keyword arguments as one line of JSON."""
+"""Function that writes its keyword arguments as one line of JSON."""
 
 
 class MissingOutput(Exception):
-    """A workflow lacks the requested output; the text names its outputs."""
+    """A workflow lacks the requested output; the message lists its outputs."""
 
 
 def main() -> None:
@@ -42,20 +42,20 @@ def main() -> None:
     images: queue.Queue[NDArray[np.uint8]] = queue.Queue()
     threading.Thread(target=_read_images, args=(sys.stdin.buffer, images), daemon=True).start()
     try:
-        infer = _make_client(json.loads(sys.argv[1]))
+        infer = _make_inference_function(json.loads(sys.argv[1]))
     except Exception as error:
         write(unusable=f"{type(error).__name__}: {error}")
-        # The reading thread holds the lock of the input, so that a regular exit would abort the interpreter.
+        # The reading thread holds the lock of the input, which makes a normal exit abort the interpreter.
         os._exit(0)
     logging.getLogger("backoff").addHandler(_RetryHandler(write))
     logging.getLogger("backoff").setLevel(logging.DEBUG)
     write(ready=True)
     while True:
-        _answer(infer, images.get(), write)
+        _write_answer(infer, images.get(), write)
 
 
 def _open_output() -> Write:
-    """Return a function that writes to the standard output, and redirect all prints to the standard error."""
+    """Return a function that writes to the standard output; redirect all other output to standard error."""
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
 
@@ -67,7 +67,7 @@ def _open_output() -> Write:
 
 
 def _read_images(pipe: BinaryIO, images: queue.Queue[NDArray[np.uint8]]) -> None:
-    """Put each image into `images`, and exit at the end of the input, even if the server hangs."""
+    """Put each image into `images`; exit the process at the end of the input, even during a request."""
     while header := pipe.readline():
         size = json.loads(header)
         shape = size["height"], size["width"], 3
@@ -78,7 +78,7 @@ def _read_images(pipe: BinaryIO, images: queue.Queue[NDArray[np.uint8]]) -> None
     os._exit(0)
 
 
-def _make_client(settings: dict[str, Any]) -> Callable[[NDArray[np.uint8]], Any]:
+def _make_inference_function(settings: dict[str, Any]) -> Callable[[NDArray[np.uint8]], Any]:
     """Return a function that sends an RGB image to the model or workflow and returns the answer."""
     from inference_sdk import InferenceConfiguration, InferenceHTTPClient
 
@@ -107,8 +107,8 @@ def _run_workflow(client: InferenceHTTPClient, settings: dict[str, Any], image: 
     return outputs[settings["workflow_output"]]
 
 
-def _answer(infer: Callable[[NDArray[np.uint8]], Any], image: NDArray[np.uint8], write: Write) -> None:
-    """Write the answer of the server to an image, or the reason for a missing answer."""
+def _write_answer(infer: Callable[[NDArray[np.uint8]], Any], image: NDArray[np.uint8], write: Write) -> None:
+    """Send an image to the server, and write its answer, or the reason why there is none."""
     try:
         answer = infer(image)
         if isinstance(answer, dict):
@@ -124,7 +124,7 @@ def _answer(infer: Callable[[NDArray[np.uint8]], Any], image: NDArray[np.uint8],
 
 
 def _describe_error(error: Exception) -> dict[str, Any]:
-    """Return the kind of failure that an exception of the SDK means, and its text."""
+    """Return the kind of failure and the message of an exception of inference-sdk."""
     import socket
     import ssl
 
@@ -162,14 +162,14 @@ def _iterate_causes(error: BaseException | None) -> Iterator[BaseException]:
 
 
 class _RetryHandler(logging.Handler):
-    """Reports each retry of a request, from the log of inference-sdk."""
+    """Log handler that reports each retry of a request by inference-sdk."""
 
     def __init__(self, write: Write) -> None:
         super().__init__()
         self._write = write
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write the status that caused a retry, None for no connection: the last argument of the record."""
+        """Write the HTTP status that caused a retry: the last argument of `record`; None: no connection."""
         last = record.args[-1] if isinstance(record.args, tuple) else None
         self._write(again=getattr(last, "status_code", None))
 

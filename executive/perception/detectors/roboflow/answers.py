@@ -13,23 +13,23 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from executive.cell.detection import Detection
 
 MAX_PREDICTIONS = 300
-"""Largest number of predictions in one answer; RF-DETR has 300 queries."""
+"""Maximum number of predictions in one answer; RF-DETR has 300 queries."""
 MAX_OVERHANG = 0.1
-"""Largest overhang of a box beyond the image, as a share of the side; boxes are clipped to the image."""
+"""Maximum extent of a box beyond the image, as a fraction of the image size; such boxes are clipped."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Extent = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class _Prediction(BaseModel):
-    """A box by centre and size [pixel of the sent image], its class and confidence."""
+    """Centre and size of a box [pixel of the sent image], class and confidence."""
 
     model_config = ConfigDict(strict=True)
 
     x: Finite
     y: Finite
-    width: Extent
-    height: Extent
+    width: Positive
+    height: Positive
     confidence: Annotated[float, Field(ge=0, le=1)]
     label: str = Field(alias="class", min_length=1)
 
@@ -52,7 +52,7 @@ def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
         size: Width and height of the sent image [pixel].
 
     Raises:
-        ValueError: The answer is invalid; the text names the place and the problem.
+        ValueError: The answer is invalid; the message states position and problem.
     """
     if not isinstance(answer, dict):
         raise ValueError(f"it is of type {type(answer).__name__}, not an object with predictions")
@@ -71,15 +71,15 @@ def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
 def read_output(output: Any, size: tuple[int, int]) -> list[Detection]:
     """Return the detections in an output of a workflow, in the order of the output.
 
-    An output is an answer, the list of predictions of an answer, or all outputs of a step (`$steps.model.*`)
-    with the answer under the key `predictions`. If there are no predictions, the size of the image is null.
+    An output is an answer, the list of predictions of an answer, or a mapping with all outputs of a step
+    (`$steps.model.*`) and the answer as `predictions`. Without predictions, the size of the image is null.
 
     Args:
         output: Decoded JSON of the output.
         size: Width and height of the sent image [pixel].
 
     Raises:
-        ValueError: The output is invalid; the text names the place and the problem.
+        ValueError: The output is invalid; the message states position and problem.
     """
     if isinstance(output, dict) and isinstance(output.get("predictions"), dict):
         output = output["predictions"]
@@ -110,9 +110,9 @@ def _convert_predictions(predictions: list[_Prediction], size: tuple[int, int]) 
 
 
 def _describe_first_error(error: ValidationError) -> str:
-    """Return the place and the message of the first error in an answer, without values of the answer."""
+    """Return position and message of the first error in an answer, without values of the answer."""
     problem = error.errors(include_url=False, include_input=False)[0]
     place = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in problem["loc"])
-    # The names of this module's classes mean nothing to the owner of a server.
+    # The user does not know the classes of this module.
     message = problem["msg"].partition(" or instance of")[0]
     return f"{place.removeprefix('.')}: {message[0].lower()}{message[1:]}"

@@ -1,4 +1,4 @@
-"""Messages about failures of an inference server: the event, the server, and advice."""
+"""Messages about failures of an inference server: server, failure, and advice."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 from executive.perception.detectors.roboflow.key import KEY_VARIABLE
 from executive.perception.detectors.roboflow.options import RoboflowOptions
 
-MAX_QUOTED = 100
-"""Largest number of characters quoted from a message of a server."""
+MAX_QUOTATION_LENGTH = 100
+"""Maximum number of characters that are quoted from a message of a server."""
 
 _KEY_ADVICE = f"set {KEY_VARIABLE} to a key that may use it"
 _TEMPLATE_BY_STATUS: Mapping[int, tuple[str, str]] = {
@@ -52,7 +52,12 @@ def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> st
 
 
 def describe_delay(retry_causes: Sequence[int | None], options: RoboflowOptions) -> str:
-    """Return the message about a passed deadline, given the causes of the retries."""
+    """Return the message about a missed deadline.
+
+    Args:
+        retry_causes: HTTP statuses that caused retries before the deadline; None for no connection.
+        options: Options of the detector.
+    """
     message = f"no answer within {options.deadline} s from {options.host}"
     if not retry_causes:
         return f"{message}; look at its log and the network, or give it a longer deadline"
@@ -73,13 +78,13 @@ def describe_invalid_answer(problem: str, options: RoboflowOptions) -> str:
 
 
 def _fill_in(template: tuple[str, str], options: RoboflowOptions) -> tuple[str, str]:
-    """Return the event and the advice of a template, with the names of model, workflow and options."""
+    """Return failure and advice of a template, with the names of model, workflow and options inserted."""
     event, advice = template
     event = event.format(subject=options.subject, output=options.workflow_output)
     return event, advice.format(options=options.subject_options)
 
 
 def shorten_to_line(text: str) -> str:
-    """Return the text of a server as one short line of printable characters."""
-    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 10 * MAX_QUOTED]).split())
-    return line if len(line) <= MAX_QUOTED else f"{line[:MAX_QUOTED]}..."
+    """Return text from a server as one short line of printable characters."""
+    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 10 * MAX_QUOTATION_LENGTH]).split())
+    return line if len(line) <= MAX_QUOTATION_LENGTH else f"{line[:MAX_QUOTATION_LENGTH]}..."

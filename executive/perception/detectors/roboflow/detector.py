@@ -19,23 +19,23 @@ from executive.perception.detectors.roboflow.complaints import (
     describe_failure,
     describe_invalid_answer,
 )
-from executive.perception.detectors.roboflow.helper import Helper, NoAnswer
+from executive.perception.detectors.roboflow.helper import InferenceProcess, NoAnswer
 from executive.perception.detectors.roboflow.key import ApiKey
 from executive.perception.detectors.roboflow.options import (
     WORKFLOW_OPTIONS,
     RoboflowOptions,
     find_wrong_roboflow_options,
 )
-from executive.perception.detectors.setting import DetectorSetting, OptionFaults
-from executive.perception.detectors.views import Part, remove_duplicates, search_parts
+from executive.perception.detectors.setting import DetectorSetting, OptionErrors
+from executive.perception.detectors.views import Region, remove_duplicates, search_regions
 
 
 class RoboflowDetector(ThreadedDetector):
     """Searches frames with a hosted or self-hosted server; implements `executive.cell.protocols.Detector`.
 
     Args:
-        config: Threshold, floor and latency.
-        options: Server and model.
+        config: Section of the detector in the cell file.
+        options: Options of this kind of detector.
         setting: Parts of the cell and of the run that the detector uses.
         key: API key of the user.
     """
@@ -45,13 +45,13 @@ class RoboflowDetector(ThreadedDetector):
     ) -> None:
         super().__init__(config, setting, options.deadline)
         self._options = options
-        self._read = read_output if options.api == "workflow" else read_answer
+        self._read_answer = read_output if options.api == "workflow" else read_answer
         server = options.model_dump(include={"url", "model_id", "api", *WORKFLOW_OPTIONS})
-        self._helper = Helper({**server, "confidence": config.floor}, key)
+        self._helper = InferenceProcess({**server, "confidence": config.floor}, key)
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> RoboflowDetector:
-        """Return the detector of a cell file, without a request and without need of an API key.
+        """Return the detector for a section of a cell file; sends no request and needs no API key.
 
         Raises:
             InputError: An option is missing, unknown or invalid.
@@ -61,45 +61,47 @@ class RoboflowDetector(ThreadedDetector):
         return cls(config, RoboflowOptions.model_validate(config.options), setting, ApiKey())
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionFaults:
+    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
         del base, others
         yield from find_wrong_roboflow_options(config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
-        """Return the names in the cell of the detectable classes; None if the options do not list them."""
+        """Return the class names of the cell that the model can find; None if not listed in the options."""
         del base
         if any(True for _ in find_wrong_roboflow_options(config)):
             return None
         options = RoboflowOptions.model_validate(config.options)
         return tuple(options.class_map.get(name, name) for name in options.labels) or None
 
-    def _parts(self, view: str, size: tuple[int, ...]) -> list[Part]:
+    def _list_regions(self, view: str, size: tuple[int, ...]) -> list[Region]:
         is_whole = view == "full" and self._options.full != "tiles"
-        return [(0, 0, size[0], size[1])] if is_whole else super()._parts(view, size)
+        return [(0, 0, size[0], size[1])] if is_whole else super()._list_regions(view, size)
 
     def close(self) -> None:
-        """Stop the helper process and the thread, also during a request."""
+        """End the helper process and the thread, also during a request."""
         self._helper.stop()
         super().close()
         self._helper.close()
 
-    def _search(self, image: NDArray[np.uint8], parts: Sequence[Part]) -> list[Detection]:
+    def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
         self._helper.wait_until_ready()
         deadline = time.monotonic() + self._options.deadline
-        return search_parts(image, parts, lambda crop: self._find(crop, deadline), self._options.class_map)
+        return search_regions(
+            image, regions, lambda crop: self._find_in_crop(crop, deadline), self._options.class_map
+        )
 
-    def _find(self, crop: NDArray[np.uint8], deadline: float) -> list[Detection]:
-        """Return the detections of the server in a part of a frame, in pixels of the part."""
+    def _find_in_crop(self, crop: NDArray[np.uint8], deadline: float) -> list[Detection]:
+        """Return the detections of the server in a crop of a frame, with boxes in pixels of the crop."""
         try:
-            message = self._helper.ask(crop, deadline)
+            message = self._helper.request(crop, deadline)
         except NoAnswer as error:
             raise DeadlinePassed(describe_delay(error.retry_causes, self._options)) from None
         if "failure" in message:
             raise Unavailable(describe_failure(message, self._options))
         try:
-            answer = self._read(message["answer"], (crop.shape[1], crop.shape[0]))
+            answer = self._read_answer(message["answer"], (crop.shape[1], crop.shape[0]))
         except ValueError as error:
             raise Unavailable(describe_invalid_answer(str(error), self._options)) from None
         found = [detection for detection in answer if detection.confidence >= self._config.floor]

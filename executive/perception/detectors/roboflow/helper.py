@@ -1,4 +1,4 @@
-"""Helper process that runs inference-sdk, and is replaced after a passed deadline."""
+"""Helper process that runs inference-sdk and is replaced after a missed deadline."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ from executive.perception.detectors.roboflow.key import ApiKey
 from executive.processes import build_command
 
 PROGRAM = "executive.perception.detectors.roboflow"
+"""Module that the helper process runs."""
 STARTUP_TIMEOUT = 30.0
-"""Longest time for the import of inference-sdk [s]; measured: 2 s, and 6 s on shared cores."""
+"""Maximum time for the import of inference-sdk [s]; measured: 2 s, and 6 s on shared cores."""
 EXIT_TIMEOUT = 1.0
-"""Longest time from the end of the program's output to the exit of the program [s]."""
-MAX_STDERR = 2000
-"""Largest number of bytes at the end of the standard error in which the last line is searched."""
+"""Maximum time from the end of the output of the program to its exit [s]."""
+MAX_STDERR_SIZE = 2000
+"""Size of the end of the standard error in which the last line is searched [byte]."""
 
 
 class NoAnswer(Exception):
-    """The deadline of an answer has passed.
+    """The server did not answer before the deadline.
 
     Attributes:
-        retry_causes: Causes of the retries before the deadline: HTTP statuses, None for no connection.
+        retry_causes: HTTP statuses that caused retries before the deadline; None for no connection.
     """
 
     def __init__(self, retry_causes: Sequence[int | None]) -> None:
@@ -43,14 +44,14 @@ class NoAnswer(Exception):
         self.retry_causes = tuple(retry_causes)
 
 
-class Helper:
+class InferenceProcess:
     """Runs inference-sdk in a separate process, from the construction of the object until `close`.
 
-    Each call has a deadline: a process that has not answered by the deadline is killed, and a new process is
-    started. One thread sends requests; another thread may stop the helper.
+    Each call has a deadline: if the process does not answer before it, the process is killed and replaced.
+    One thread sends requests; another thread may call `stop`.
 
     Args:
-        settings: Server and model, in the format of the program's argument.
+        settings: Server and model: the argument of the program.
         key: API key of the user.
     """
 
@@ -61,22 +62,22 @@ class Helper:
         self._lock = threading.Lock()
         self._is_stopped = False
         self._process: subprocess.Popen[bytes] | None = None
-        self._problem = ""
+        self._start_problem = ""
         self._is_ready = False
         self._startup_deadline = 0.0
         self._start()
 
     def wait_until_ready(self) -> None:
-        """Wait until the process has imported its packages.
+        """Wait until the process has imported inference-sdk.
 
         Raises:
-            Unavailable: The process could not be started, or was not ready in time.
+            Unavailable: The process could not be started, or was not ready within `STARTUP_TIMEOUT`.
             Fault: The process exited.
         """
         if self._process is None:
             self._start()
         if self._process is None:
-            raise Unavailable(f"its helper process is not running: {self._problem}")
+            raise Unavailable(f"its helper process is not running: {self._start_problem}")
         if self._is_ready:
             return
         try:
@@ -90,15 +91,15 @@ class Helper:
             )
         self._is_ready = True
 
-    def ask(self, image: NDArray[np.uint8], deadline: float) -> Mapping[str, Any]:
-        """Return the `answer` to an image, or a `failure` and its text, `said`; the process must be ready.
+    def request(self, image: NDArray[np.uint8], deadline: float) -> Mapping[str, Any]:
+        """Send an image to the ready process; return its `answer`, or `failure` with the message `said`.
 
         Args:
             image: `(H, W, 3)` RGB.
             deadline: Latest time of the answer, on the clock `time.monotonic` [s].
 
         Raises:
-            NoAnswer: The deadline passed without an answer.
+            NoAnswer: There was no answer before the deadline.
             Unavailable: Another process killed the helper process.
             Fault: The process exited.
         """
@@ -116,7 +117,7 @@ class Helper:
             data = b""
 
     def stop(self) -> None:
-        """Kill the process; a concurrent call of `ask` or `wait_until_ready` raises `Unavailable`."""
+        """Kill the process; a concurrent call of `request` or `wait_until_ready` raises `Unavailable`."""
         with self._lock:
             self._is_stopped = True
             if self._process is not None:
@@ -129,7 +130,7 @@ class Helper:
         self._stderr.close()
 
     def _exchange(self, data: bytes, deadline: float) -> Mapping[str, Any]:
-        """Send `data` and return the next message; replace the process before an exception is raised."""
+        """Send `data` and return the next message; if this fails, replace the process and raise an error."""
         process = self._process
         assert process is not None and process.stdin and process.stdout
         is_late = threading.Event()
@@ -157,18 +158,18 @@ class Helper:
         try:
             message: Mapping[str, Any] = json.loads(self._key.redact(line.decode()))
         except RecursionError:
-            # The helper process parsed the answer with a shallower stack than the stack of this thread.
+            # The process could parse this answer, because its call stack was shallower.
             return {"failure": "garbled", "said": "it is nested too deeply"}
         return message
 
     def _raise_exit(self, process: subprocess.Popen[bytes]) -> None:
-        """Replace a process that has closed its output, and raise an exception with the cause of the exit."""
+        """Replace a process that has closed its output, and raise an error with the cause of its exit."""
         try:
             status = process.wait(EXIT_TIMEOUT)
         except subprocess.TimeoutExpired:
             _kill(process)
             status = process.wait()
-        self._stderr.seek(max(self._stderr.seek(0, os.SEEK_END) - MAX_STDERR, 0))
+        self._stderr.seek(max(self._stderr.seek(0, os.SEEK_END) - MAX_STDERR_SIZE, 0))
         lines = self._stderr.read().decode(errors="replace").strip().splitlines()
         self._restart()
         if status < 0:
@@ -184,7 +185,7 @@ class Helper:
         """Start a process in the background, unless the helper is stopped."""
         with self._lock:
             if self._is_stopped:
-                self._problem = "the detector is closed"
+                self._start_problem = "the detector is closed"
                 return
             self._stderr.seek(0)
             self._stderr.truncate()
@@ -197,12 +198,13 @@ class Helper:
                     start_new_session=True,  # Ctrl-C does not interrupt the process.
                 )  # fmt: skip
             except OSError as error:
-                self._problem = (error.strerror or str(error)).lower()
+                self._start_problem = (error.strerror or str(error)).lower()
                 return
             self._startup_deadline = time.monotonic() + STARTUP_TIMEOUT
             self._is_ready = False
 
     def _end(self) -> None:
+        """Kill the process, if any, and close its pipes."""
         with self._lock:
             process, self._process = self._process, None
         if process is None:

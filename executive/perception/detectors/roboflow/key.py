@@ -1,4 +1,4 @@
-"""API key of a user of the hosted service."""
+"""API key of a user of Roboflow's hosted service."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import os
 from collections.abc import Mapping
 
 KEY_VARIABLE = "ROBOFLOW_API_KEY"
-"""Environment variable that holds the API key, its only source."""
+"""Environment variable with the API key; there is no other source of the key."""
 MIN_KEY_LENGTH = 8
-"""Smallest length of a secret key; shorter keys are placeholders for servers that accept any key."""
-HIDDEN = "***"
-"""Replacement of the key in texts."""
+"""Minimum length of a secret key; shorter keys are placeholders for servers that accept any key."""
+REDACTED_KEY = "***"
+"""Text that replaces the key in messages."""
 
 
 class ApiKey:
-    """API key from the environment; only the attribute `environment` reveals the text of the key."""
+    """API key from the environment; only the attribute `environment` contains the key as text."""
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
         self.environment = dict(environment)
@@ -24,14 +24,14 @@ class ApiKey:
 
     @property
     def is_set(self) -> bool:
-        """Return True if the environment contains a key."""
+        """True if the environment contains a key."""
         return bool(self._key)
 
     def redact(self, text: str) -> str:
         """Return `text`, plain or JSON, without the key."""
         if len(self._key) < MIN_KEY_LENGTH:
             return text
-        return text.replace(self._key, HIDDEN).replace(json.dumps(self._key)[1:-1], HIDDEN)
+        return text.replace(self._key, REDACTED_KEY).replace(json.dumps(self._key)[1:-1], REDACTED_KEY)
 
     def __repr__(self) -> str:
-        return f"ApiKey({HIDDEN if self.is_set else ''})"
+        return f"ApiKey({REDACTED_KEY if self.is_set else ''})"

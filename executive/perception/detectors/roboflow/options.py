@@ -9,29 +9,29 @@ from pydantic import Field
 
 from executive.cell.config import DetectorConfig, Section
 from executive.perception.detectors.roboflow.key import KEY_VARIABLE
-from executive.perception.detectors.setting import OptionFaults, find_wrong_class_map, find_wrong_options
+from executive.perception.detectors.setting import OptionErrors, find_wrong_class_map, find_wrong_options
 
 HOSTED_URL = "https://serverless.roboflow.com"
-"""Address of the server of Roboflow."""
+"""Address of Roboflow's hosted server."""
 SECRET_WORDS = ("key", "token", "secret", "password", "authorization")
-"""Parts of the names of unknown options that suggest a secret."""
+"""Substrings of the names of unknown options whose values are probably secrets."""
 WORKFLOW_OPTIONS = ("workspace", "workflow_id", "workflow_input", "workflow_output")
 """Options that only `api: workflow` uses."""
 FORBIDDEN_CHARACTERS = "?&#= "
-"""Characters that would change the URL of a request."""
+"""Characters that are not allowed in names, because they would change the URL of a request."""
 
 
 class RoboflowOptions(Section):
     """Options of a detector of kind `roboflow`, in addition to the options of all detectors."""
 
     model_id: str = ""
-    """Model id on the server: `project/version`, or an alias of inference-sdk such as `rfdetr-nano`. Not used
+    """Model id on the server: `project/version`, or an alias of inference-sdk such as `rfdetr-nano`; not used
     by `api: workflow`."""
     url: str = HOSTED_URL
     """Address of the inference server."""
     api: Literal["auto", "v0", "v1", "workflow"] = "auto"
     """API of the server: `v0`, one request to `/project/version`; `v1`, the API of self-hosted servers;
-    `auto`, `v0` or `v1` by the choice of inference-sdk; `workflow`, a workflow of a workspace."""
+    `auto`, `v0` or `v1` as inference-sdk chooses; `workflow`, a workflow of a workspace."""
     workspace: str = ""
     """Name of the workflow's workspace, as in the URL of the workflow."""
     workflow_id: str = ""
@@ -43,16 +43,16 @@ class RoboflowOptions(Section):
     class_map: dict[str, str] = Field(default_factory=dict)
     """Class names of the cell by class names of the model, if the names differ."""
     labels: tuple[str, ...] = ()
-    """Class names of the model, for a check of the classes that a mission requests."""
+    """Class names of the model, for the check that a mission requests only these classes."""
     deadline: float = Field(1.0, gt=0, le=60)
-    """Longest time for all answers about one frame, on the wall clock and on the clock of the run [s]. The
-    deadline covers all requests, and the retries of inference-sdk after the statuses 429, 503 and 504."""
+    """Maximum time for all answers about one frame, on the wall clock and on the clock of the run [s],
+    including the retries of inference-sdk after the HTTP statuses 429, 503 and 504."""
     full: Literal["whole", "tiles"] = "whole"
-    """Images for the view `full`: `whole`, the frame; `tiles`, one after the other, tiles of the size of the
-    table view that overlap by a quarter or more (9 in a frame of 640 x 480 pixels with a table view of
-    256 x 256). The view `table` is one image. An image takes one request with `v0` and `workflow`, two
-    requests with `v1` (the list of loaded models; the image), and three requests with `v1` until the server
-    has loaded the model."""
+    """Images that are sent for the view `full`: `whole`, the frame; `tiles`, one after the other, tiles of
+    the size of the table view that overlap by at least a quarter (9 tiles for a frame of 640 x 480 pixels and
+    a table view of 256 x 256). For the view `table`, one image is sent. An image needs one request with `v0`
+    and `workflow`, two requests with `v1` (list of loaded models; image), and three until the model is
+    loaded."""
 
     @property
     def host(self) -> str:
@@ -73,7 +73,7 @@ class RoboflowOptions(Section):
         return "workspace and workflow_id" if self.api == "workflow" else "model_id"
 
 
-def find_wrong_roboflow_options(config: DetectorConfig) -> OptionFaults:
+def find_wrong_roboflow_options(config: DetectorConfig) -> OptionErrors:
     """Yield each invalid option, with a message."""
     wrong = list(find_wrong_options(RoboflowOptions, config))
     for option, message in wrong:
@@ -92,8 +92,8 @@ def find_wrong_roboflow_options(config: DetectorConfig) -> OptionFaults:
         yield from find_wrong_class_map(config, options.class_map, options.labels)
 
 
-def _check_model(options: RoboflowOptions) -> OptionFaults:
-    """Yield the option that prevents requests to a model, with a message."""
+def _check_model(options: RoboflowOptions) -> OptionErrors:
+    """Yield the first invalid option for requests to a model, with a message."""
     given = [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]
     parts = options.model_id.split("/")
     if given:
@@ -111,8 +111,8 @@ def _check_model(options: RoboflowOptions) -> OptionFaults:
         )
 
 
-def _check_workflow(options: RoboflowOptions) -> OptionFaults:
-    """Yield each option that prevents requests to a workflow, with a message."""
+def _check_workflow(options: RoboflowOptions) -> OptionErrors:
+    """Yield each invalid option for requests to a workflow, with a message."""
     names = {"workspace": options.workspace, "workflow_id": options.workflow_id}
     for option, name in names.items():
         if not name:
@@ -121,7 +121,7 @@ def _check_workflow(options: RoboflowOptions) -> OptionFaults:
             yield option, f"{option} must be a name alone, without /, ?, &, #, = or a space"
 
 
-def _check_url(url: str) -> OptionFaults:
+def _check_url(url: str) -> OptionErrors:
     """Yield the option `url`, with a message, if the value is not exactly the address of a server."""
     try:
         parts = urlsplit(url)
