@@ -53,7 +53,7 @@ class MotionSearch:
         limits: Joint limits of the arm.
         start: Joint positions at the start `(n,)` [rad].
         end: A goal, or joint positions at the end `(n,)` [rad].
-        task: Load and obstacles of the free part; `around` includes the target.
+        task: Load and obstacles of the free part; `task.obstacles` includes the target.
     """
 
     def __init__(
