@@ -61,8 +61,8 @@ def _make_fixed_shapes(config: CellConfig) -> Iterator[Shape]:
     """Yield the shapes of the table and of the bins."""
     (left, right), (near, far) = config.table.x, config.table.y
     size = (right - left + 2 * TABLE_MARGIN, far - near + 2 * TABLE_MARGIN, TABLE_THICKNESS)
-    middle = Pose.of(((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2))
-    yield Shape("", "box", size, middle, TABLE_COLOUR)
+    X_WS = Pose.of(((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2))
+    yield Shape("", "box", size, X_WS, TABLE_COLOUR)
     for bin in config.bins.values():
         for (x, y, z), centre in list_bin_walls(bin.size):
             size = 2 * x, 2 * y, 2 * z

@@ -278,7 +278,7 @@ WRONG = {
         scene.yaml:2:9: error[unknown-key]: light has no key "brightnes"
            2 | light: {brightnes: 0.3}
              |         ^^^^^^^^^
-          Did you mean "brightness"? light takes: direction, colour, ambient, diffuse, specular, shadow, brightness.
+          Did you mean "brightness"? Keys of light: direction, colour, ambient, diffuse, specular, shadow, brightness.
         """,
     ),
     "a key of a section that may be missing": (
@@ -287,7 +287,7 @@ WRONG = {
         scene.yaml:2:26: error[unknown-key]: unknown has no key "size"
            2 | unknown: {count: [1, 2], size: 0.5}
              |                          ^^^^
-          unknown takes: count, models, scale, colours.
+          Keys of unknown: count, models, scale, colours.
         """,
     ),
     "a class that the cell lacks": (
