@@ -81,7 +81,7 @@ class CheckContext:
 
     @cached_property
     def library_uses_by_path(self) -> Mapping[str, UseNode]:
-        """By the path of each node in a library: the `use` in the mission file that contains the node."""
+        """The `use` in the mission file that contains each node of a library, by the path of the node."""
         uses: dict[str, UseNode] = {}
 
         def walk(node: Node, use: UseNode | None) -> None:

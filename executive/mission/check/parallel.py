@@ -59,13 +59,10 @@ def find_racing_reads(context: CheckContext) -> Iterator[Finding]:
         for index, other in permutations(range(len(branches)), 2):
             # Branches start in order: the first skill of a branch reads before a later branch writes.
             safe_reader = _find_first_leaf(branches[index]) if index < other else None
+            # find_shared_variables reports a variable that both branches write.
+            written_by_other = writers[other].keys() - writers[index].keys()
             for reader, input_name, variable, mark in inputs[index]:
-                # find_shared_variables reports a variable that both branches write.
-                if (
-                    reader is not safe_reader
-                    and variable in writers[other]
-                    and variable not in writers[index]
-                ):
+                if reader is not safe_reader and variable in written_by_other:
                     writer, writer_mark, hint = writers[other][variable]
                     message = (
                         f"{input_name} reads ${variable}, while {writer} in "

@@ -56,7 +56,7 @@ def _make_file_schema(
         **_make_mapping_schema(keys),
         "definitions": {
             "node": _make_node_schema(skills, node_classes),
-            "tree": {"anyOf": [_refer("node"), subtree]},
+            "tree": {"anyOf": [_make_reference("node"), subtree]},
             "param": _make_param_schema(),
             "library": _make_mapping_schema(grammar.LIBRARY_KEYS),
             "reasons": _make_reasons_schema(skills),
@@ -75,7 +75,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Json:
     The head is the skill or keyword. It selects the schema of the mapping by `dependencies`: unlike with
     alternatives, an editor can then mark each invalid key and complete the valid keys.
     """
-    label: Json = {**_refer("label"), "description": grammar.LABEL_KEY.doc}
+    label: Json = {**_make_reference("label"), "description": grammar.LABEL_KEY.doc}
     heads = [*skills, *node_classes, grammar.USE_KEYWORD]
     nodes_without_body = [
         {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ARRAY_ITEM}
@@ -94,13 +94,13 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Json:
         "anyOf": [
             *make_name_schemas(skills),
             *nodes_without_body,
-            {"type": "array", "items": _refer("node"), **NO_ARRAY_ITEM},
+            {"type": "array", "items": _make_reference("node"), **NO_ARRAY_ITEM},
             {"type": "object", **NO_ARRAY_ITEM},
         ],
         "minItems": 1,
         "dependencies": {
             head: {
-                "properties": {head: _refer(head), "as": label, **siblings.get(head, {})},
+                "properties": {head: _make_reference(head), "as": label, **siblings.get(head, {})},
                 "additionalProperties": False,
                 **requirements.get(head, {}),
             }
@@ -108,7 +108,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Json:
         },
         "if": {"anyOf": [{"required": [head]} for head in heads]},
         "else": {
-            "properties": {**{head: _refer(head) for head in heads}, "as": label},
+            "properties": {**{head: _make_reference(head) for head in heads}, "as": label},
             "additionalProperties": False,
             "minProperties": 1,
             "dependencies": {"as": {"minProperties": 2}},
@@ -150,13 +150,13 @@ def _make_value_schema(key: Key) -> Json:
     """Return the schema of the value of a key of a control node."""
     match key.kind:
         case Kind.NODE:
-            node = _refer("node")
+            node = _make_reference("node")
             may_be_empty = key.is_shorthand and not key.is_required
             return {"allOf": [{"anyOf": [node, {"type": "null"}]}]} if may_be_empty else node
         case Kind.NODES:
             return _SCHEMAS_BY_KIND["nodes"]
         case Kind.REASONS:
-            return _refer("reasons")
+            return _make_reference("reasons")
         case Kind.VARIABLE:
             return _SCHEMAS_BY_KIND["word"]
         case Kind.ELEMENTS:
@@ -208,7 +208,7 @@ def _make_properties(keys: Mapping[str, GrammarKey]) -> Json:
     return {name: {"description": key.doc, **_SCHEMAS_BY_KIND[key.kind]} for name, key in keys.items()}
 
 
-def _refer(name: str) -> Json:
+def _make_reference(name: str) -> Json:
     """Return the schema that refers to the definition with a name."""
     return {"$ref": f"#/definitions/{name}"}
 
@@ -230,8 +230,8 @@ def _allow_list(text: Json) -> Json:
 _WORD: Json = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
 
 _SCHEMAS_BY_KIND: Mapping[str, Json] = {
-    "node": _refer("node"),
-    "nodes": {"type": "array", "items": _refer("node"), "minItems": 1},
+    "node": _make_reference("node"),
+    "nodes": {"type": "array", "items": _make_reference("node"), "minItems": 1},
     "number": {"type": "number"},
     "text": {"type": ["string", "number", "boolean"]},
     "word": {"type": "string", **_WORD},
@@ -241,9 +241,9 @@ _SCHEMAS_BY_KIND: Mapping[str, Json] = {
     "values": _map_names_to({}),
     "variables": _map_names_to(REFERENCE),
     "paths": _allow_list({}),
-    "params": _map_names_to(_refer("param")),
+    "params": _map_names_to(_make_reference("param")),
     "routes": {"type": ["object", "null"], "additionalProperties": _allow_list({})},
-    "trees": _map_names_to(_refer("tree")),
+    "trees": _map_names_to(_make_reference("tree")),
     "args": {**_map_names_to({}), "type": ["object", "array", "null"], "items": {"type": "string", **_WORD}},
 }
 """Schema of the value of a key, by `GrammarKey.kind`."""
