@@ -44,7 +44,7 @@ class Witness:
         if self.cell is None or not isinstance(timed.event, NodeStarted):
             return
         path = timed.event.node
-        entry = self._flow.entry.get(path)
+        entry = self._flow.entry_states.get(path)
         if entry is None:
             self._broken.append(f"{path} runs, which the check says it never does")
         elif missing := [f"${name}" for name in entry.written or () if name not in self._scope]:
