@@ -1,4 +1,4 @@
-"""Cell files by path or by name of a shipped cell."""
+"""Loading of cells, given by the path of a cell file or the name of a shipped cell."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 
 def load_cells(names: tuple[str, ...], overrides: Mapping[str, str] | None = None) -> dict[str, CellConfig]:
-    """Return the cells by name; each argument is a path or the name of a shipped cell.
+    """Return the cells by name; `names` contains paths of cell files and names of shipped cells.
 
-    `overrides` name keys of the cells as `cell.<key>.<key>`.
+    `overrides` contains values of keys of the cells, by `cell.<key>.<key>`.
 
     Raises:
         InputError: A cell does not exist, two cells have the same name, or a file is invalid.
@@ -25,7 +25,7 @@ def load_cells(names: tuple[str, ...], overrides: Mapping[str, str] | None = Non
     for name in names:
         config = load_cell(find_cell(name), overrides)
         if config.cell in cells:
-            raise InputError(f'two of the cell files are called "{config.cell}"; give each a name of its own')
+            raise InputError(f'two cells are called "{config.cell}"; give one of them another name')
         cells[config.cell] = config
     return cells
 
@@ -48,4 +48,4 @@ def find_cell(name: str) -> Path:
     if name in shipped:
         return shipped[name]
     hint = list_choices(name, shipped, "Shipped cells")
-    raise InputError(f'there is no cell file "{name}", and no shipped cell of that name. {hint}')
+    raise InputError(f'there is neither a cell file nor a shipped cell "{name}". {hint}')

@@ -1,4 +1,4 @@
-"""`executive check`: find mistakes in missions before a run."""
+"""`executive check`: find errors in missions before a run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from executive.cli.options import json_option, overrides_option
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.streams import keep_stdout_clean, print_json
 
 if TYPE_CHECKING:
     from executive.mission.findings import Finding
@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 @json_option
 @click.pass_context
 def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, str], as_json: bool) -> None:
-    """Print all mistakes in each MISSION, and the failures that can end its run.
+    """Check missions without running them.
 
-    Exit code 2 if a mission cannot be run.
+    Prints the errors and warnings of each MISSION (a file or the name of a shipped mission), and the failures
+    that can end its run. Exit code 2 if a mission has errors.
     """
-    with stdout_kept_clean():
+    with keep_stdout_clean():
         from executive.errors import InputError
         from executive.mission.findings import MAX_LISTED_FINDINGS, Finding
         from executive.mission.load import load_mission
@@ -39,19 +40,19 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
             try:
                 loaded = load_mission(mission, skills, overrides, load_cell_kind)
                 findings, endings, ok = loaded.warnings, loaded.unhandled_failures, True
-                texts.append(_describe(mission, findings, endings))
+                texts.append(_describe_mission(mission, findings, endings))
             except InputError as error:
-                missing = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
-                findings, endings, ok = getattr(error, "findings", missing), (), False
+                unreadable = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
+                findings, endings, ok = getattr(error, "findings", unreadable), (), False
                 texts.append(str(error))
-            parts = {
+            contents = {
                 "findings": [
                     {**asdict(finding), "excerpt": finding.shown_excerpt}
                     for finding in findings[:MAX_LISTED_FINDINGS]
                 ],
                 "endings": [*map(asdict, endings)],
             }
-            reports.append({"mission": mission, "ok": ok, **parts})
+            reports.append({"mission": mission, "ok": ok, **contents})
     if as_json:
         print_json(reports)
     else:
@@ -59,18 +60,18 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     ctx.exit(0 if all(report["ok"] for report in reports) else 2)
 
 
-def _describe(mission: str, findings: Sequence[Finding], endings: Sequence[UnhandledFailure]) -> str:
-    """Return the warnings of a valid mission, and the failures that can end its run, as text."""
+def _describe_mission(mission: str, findings: Sequence[Finding], endings: Sequence[UnhandledFailure]) -> str:
+    """Return a text with the warnings of a valid mission, and with the failures that can end its run."""
     from executive.mission.findings import describe_findings
 
     lines = [*describe_findings(findings), f"{mission}: ok"]
     if endings:
         lines.append("  no node handles these failures; each would end the mission:")
-        # Endings of a subtree that is used twice have the same place, and count once.
-        reasons: dict[tuple[str, str, int], dict[str, None]] = {}
+        # A subtree that is used twice has the same endings in the same lines; each is printed once.
+        reasons_by_place: dict[tuple[str, str, int], dict[str, None]] = {}
         for ending in endings:
-            reasons.setdefault((ending.source, ending.path, ending.line), {})[ending.reason] = None
-        names = {place: f"{place[0]}: {', '.join(found)}" for place, found in reasons.items()}
-        width = max(map(len, names.values()))
-        lines += [f"    {name:{width}}  {path}:{line}" for (_, path, line), name in names.items()]
+            reasons_by_place.setdefault((ending.source, ending.path, ending.line), {})[ending.reason] = None
+        descriptions = {place: f"{place[0]}: {', '.join(names)}" for place, names in reasons_by_place.items()}
+        width = max(map(len, descriptions.values()))
+        lines += [f"    {text:{width}}  {path}:{line}" for (_, path, line), text in descriptions.items()]
     return "\n".join(lines)

@@ -1,8 +1,8 @@
-"""`executive doctor`: checks of this installation, each with a fix for what is wrong.
+"""`executive doctor`: checks of this installation, with a fix for each problem.
 
-`python -m executive.cli.doctor tiny|egl` draws a few frames and prints the median time per frame. It
-runs as a separate process, because a failing EGL driver may crash it. Each check imports its packages only
-when it runs: a missing package then affects only this check, and other commands start without these imports.
+`python -m executive.cli.doctor tiny|egl` renders a few frames and prints the median time per frame. It
+runs as a separate process, because a failing EGL driver may crash the process. Each check imports its
+packages itself, so that a missing package affects only this check, and other commands start quickly.
 """
 
 from __future__ import annotations
@@ -19,32 +19,32 @@ from typing import NamedTuple
 import click
 
 from executive.cli.options import json_option
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import InputError
 from executive.processes import build_command
 
 MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
-"""Oldest and newest Python for which every required package has wheels."""
+"""Oldest and newest Python version for which every required package has wheels."""
 EXTRAS = {"view": "watch a run in the browser", "train": "train a detector of your own"}
-"""Purpose of each extra."""
-FRAMES = 5
-"""Number of timed frames, after one frame for warming up."""
+"""Purpose of each optional group of packages, by its name."""
+FRAME_COUNT = 5
+"""Number of timed frames; another frame before them is not timed."""
 FRAME_SIZE = (640, 480)
 """Width and height of a frame [pixel]."""
-DRAW_TIMEOUT = 30.0
-"""Time after which a drawing process is ended [s]."""
+RENDER_TIMEOUT = 30.0
+"""Time after which a rendering process is ended [s]."""
 SERVER_TIMEOUT = 3.0
 """Time after which a server counts as unreachable [s]."""
 
 
-class Diagnosed(NamedTuple):
+class CheckResult(NamedTuple):
     """Result of one check.
 
     Attributes:
-        status: `ok`; `note`: an optional feature cannot be used; `problem`: the project cannot work.
-        subject: Name of the checked thing.
-        message: State of the checked thing.
-        fix: Command or other action that helps, or "".
+        status: `ok`; `note`: an optional feature cannot be used; `problem`: missions cannot be run.
+        subject: Name of the checked part of the installation.
+        message: State of this part.
+        fix: Command or other action that solves the problem, or "".
     """
 
     status: str
@@ -57,12 +57,13 @@ class Diagnosed(NamedTuple):
 @json_option
 @click.pass_context
 def command(ctx: click.Context, as_json: bool) -> None:
-    """Check Python, packages, plugins, renderer, display and Roboflow's server.
+    """Check this installation.
 
-    Exit code 1 if there is a problem. A note is about an optional feature that cannot be used.
+    Checks Python, packages, plugins, renderer, display and the server of Roboflow. A problem prevents runs;
+    exit code 1 if there is one. A note concerns an optional feature that cannot be used.
     """
-    with stdout_kept_clean():
-        findings = list(examine())
+    with keep_stdout_clean():
+        findings = list(run_checks())
     problems = sum(finding.status == "problem" for finding in findings)
     if as_json:
         print_json([finding._asdict() for finding in findings])
@@ -74,32 +75,32 @@ def command(ctx: click.Context, as_json: bool) -> None:
     ctx.exit(int(problems > 0))
 
 
-def examine() -> Iterator[Diagnosed]:
-    """Run every check and yield its results, even if a package that a check needs is missing."""
+def run_checks() -> Iterator[CheckResult]:
+    """Run every check and yield its results; a check whose packages are missing yields a problem."""
     for check in (check_system, check_packages, check_plugins, check_renderer, check_roboflow):
         subject = check.__name__.removeprefix("check_")
         try:
             yield from check()
         except InputError as error:
-            yield Diagnosed("problem", subject, str(error))
+            yield CheckResult("problem", subject, str(error))
         except ImportError as error:
-            yield Diagnosed("problem", subject, f"cannot be checked: {error}", "run `uv sync`")
+            yield CheckResult("problem", subject, f"cannot be checked: {error}", "run `uv sync`")
 
 
-def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Diagnosed]:
-    """Yield the version of Python, and the screen on which --gui opens a window."""
+def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[CheckResult]:
+    """Check the version of Python, and whether there is a display for --gui."""
     python = f"{'.'.join(map(str, version))} on {platform.system()} {platform.machine()}"
     is_supported = MIN_PYTHON <= version[:2] <= MAX_PYTHON
-    fix = "use 3.10 or 3.11 (uv takes 3.11 by itself)"
+    fix = "use Python 3.10 or 3.11 (uv installs 3.11)"
     yield _make_result(is_supported, "python", python, "problem", f"{python} has no pybullet wheel", fix)
     name = os.environ.get("DISPLAY")
-    shown = f"DISPLAY is {name}, where --gui opens the simulator's window"
-    fix = "run without --gui; the terminal, `--view` and the report also show a run"
-    yield _make_result(bool(name), "display", shown, "note", "DISPLAY is not set", fix)
+    message = f"DISPLAY is {name}; --gui opens the window of the simulator there"
+    fix = "run without --gui; the terminal, --view and the report also show a run"
+    yield _make_result(bool(name), "display", message, "note", "DISPLAY is not set", fix)
 
 
-def check_packages() -> Iterator[Diagnosed]:
-    """Yield findings on required packages, packages that provide `cv2`, extras, and the video encoder."""
+def check_packages() -> Iterator[CheckResult]:
+    """Check the required packages, the packages that provide `cv2`, the extras, and the video encoder."""
     from importlib.metadata import packages_distributions
 
     from executive.run.versions import DISTRIBUTION, find_installer, find_version, list_requirements
@@ -107,18 +108,18 @@ def check_packages() -> Iterator[Diagnosed]:
     names = list_requirements()
     missing = [name for name in (DISTRIBUTION, *names) if not find_version(name)]
     for name in missing:
-        yield Diagnosed("problem", "packages", f"{name} is missing", "run `uv sync`")
+        yield CheckResult("problem", "packages", f"{name} is missing", "run `uv sync`")
     if not missing:
         message = f"{DISTRIBUTION} {find_version(DISTRIBUTION)} and its {len(names)} required packages"
-        yield Diagnosed("ok", "packages", message)
+        yield CheckResult("ok", "packages", message)
     if packages := sorted(set(packages_distributions().get("cv2", ()))):
         opencv = ", ".join(f"{name} {find_version(name)}" for name in packages)
         fix = "run `uv sync --reinstall`, which removes all but opencv-python-headless"
         if find_installer(DISTRIBUTION) == "pip":
             fix = f"run `pip uninstall -y {' '.join(packages)}`, then `pip install opencv-python-headless`"
-        alone = f"{opencv} is the only package that provides `cv2`"
+        ok_message = f"{opencv} is the only package that provides `cv2`"
         message = f"{len(packages)} packages provide `cv2` and overwrite each other ({opencv})"
-        yield _make_result(len(packages) == 1, "opencv", alone, "problem", message, fix)
+        yield _make_result(len(packages) == 1, "opencv", ok_message, "problem", message, fix)
     for extra, purpose in EXTRAS.items():
         names = list_requirements(extra)
         missing = [name for name in names if not find_version(name)]
@@ -126,11 +127,11 @@ def check_packages() -> Iterator[Diagnosed]:
         fix = f"to {purpose}, run `uv sync --extra {extra}`"
         yield _make_result(not missing, extra, versions, "note", f"not installed: {', '.join(missing)}", fix)
     if version := find_version("av"):
-        yield Diagnosed("ok", "film", f"av {version} encodes videos; the program ffmpeg is not needed")
+        yield CheckResult("ok", "film", f"av {version} encodes videos; the program ffmpeg is not needed")
 
 
-def check_plugins() -> Iterator[Diagnosed]:
-    """Load every installed skill, kind of cell and kind of detector, and yield their numbers."""
+def check_plugins() -> Iterator[CheckResult]:
+    """Load all installed skills, kinds of cells and kinds of detectors."""
     from executive.perception.detectors import registry
     from executive.plugins import CELL_KIND_GROUP, discover, find_project, list_entries
 
@@ -139,47 +140,48 @@ def check_plugins() -> Iterator[Diagnosed]:
     for entry in (*kinds.values(), *detectors.values()):
         entry.load()
     message = f"{len(skills)} skills, {len(kinds)} kinds of cells, {len(detectors)} kinds of detectors"
-    yield Diagnosed("ok", "plugins", f"{message}; those of {project.file} included" if project else message)
+    origin = f", including those of {project.file}" if project else ""
+    yield CheckResult("ok", "plugins", f"{message}{origin}")
 
 
-def check_renderer() -> Iterator[Diagnosed]:
-    """Yield the time TinyRenderer needs for a frame, and whether PyBullet's EGL plugin draws."""
+def check_renderer() -> Iterator[CheckResult]:
+    """Measure the time of TinyRenderer for a frame, and check PyBullet's EGL plugin."""
     time, problem = measure_frame_time("tiny")
-    drawn = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 of the overhead cell"
-    message, fix = f"TinyRenderer draws nothing: {problem}", "run `uv sync --reinstall-package pybullet`"
-    yield _make_result(not problem, "renderer", drawn, "problem", message, fix)
+    ok_message = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 pixels of the cell overhead"
+    message, fix = f"TinyRenderer renders no frame: {problem}", "run `uv sync --reinstall-package pybullet`"
+    yield _make_result(not problem, "renderer", ok_message, "problem", message, fix)
     _, problem = measure_frame_time("egl")
-    state = f"draws nothing: {problem}" if problem else "can be loaded and draws"
+    state = f"renders no frame: {problem}" if problem else "can be loaded and renders"
     status = "note" if problem else "ok"
-    yield Diagnosed(status, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
+    yield CheckResult(status, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
 
 
-def check_roboflow() -> Iterator[Diagnosed]:
-    """Yield whether there is a key, without showing it, and whether Roboflow's own server answers."""
+def check_roboflow() -> Iterator[CheckResult]:
+    """Check whether a key for Roboflow is set, without showing the key, and whether its server answers."""
     from executive.perception.detectors.roboflow.key import KEY_VARIABLE, ApiKey
     from executive.perception.detectors.roboflow.options import HOSTED_URL
 
-    fix, is_set = "set it for models that Roboflow hosts", ApiKey(os.environ).is_set
+    fix, is_set = "set it to use models that Roboflow hosts", ApiKey(os.environ).is_set
     yield _make_result(is_set, "key", f"{KEY_VARIABLE} is set", "note", f"{KEY_VARIABLE} is not set", fix)
     message = f"{HOSTED_URL} does not answer within {SERVER_TIMEOUT:.0f} s"
     fix = "check the network; only models that Roboflow hosts need it"
     yield _make_result(is_reachable(HOSTED_URL), "roboflow", f"{HOSTED_URL} answers", "note", message, fix)
 
 
-def _make_result(is_ok: bool, subject: str, good: str, status: str, bad: str, fix: str) -> Diagnosed:
-    return Diagnosed("ok", subject, good) if is_ok else Diagnosed(status, subject, bad, fix)
+def _make_result(is_ok: bool, subject: str, ok_text: str, status: str, text: str, fix: str) -> CheckResult:
+    return CheckResult("ok", subject, ok_text) if is_ok else CheckResult(status, subject, text, fix)
 
 
 def measure_frame_time(renderer: str) -> tuple[float, str]:
-    """Draw with `tiny` or `egl` in a subprocess; return milliseconds per frame and an error message or ""."""
+    """Render with `tiny` or `egl` in a subprocess; return time per frame [ms] and error message or ""."""
     command_line = build_command("executive.cli.doctor", renderer)
     try:
         completed = subprocess.run(
-            command_line, capture_output=True, text=True, timeout=DRAW_TIMEOUT, check=False
+            command_line, capture_output=True, text=True, timeout=RENDER_TIMEOUT, check=False
         )
     except subprocess.TimeoutExpired:
-        return 0.0, f"no frame came in {DRAW_TIMEOUT:.0f} s"
-    # Drivers may print text around the result, and may crash after it.
+        return 0.0, f"no frame within {RENDER_TIMEOUT:.0f} s"
+    # Drivers may print text before and after the result, and may crash afterwards.
     if result := re.search(r"^milliseconds: ([0-9.]+)$", completed.stdout, re.MULTILINE):
         return float(result[1]), ""
     *_, last = ["no error output", *filter(str.strip, completed.stderr.splitlines())]
@@ -187,7 +189,7 @@ def measure_frame_time(renderer: str) -> tuple[float, str]:
 
 
 def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
-    """Return True if a server answers within `timeout` [s], even with an error."""
+    """Return True if a server answers within `timeout` [s], also with an HTTP error."""
     import urllib.error
     import urllib.request
 
@@ -198,8 +200,8 @@ def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
     return True
 
 
-def prepare_drawing(renderer: str) -> Callable[[], object]:
-    """Return a function that draws a frame: of the overhead cell for `tiny`, of an empty scene for `egl`.
+def prepare_renderer(renderer: str) -> Callable[[], object]:
+    """Return a function that renders a frame: of the cell overhead for `tiny`, of an empty scene for `egl`.
 
     Raises:
         SystemExit: There is no EGL plugin, or it cannot be loaded.
@@ -228,6 +230,6 @@ if __name__ == "__main__":
     import statistics
     import timeit
 
-    with stdout_kept_clean():
-        times = timeit.repeat(prepare_drawing(sys.argv[1]), number=1, repeat=1 + FRAMES)
+    with keep_stdout_clean():
+        times = timeit.repeat(prepare_renderer(sys.argv[1]), number=1, repeat=1 + FRAME_COUNT)
     click.echo(f"milliseconds: {1000 * statistics.median(times[1:]):.2f}")

@@ -9,118 +9,122 @@ from typing import Any
 import click
 
 from executive.cli import options
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.streams import keep_stdout_clean, print_json
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
-"""Suffixes of the file formats in which the sheet of misses can be saved."""
+"""Suffixes of the file formats in which the sheet of mistakes can be saved."""
 
 
 @click.command(name="evaluate")
 @click.option(
     "--cell", "cells", metavar="CELL", multiple=True,
-    help="Cell whose detector is measured on random scenes of the cell; repeatable.",
+    help="Cell file or shipped cell whose detector is measured on rendered scenes; repeatable.",
 )  # fmt: skip
-@click.option("--detector", metavar="NAME", help="Name of the cell's detector; by default the first.")
+@click.option(
+    "--detector", "detector_name", metavar="NAME",
+    help="Name of the detector in --cell; by default the first.",
+)  # fmt: skip
 @click.option(
     "--dataset", type=options.FOLDER, metavar="FOLDER",
-    help="COCO or YOLO folder of labelled images to use instead of random scenes.",
+    help="COCO or YOLO dataset to use instead of rendered scenes.",
 )  # fmt: skip
 @click.option(
     "--weights", type=options.FILE, metavar="ONNX",
-    help="Exported RF-DETR to measure instead of a cell's detector.",
+    help="Exported RF-DETR to measure instead of the detector of a cell.",
 )  # fmt: skip
 @click.option(
     "--labels", type=options.FILE, metavar="FILE",
-    help="Class names of --weights, one per line; by default labels.txt or NAME.labels.txt beside it.",
+    help="Class names of --weights, one per line; by default NAME.labels.txt or labels.txt in its folder.",
 )  # fmt: skip
 @click.option("--images", type=options.COUNT, default=200, help="Number of scenes to render per cell.")
 @options.seed_option
 @click.option(
     "--threshold", type=click.FloatRange(0, 1),
-    help="Lowest confidence at which a detection counts; by default the threshold of the detector.",
+    help="Minimum confidence of a detection; by default the threshold of the detector.",
 )  # fmt: skip
 @click.option(
     "--varied", is_flag=True,
-    help="Vary scenes as widely as in training; by default scenes are as at the start of a run.",
+    help="Vary the scenes as widely as for training; by default they are initial scenes of runs.",
 )  # fmt: skip
 @click.option(
     "--view", type=click.Choice(["table", "full"]), default="table",
-    help="Part of the frame to search.",
+    help="Region of the frame to search.",
 )  # fmt: skip
 @options.scene_option
 @options.overrides_option
 @click.option(
     "--out", type=options.FILE, metavar="FILE",
-    help="File for the measurement that runs read; by default CELL.measured.json beside the cell file.",
+    help="File for the measurement; by default CELL.measured.json beside the cell file, which runs read.",
 )  # fmt: skip
-@click.option("--workers", type=options.COUNT, default=2, help="Number of rendering processes.")
-@click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Image file for the worst misses.")
+@options.workers_option
+@click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Image file for the worst mistakes.")
 @options.json_option
 def command(
-    cells: tuple[str, ...], detector: str | None, dataset: Path | None, weights: Path | None,
+    cells: tuple[str, ...], detector_name: str | None, dataset: Path | None, weights: Path | None,
     labels: Path | None, images: int, seed: int, threshold: float | None, varied: bool, view: str,
     scene: Path | None, overrides: dict[str, str], out: Path | None, workers: int, sheet: Path | None,
     as_json: bool,
 ) -> None:  # fmt: skip
-    """Measure a detector on random scenes of cells, or on labelled images.
+    """Measure the accuracy of a detector.
 
-    The detector is that of a cell with all settings of its section, or a model file (--weights), by default
-    the one that ships with this project. The measurement of a cell's detector, as it is declared, is stored:
-    runs take the error rates of the detector from it.
+    The detector belongs to a cell (--cell), or is a model file (--weights) or the shipped model. The images
+    are rendered scenes of the cell (by default of the shipped cell overhead), or those of --dataset. For a
+    detector of a cell, the error rates are stored for runs, unless an option changes its conditions.
     """
-    unknown = next((key for key in overrides if not key.startswith("cell.")), "")
-    is_picture = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES
-    options.refuse(
-        (detector and weights, "--detector is of a cell and --weights a model file; give one of them"),
-        (detector and dataset and not cells, f"--detector {detector} is of which cell? Name it with --cell"),
-        (labels and not weights, "--labels are those of a model file; name it with --weights"),
-        (dataset and varied, "--varied renders scenes, and --dataset brings images; give one of them"),
-        (dataset and scene, "--scene renders scenes, and --dataset brings images; give one of them"),
-        (varied and scene, f"--scene {scene} changes scenes of the cell; --varied draws them itself"),
-        (varied and view != "table", f"--view {view} is a part of a run's frame; leave out --varied"),
-        (out and len(cells) != 1, f"--out {out} is the file for one cell; name the cell with --cell"),
-        (unknown, f"--set {unknown} is no key of a cell; write cell.KEY.KEY=VALUE"),
-        (not is_picture, f'"{sheet}" is no picture; its name must end in {", ".join(IMAGE_SUFFIXES)}'),
+    unknown_key = next((key for key in overrides if not key.startswith("cell.")), "")
+    is_image = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES
+    options.check_usage(
+        (detector_name and weights, "--detector and --weights exclude each other; give one of them"),
+        (detector_name and dataset and not cells, f"--detector {detector_name} needs --cell"),
+        (labels and not weights, "--labels needs a model file; name it with --weights"),
+        (dataset and varied, "--varied and --dataset exclude each other; give one of them"),
+        (dataset and scene, "--scene and --dataset exclude each other; give one of them"),
+        (varied and scene, "--scene and --varied exclude each other; give one of them"),
+        (varied and view != "table", f"--view {view} and --varied exclude each other; give one of them"),
+        (out and len(cells) != 1, f"--out {out} needs exactly one --cell"),
+        (unknown_key, f"--set {unknown_key} is not a key of a cell; write cell.KEY.KEY=VALUE"),
+        (not is_image, f'the name of --sheet "{sheet}" must end in {", ".join(IMAGE_SUFFIXES)}'),
     )
-    measured: dict[str, Any] = {}
-    # A measurement under other conditions than those of a run does not predict the error rates of runs.
-    as_declared = not (weights or varied or scene or threshold) and view == "table"
-    stored = bool(cells) and as_declared and (out is not None or not overrides)
-    with stdout_kept_clean():
+    results: dict[str, Any] = {}
+    # Only a measurement under the conditions of a run predicts the error rates in runs.
+    has_run_conditions = not (weights or varied or scene or threshold) and view == "table"
+    is_stored = bool(cells) and has_run_conditions and (out is not None or not overrides)
+    with keep_stdout_clean():
         from executive.campaign import evaluation
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import bar, report_polygons
         from executive.training.evaluation.worst_mistakes import WorstMistakes
         from executive.view.figures.detector import print_metrics
 
-        worst, scenes = WorstMistakes(), evaluation.SceneSettings(images, seed, varied, view, workers, scene)
-        cell_names = cells or (() if dataset else ("overhead",))
-        files = dict(zip(map(find_cell, cell_names), load_cells(cell_names, overrides).values(), strict=True))
-        tested_detectors = list(evaluation.list_detectors(files, detector, weights, labels))
+        mistakes = WorstMistakes()
+        scenes = evaluation.SceneSettings(images, seed, varied, view, workers, scene)
+        names = cells or (() if dataset else ("overhead",))
+        configs_by_file = dict(zip(map(find_cell, names), load_cells(names, overrides).values(), strict=True))
+        detectors = list(evaluation.list_detectors(configs_by_file, detector_name, weights, labels))
         if dataset is not None:
             report_polygons(dataset)
-        for tested in tested_detectors:
-            evaluation.check_detector(tested, renders_scenes=dataset is None, scene=scene)
-        for tested in tested_detectors:
-            measurement, start = tested.make_measurement_name(dataset), time.monotonic()
+        for detector in detectors:
+            evaluation.check_detector(detector, renders_scenes=dataset is None, scene=scene)
+        for detector in detectors:
+            measurement, start_time = detector.make_measurement_name(dataset), time.monotonic()
             result = evaluation.measure_detector(
-                tested, dataset, scenes, threshold=threshold, worst_mistakes=worst, progress=bar
+                detector, dataset, scenes, threshold=threshold, worst_mistakes=mistakes, progress=bar
             )
-            print_metrics(measurement, tested.name, result)
-            kind = tested.configs[tested.name].kind
-            measured[measurement] = {"detector": tested.name, "kind": kind, **result.to_dict()}
-            if stored and tested.cell is not None:
+            print_metrics(measurement, detector.name, result)
+            kind = detector.configs[detector.name].kind
+            results[measurement] = {"detector": detector.name, "kind": kind, **result.to_dict()}
+            if is_stored and detector.cell is not None:
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
-                repeat = f"executive evaluate --cell {tested.cell.cell} --detector {tested.name} {source}"
-                seconds = time.monotonic() - start
-                path = evaluation.store_evaluation(tested, result, out, command=repeat, seconds=seconds)
+                arguments = f"--cell {detector.cell.cell} --detector {detector.name} {source}"
+                line, seconds = f"executive evaluate {arguments}", time.monotonic() - start_time
+                path = evaluation.store_evaluation(detector, result, out, command=line, seconds=seconds)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
             from executive.training.dataset import save_image
             from executive.training.evaluation.worst_mistakes import draw_sheet
 
-            save_image(sheet, draw_sheet(worst.kept, ", ".join(measured)))
-            click.echo(f"the {len(worst.kept)} worst in {sheet}", err=True)
+            save_image(sheet, draw_sheet(mistakes.kept, ", ".join(results)))
+            click.echo(f"{sheet}: the {len(mistakes.kept)} worst mistakes", err=True)
     if as_json:
         named_files = {"scene": scene and str(scene), "weights": weights and str(weights)}
-        print_json({"seed": seed, "varied": varied, **named_files, "measured": measured})
+        print_json({"seed": seed, "varied": varied, **named_files, "measured": results})

@@ -1,4 +1,4 @@
-"""`executive film`: make a film of a recorded run, with robot and tree side by side."""
+"""`executive film`: make a film of a recorded run that shows robot and tree side by side."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from executive.cli.options import FILE, json_option, runs_option, workers_option
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.streams import keep_stdout_clean, print_json
 
 
 @click.command(name="film")
@@ -16,13 +16,13 @@ from executive.cli.streams import print_json, stdout_kept_clean
     "-o", "--output", type=FILE, metavar="FILE",
     help="File to write, .mp4 or .gif; by default film.mp4 in the run directory.",
 )  # fmt: skip
-@click.option("--gif", is_flag=True, help="Make an animated GIF, for instance for a README.")
+@click.option("--gif", is_flag=True, help="Make an animated GIF, for example for a README.")
 @click.option(
     "--speed", type=click.FloatRange(0.1, 100),
-    help="Seconds on the robot's clock per second of the film; by default 1, for a GIF 2.",
+    help="Simulated seconds per second of the film; by default 1, or 2 for a GIF.",
 )  # fmt: skip
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
-@click.option("--quiet", is_flag=True, help="Do not show the progress.")
+@click.option("--quiet", is_flag=True, help="Do not print the progress.")
 @workers_option
 @runs_option
 @json_option
@@ -30,12 +30,13 @@ def command(
     run: str, output: Path | None, gif: bool, speed: float | None, force: bool, quiet: bool, workers: int,
     runs: Path, as_json: bool,
 ) -> None:  # fmt: skip
-    """Make a film of RUN (a run directory, or `latest`): the robot, and beside it the tree and every item.
+    """Make a film of a recorded run.
 
-    The world is rebuilt from the run's world.log and rendered again, so this works for every run on a
-    simulated cell, also one that was halted, interrupted or resumed. Needs no display.
+    RUN is a run directory or `latest`. The film shows the robot, the tree and all items. The world is
+    reconstructed from world.log in the run directory and rendered again, so that every run on a simulated
+    cell can be filmed, also a run that was halted, interrupted or resumed. No display is needed.
     """
-    with stdout_kept_clean():
+    with keep_stdout_clean():
         from executive.cli.progress import bar
         from executive.record.run_directory import RunDirectory, find_run
         from executive.view.film.film import END_DURATION, write_film
@@ -43,20 +44,20 @@ def command(
         from executive.view.film.source import FilmSource
 
         directory = RunDirectory(find_run(run, runs))
-        format = choose_format(output, gif)
-        file = output or directory.path / f"film{format.suffix}"
+        film_format = choose_format(output, gif)
+        film_file = output or directory.path / f"film{film_format.suffix}"
         source = FilmSource(directory)
-        speed = speed or format.speed
-        with prepare_file(file, force=force) as partial_file:
+        speed = speed or film_format.speed
+        with prepare_file(film_file, force=force) as partial_file:
             if not quiet:
                 seconds = source.events[-1].clock / speed + END_DURATION
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)
             with bar("frames", quiet=quiet, print_lines=True) as progress:
                 frames = write_film(
-                    source, partial_file, format, speed=speed, workers=workers, progress=progress
+                    source, partial_file, film_format, speed=speed, workers=workers, progress=progress
                 )
-        seconds, size = frames / format.frame_rate, file.stat().st_size
-        result = {"file": str(file), "frames": frames, "seconds": seconds, "size": size}
-        click.echo(f"{file}: {seconds:.1f} s, {size / 1e6:.1f} MB", err=True)
+        seconds, size = frames / film_format.frame_rate, film_file.stat().st_size
+        result = {"file": str(film_file), "frames": frames, "seconds": seconds, "size": size}
+        click.echo(f"{film_file}: {seconds:.1f} s, {size / 1e6:.1f} MB", err=True)
     if as_json:
         print_json(result)

@@ -1,4 +1,4 @@
-"""The command `executive`: finds the requested command, and reports every error as text and exit code."""
+"""Command group `executive`: runs the requested command, and reports errors by text and exit code."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from typing import Any
 
 import click
 
-from executive.cli.streams import tolerant_streams
+from executive.cli.streams import use_tolerant_streams
 from executive.errors import ExecutiveError, shorten_quotations
 from executive.run.signals import TERMINATION_SIGNALS, handle_signals
 
-PATH_ERRORS = (
+PATH_ERROR_NUMBERS = (
     errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
     errno.EPERM, errno.EROFS,
 )  # fmt: skip
-"""Errors of the operating system that are caused by a wrong path of the user."""
-BAD_INPUT, BROKEN, INTERRUPTED = 2, 3, 130
-"""Exit codes of a command that ends early."""
+"""Error numbers of the operating system that are reported as an invalid path of the user."""
+INVALID_INPUT_CODE, FAULT_CODE, HALTED_CODE = 2, 3, 130
+"""Exit codes of a command that ends by an error or is halted."""
 
 COMMANDS = (
     "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep", "faults",
     "replay", "report", "film", "doctor", "init",
 )  # fmt: skip
-"""Every command, in the order of `--help`; each command is in the module of its name."""
+"""Names of all commands in the order of `--help`; each command is in the module with its name."""
 
 
-class Executive(click.Group):
-    """Command group that imports only the requested command, and exits with the documented exit codes."""
+class CommandGroup(click.Group):
+    """Command group that imports only the requested command and ends with the documented exit codes."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
@@ -53,10 +53,10 @@ class Executive(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that `args` begin with; the error for a misspelling suggests a command."""
-        close = difflib.get_close_matches(args[0], COMMANDS, n=1)
-        if args[0] not in COMMANDS and close and not args[0].startswith("-"):
-            ctx.fail(f'there is no command "{args[0]}"; did you mean "{close[0]}"?')
+        """Return the command that `args[0]` names; the error for a misspelled name suggests a command."""
+        suggestions = difflib.get_close_matches(args[0], COMMANDS, n=1)
+        if args[0] not in COMMANDS and suggestions and not args[0].startswith("-"):
+            ctx.fail(f'there is no command "{args[0]}"; did you mean "{suggestions[0]}"?')
         return super().resolve_command(ctx, args)
 
     def main(
@@ -67,10 +67,10 @@ class Executive(click.Group):
         standalone_mode: bool = True,
         **extra: Any,
     ) -> Any:
-        """Run a command and exit with its code; tracebacks are shown only with `--debug`."""
-        del standalone_mode  # The group is always a program of its own.
+        """Run a command and exit with its exit code; tracebacks are printed only with `--debug`."""
+        del standalone_mode  # The group is always the main program.
         args = list(sys.argv[1:] if args is None else args)
-        with tolerant_streams():
+        with use_tolerant_streams():
             try:
                 with handle_signals(TERMINATION_SIGNALS, signal.default_int_handler):
                     code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
@@ -80,51 +80,50 @@ class Executive(click.Group):
 
 
 def _show_error(error: BaseException, *, debug: bool) -> int:
-    """Write an error that ended a command to standard error, and return the exit code."""
+    """Print the error that ended a command to stderr, and return the exit code."""
     if isinstance(error, click.ClickException):
         text = io.StringIO()
         error.show(text)
         click.echo(shorten_quotations(text.getvalue()), err=True, nl=False)
-        return BAD_INPUT
+        return INVALID_INPUT_CODE
     if isinstance(error, (click.Abort, KeyboardInterrupt)):
         click.echo("halted", err=True)
-        return INTERRUPTED
+        return HALTED_CODE
     if debug:
         traceback.print_exception(error)
     if isinstance(error, ExecutiveError):
         click.echo(str(error), err=True)
         return error.exit_code
-    if isinstance(error, OSError) and error.filename and error.errno in PATH_ERRORS:
+    if isinstance(error, OSError) and error.filename and error.errno in PATH_ERROR_NUMBERS:
         click.echo(shorten_quotations(f"{error.filename}: {error.strerror}"), err=True)
-        return BAD_INPUT
+        return INVALID_INPUT_CODE
     if not debug:
-        click.echo(_report_internal_error(error), err=True)
-    return BROKEN
+        click.echo(_save_traceback(error), err=True)
+    return FAULT_CODE
 
 
-def _report_internal_error(error: BaseException) -> str:
-    """Write the traceback of `error` to a file, and return a message with the path of this file."""
+def _save_traceback(error: BaseException) -> str:
+    """Write the traceback of `error` to a file, and return a message with the path of the file."""
     with tempfile.NamedTemporaryFile(
         "w", prefix="executive-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
     ) as file:
         traceback.print_exception(error, file=file)
     text = shorten_quotations(f"{type(error).__name__}: {error}")
     return (
-        f"internal error ({text}); the details are in {file.name}, "
-        "or on the screen with `executive --debug ...`"
+        f"internal error ({text}); {file.name} contains the traceback, and `executive --debug ...` prints it"
     )
 
 
-@click.group(cls=Executive, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
+@click.group(cls=CommandGroup, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
 @click.version_option(package_name="executive")
-@click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+@click.option("--debug", is_flag=True, help="Print the traceback of an error.")
 def main(debug: bool) -> None:
     """Run pick-and-place missions written as behaviour trees in YAML.
 
     Exit codes: 0 success, 1 mission failed or the audit disagrees, 2 invalid input, 3 fault, 4 incomplete
     (objects were rejected), 130 halted by the user.
     """
-    del debug  # `Executive.main` reads the option: it also handles errors outside of commands.
+    del debug  # `CommandGroup.main` reads the option, because it also handles errors outside of commands.
 
 
 if __name__ == "__main__":

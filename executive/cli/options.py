@@ -10,12 +10,12 @@ import click
 
 
 def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
-    """Return the values of overrides `KEY=VALUE`, by key; refuse a key that is given twice."""
+    """Return the values of options `--set KEY=VALUE` by key; a key that occurs twice is an error."""
     overrides: dict[str, str] = {}
     for value in values:
         key, equals, text = value.partition("=")
         if not key or not equals:
-            message = f'"{value}" is no override; write it as KEY=VALUE, for instance attempts=5'
+            message = f'"{value}" is not of the form KEY=VALUE, for example attempts=5'
             raise click.BadParameter(message, ctx, param)
         if key in overrides:
             raise click.BadParameter(f'"{key}" is set twice', ctx, param)
@@ -24,54 +24,55 @@ def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[s
 
 
 class PathType(click.Path):
-    """Path that is neither empty (`Path("")` is the working directory) nor a link without a target."""
+    """Type of paths that rejects an empty path (`Path("")` is the working directory) and a broken link."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path, or end the command with an error."""
+        """Return the path, or raise a usage error."""
         if str(value) == "":
             self.fail("the path is empty", param, ctx)
         if os.path.islink(value) and not os.path.exists(value):
-            self.fail(f"{value} is a link that leads to no file", param, ctx)
+            self.fail(f"{value} is a broken link: its target does not exist", param, ctx)
         return super().convert(value, param, ctx)
 
 
 FILE = PathType(path_type=Path, dir_okay=False)
+"""Type of an option with the path of a file."""
 FOLDER = PathType(path_type=Path, file_okay=False)
+"""Type of an option with the path of a folder."""
 COUNT = click.IntRange(min=1)
+"""Type of an option with a positive number."""
 MAX_SEED = 2**32 - 1
-"""Largest seed: a number of 32 bits, which every random number generator accepts."""
-MISSION = click.argument("mission", metavar="MISSION")
+"""Maximum seed: 32 bits, which every random number generator accepts."""
+mission_argument = click.argument("mission", metavar="MISSION")
 
 
-def refuse(*conflicts: tuple[object, str]) -> None:
+def check_usage(*errors: tuple[object, str]) -> None:
     """Raise the first error whose condition is true.
 
     Args:
-        conflicts: Condition and message of each error.
+        errors: Condition and message of each possible error in the use of options.
 
     Raises:
         UsageError: A condition is true.
     """
-    for is_wrong, message in conflicts:
-        if is_wrong:
+    for condition, message in errors:
+        if condition:
             raise click.UsageError(message)
 
 
 overrides_option = click.option(
     "--set", "overrides", metavar="KEY=VALUE", multiple=True, callback=_parse_overrides,
-    help="Set a param, or with cell.KEY.KEY a key of the cell; repeatable.",
+    help="Set a param of the mission, or a key of the cell: cell.KEY.KEY=VALUE; repeatable.",
 )  # fmt: skip
-runs_option = click.option("--runs", type=FOLDER, default=Path("runs"), help="Folder of the run directories.")
+runs_option = click.option("--runs", type=FOLDER, default=Path("runs"), help="Folder with run directories.")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
-seed_option = click.option(
-    "--seed", type=click.IntRange(0, MAX_SEED), default=0, help="Seed of all random numbers."
-)
+seed_option = click.option("--seed", type=click.IntRange(0, MAX_SEED), default=0, help="Random seed.")
 scene_option = click.option(
     "--scene", type=FILE, metavar="FILE",
-    help="Change the simulated world without the executive's knowledge: light, table, objects, camera.",
+    help="Scene file: differences of the simulated world from the cell file (light, table, objects, camera).",
 )  # fmt: skip
-workers_option = click.option("--workers", type=COUNT, default=2, help="Number of concurrent runs.")
+workers_option = click.option("--workers", type=COUNT, default=2, help="Number of parallel processes.")
 oracle_option = click.option(
     "--oracle", is_flag=True,
-    help="Take detections from the true world: a simulated sort then takes about two seconds.",
+    help="Take detections from the simulated world instead of images; sorting then takes about two seconds.",
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Progress of a command, on stderr."""
+"""Progress messages of commands, on stderr."""
 
 from __future__ import annotations
 
@@ -15,60 +15,60 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from executive.cli.streams import open_unescaped_stderr
 
 LINE_PERIOD = 10.0
-"""Time between two lines about the progress of a command without a terminal [s]."""
+"""Minimum time between two progress lines if stderr is not a terminal [s]."""
 
 
 @contextmanager
 def bar(
     description: str, *, quiet: bool = False, print_lines: bool = False
 ) -> Iterator[Callable[[int, int], None]]:
-    """Show a progress bar with the remaining time, and yield an update function `(done, total)`.
+    """Show a progress bar with the remaining time; the context is its update function `(done, total)`.
 
-    The bar is redrawn ten times per second. If stderr is not a terminal, there is no bar.
+    The bar is redrawn ten times per second. If stderr is not a terminal, the bar is not shown.
 
     Args:
-        description: Name of the work.
-        quiet: Show nothing.
-        print_lines: Without a terminal, write a line every ten seconds.
+        description: Name of the work, beside the bar.
+        quiet: True: show nothing.
+        print_lines: True: if stderr is not a terminal, print a line every `LINE_PERIOD` instead.
     """
     console = Console(file=open_unescaped_stderr())
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     disable = quiet or not console.is_interactive
     if print_lines and not quiet and disable:
-        yield _line_printer(description)
+        yield _make_line_printer(description)
         return
-    # Estimate the speed from all finished parts: in a shorter period, no part may finish.
+    # The speed is estimated from all finished parts, because in a shorter period no part may finish.
     with Progress(*columns, console=console, disable=disable, speed_estimate_period=math.inf) as progress:
-        number = progress.add_task(description, total=None)
-        yield lambda done, total: progress.update(number, completed=done, total=total)
+        task = progress.add_task(description, total=None)
+        yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
-def _line_printer(description: str) -> Callable[[int, int], None]:
+def _make_line_printer(description: str) -> Callable[[int, int], None]:
     """Return an update function `(done, total)` that prints a line at most every `LINE_PERIOD`."""
-    start = shown = time.monotonic()
+    start = last_line = time.monotonic()
 
     def update(done: int, total: int) -> None:
-        nonlocal shown
+        nonlocal last_line
         now = time.monotonic()
-        if done and now - shown >= LINE_PERIOD:
-            shown = now
-            left = (now - start) / done * (total - done)
-            click.echo(f"{description}: {done} of {total}, about {left:.0f} s left", err=True)
+        if done and now - last_line >= LINE_PERIOD:
+            last_line = now
+            remaining = (now - start) / done * (total - done)
+            click.echo(f"{description}: {done} of {total}, about {remaining:.0f} s left", err=True)
 
     return update
 
 
 def report_polygons(folder: Path) -> None:
-    """Print how many boxes of labelled images are made from polygons, if any."""
+    """Print the number of polygons in labelled images, if there are any, because only boxes are used."""
     from executive.training.samples import Samples
 
     if count := Samples(folder).polygon_count:
-        click.echo(f"note: {count} polygons in {folder} are used as boxes around them", err=True)
+        click.echo(f"note: {count} polygons in {folder} are replaced by their bounding boxes", err=True)
 
 
-def print_halting() -> None:
-    """Print that Ctrl-C or SIGTERM was received, and what happens next."""
+def print_halt() -> None:
+    """Print that Ctrl-C or SIGTERM was received, and its consequences."""
     click.echo(
-        "halting: no new runs start, and current runs are stopped; press Ctrl-C again to quit immediately",
+        "halting: no new runs start, and current runs are halted; press Ctrl-C again to quit immediately",
         err=True,
     )

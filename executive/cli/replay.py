@@ -7,38 +7,35 @@ from pathlib import Path
 import click
 
 from executive.cli.options import FILE, json_option, runs_option
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.streams import keep_stdout_clean, print_json
 
 
 @click.command(name="replay")
 @click.argument("run", metavar="RUN")
 @click.option(
-    "--mission", "edited", type=FILE, metavar="FILE",
+    "--mission", "mission_file", type=FILE, metavar="FILE",
     help="Mission file to use instead of the recorded mission.",
 )  # fmt: skip
 @runs_option
 @json_option
 @click.pass_context
-def command(ctx: click.Context, run: str, edited: Path | None, runs: Path, as_json: bool) -> None:
-    """Repeat the decisions of RUN (a run directory, or `latest`) with the recorded answers of its cell.
+def command(ctx: click.Context, run: str, mission_file: Path | None, runs: Path, as_json: bool) -> None:
+    """Repeat the decisions of a recorded run.
 
-    Nothing moves and nothing is simulated: tree, skills and ledger get the recorded answers of arm, tool,
-    camera, detectors and operator. Prints the first decision that differs; exit code 1 if there is one.
+    RUN is a run directory or `latest`. Nothing moves and nothing is simulated: tree, skills and ledger get
+    the recorded inputs from arm, tool, camera, detectors and operator. Prints the first decision that
+    differs; exit code 1 if there is one.
     """
-    with stdout_kept_clean():
+    with keep_stdout_clean():
         from executive.plugins import discover
         from executive.record.journal import read_journal
         from executive.record.replay import replay_run
         from executive.record.run_directory import find_run
 
         path = find_run(run, runs)
-        result = replay_run(path, read_journal(path / "journal.jsonl"), discover(), edited)
-        if result.is_equal:
-            click.echo(f"{result.decisions} decisions, all as recorded ({path})", err=True)
-        else:
-            click.echo(
-                f"{result.decisions} decisions as recorded, then {result.difference} ({path})", err=True
-            )
+        result = replay_run(path, read_journal(path / "journal.jsonl"), discover(), mission_file)
+        end = ", all as recorded" if result.is_equal else f" as recorded, then {result.difference}"
+        click.echo(f"{result.decisions} decisions{end} ({path})", err=True)
     if as_json:
         print_json({"run": str(path), "same": result.is_equal, **result.as_json()})
     ctx.exit(0 if result.is_equal else 1)

@@ -1,4 +1,4 @@
-"""`executive report`: write the page that explains a recorded run."""
+"""`executive report`: write the report of a recorded run."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from executive.cli.options import json_option, runs_option
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.streams import keep_stdout_clean, print_json
 
 
 @click.command(name="report")
@@ -15,11 +15,12 @@ from executive.cli.streams import print_json, stdout_kept_clean
 @runs_option
 @json_option
 def command(run: str, runs: Path, as_json: bool) -> None:
-    """Write the report of RUN (a run directory, or `latest`) again, and print its path.
+    """Write the report of a recorded run.
 
-    Every run writes a report at its end; a killed run has none yet.
+    RUN is a run directory or `latest`. Prints the path of the report. Every run writes its report when it
+    ends; this command writes it again, or for the first time if the run was killed.
     """
-    with stdout_kept_clean():
+    with keep_stdout_clean():
         from executive.record.run_directory import find_run
         from executive.view.report.page import write_report
 

@@ -11,15 +11,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from executive.cli.options import (
-    json_option,
-    overrides_option,
-    refuse,
-    runs_option,
-    scene_option,
-    seed_option,
-)
-from executive.cli.streams import open_unescaped_stderr, print_json, stdout_kept_clean
+from executive.cli import options
+from executive.cli.streams import keep_stdout_clean, open_unescaped_stderr, print_json
 
 if TYPE_CHECKING:
     from executive.events import RunStarted
@@ -35,23 +28,23 @@ if TYPE_CHECKING:
 @click.argument("mission", metavar="MISSION", required=False)
 @click.option(
     "--resume", metavar="RUN",
-    help="Instead of a mission: resume an interrupted run, given by its directory or as `latest`.",
+    help="Resume an interrupted run (a run directory or `latest`) instead of a mission.",
 )  # fmt: skip
-@seed_option
-@overrides_option
-@scene_option
-@runs_option
-@json_option
-@click.option("--quiet", is_flag=True, help="Print only the result of a run that does not succeed.")
+@options.seed_option
+@options.overrides_option
+@options.scene_option
+@options.runs_option
+@options.json_option
+@click.option("--quiet", is_flag=True, help="Print only the cause if the run does not succeed.")
 @click.option(
     "--view", "live", is_flag=True, help="Show the run on a page in the browser; its address is printed."
 )
-@click.option("--paused", is_flag=True, help="Wait before the first step until the operator continues.")
+@click.option("--paused", is_flag=True, help="Wait for the operator before the first control step.")
 @click.option("--gui", is_flag=True, help="Open the simulator's window.")
-@click.option("--realtime", is_flag=True, help="Run on the wall clock instead of as fast as possible.")
+@click.option("--realtime", is_flag=True, help="Run in real time instead of as fast as possible.")
 @click.option(
     "--request", "requests", metavar="CLASS", multiple=True,
-    help="Class that the operator requests; repeatable.",
+    help="Class that the operator requests, in this order; repeatable.",
 )  # fmt: skip
 @click.pass_context
 def command(
@@ -59,25 +52,25 @@ def command(
     scene: Path | None, runs: Path, as_json: bool, quiet: bool, live: bool, paused: bool, gui: bool,
     realtime: bool, requests: tuple[str, ...],
 ) -> None:  # fmt: skip
-    """Run MISSION (a file or the name of a shipped mission) and record it."""
+    """Run a mission and record the run.
+
+    MISSION is a file or the name of a shipped mission.
+    """
     sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
     has_mission_options = any(source is not click.core.ParameterSource.DEFAULT for source in sources)
     has_keyboard = sys.stdin is not None and sys.stdin.isatty()
-    cannot_continue = paused and not live and (quiet or not has_keyboard)
-    refuse(
-        (mission is None and resume is None, "name a MISSION, or a run to resume with --resume RUN"),
+    is_endless_pause = paused and not live and (quiet or not has_keyboard)
+    options.check_usage(
+        (mission is None and resume is None, "give a MISSION, or a run with --resume RUN"),
         (
             resume is not None and has_mission_options,
-            "--resume takes mission, seed, params, requests and scene from the run: leave them out here",
+            "--resume takes mission, seed, params, requests and scene from the run; omit them",
         ),
-        (cannot_continue, "nobody could continue the run: --paused needs --view or a terminal to type in"),
-        # The simulator would end the process with a message of its own.
-        (
-            gui and not os.environ.get("DISPLAY"),
-            "--gui needs a display, and DISPLAY names none; leave it out",
-        ),
+        (is_endless_pause, "--paused needs --view or a keyboard in a terminal to continue the run"),
+        # Without this check, the simulator would end the process.
+        (gui and not os.environ.get("DISPLAY"), "--gui needs a display, but DISPLAY is not set; omit --gui"),
     )
-    with stdout_kept_clean():
+    with keep_stdout_clean():
         from executive.cell.json_values import to_json
         from executive.record.diagnosis.text import format_diagnosis
         from executive.record.guarded_view import GuardedView
@@ -92,20 +85,20 @@ def command(
         with _serve_page(live) as page:
             views = [GuardedView(view) for view in (terminal_view, page) if view is not None]
             record = RecordOptions(views, paused)
-            options = RunOptions(
+            run_options = RunOptions(
                 seed, requests or None, keyboard=page is None or has_keyboard, gui=gui, realtime=realtime,
                 scene=scene,
             )  # fmt: skip
             if mission is None:
                 assert resume is not None
-                result, start = _resume(resume, options, runs, record)
+                result, start = _resume(resume, run_options, runs, record)
                 origin = start.file, start.seed, start.overrides
             else:
-                result = _run_mission(mission, overrides, options, runs, record)
+                result = _run_mission(mission, overrides, run_options, runs, record)
                 origin = mission, seed, overrides
-            # The command that repeats the run makes the same requests as the operator.
-            used_requests, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
-            repeat = format_repeat_command(*origin, used_requests, used_scene)
+            # The command to repeat the run contains the requests that the operator made.
+            all_requests, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
+            repeat = format_repeat_command(*origin, all_requests, used_scene)
             report, problem = try_write_report(result.run)
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
@@ -119,17 +112,17 @@ def command(
         elif result.story is not None:
             click.echo("\n".join(format_diagnosis(result.story, result.run, repeat, report)), err=True)
         elif result.status == "INCOMPLETE" or describe_disagreement(result):
-            ended = describe_end(result.status, result.reason, result.node, result.message)
-            click.echo("\n".join(filter(None, (describe_disagreement(result), ended))), err=True)
+            end_description = describe_end(result.status, result.reason, result.node, result.message)
+            click.echo("\n".join(filter(None, (describe_disagreement(result), end_description))), err=True)
     if as_json:
         print_json(to_json(result))
     ctx.exit(find_exit_code(result))
 
 
 def _run_mission(
-    mission: str, overrides: dict[str, str], options: RunOptions, runs: Path, record: RecordOptions
+    mission: str, overrides: dict[str, str], run_options: RunOptions, runs: Path, record: RecordOptions
 ) -> Result:
-    """Run a mission from its start and return the result."""
+    """Run a mission, record the run and return its result."""
     from executive.mission.load import load_mission
     from executive.plugins import discover, load_cell_kind
     from executive.record.recorded_run import record_run
@@ -138,29 +131,31 @@ def _run_mission(
     loaded = load_mission(mission, skills, overrides, load_cell_kind)
     for warning in loaded.warnings if record.views else ():
         click.echo(str(warning), err=True)
-    if options.scene is not None:
+    if run_options.scene is not None:
         from executive.cells.sim.scene_file import load_scene
 
-        # Only a simulated cell reads the scene: check the file for every cell.
-        load_scene(options.scene, loaded.cell_config)
-    return record_run(loaded, skills, options, runs, record)
+        # Only simulated cells read the scene file, but its errors are reported for every cell.
+        load_scene(run_options.scene, loaded.cell_config)
+    return record_run(loaded, skills, run_options, runs, record)
 
 
-def _resume(name: str, options: RunOptions, runs: Path, record: RecordOptions) -> tuple[Result, RunStarted]:
-    """Resume a run; return its result and its start."""
+def _resume(
+    name: str, run_options: RunOptions, runs: Path, record: RecordOptions
+) -> tuple[Result, RunStarted]:
+    """Resume an interrupted run; return its result and the event of its start."""
     from executive.plugins import discover
     from executive.record.journal import find_start, read_journal
     from executive.record.resumed_run import resume_run
     from executive.record.run_directory import find_run
 
     path = find_run(name, runs)
-    result = resume_run(path, discover(), options, record)
+    result = resume_run(path, discover(), run_options, record)
     return result, find_start(read_journal(path / "journal.jsonl"), path, "run the mission again")
 
 
 @contextlib.contextmanager
 def _serve_page(is_enabled: bool) -> Iterator[LivePage | None]:
-    """Serve a page during a run, and print its address."""
+    """In this context, serve a page that shows the run, and print its address; None if not enabled."""
     if not is_enabled:
         yield None
         return
@@ -168,14 +163,14 @@ def _serve_page(is_enabled: bool) -> Iterator[LivePage | None]:
 
     page = LivePage()
     try:
-        click.echo(f"watch it at {page.address}", err=True)
+        click.echo(f"watch the run at {page.address}", err=True)
         yield page
     finally:
         page.finish()
 
 
 def _make_view() -> LineView | TerminalView:
-    """Return the live view if stderr is a terminal, else a view that prints lines."""
+    """Return a view that redraws the terminal if stderr is a terminal, else a view that prints lines."""
     from rich.console import Console
 
     from executive.view.terminal.lines import LineView

@@ -1,25 +1,26 @@
-"""`executive schema`: print the JSON Schemas with which editors complete and check mission files."""
+"""`executive schema`: print JSON Schemas, with which editors complete and check mission files."""
 
 from __future__ import annotations
 
 import click
 
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.streams import keep_stdout_clean, print_json
 
 
 @click.command(name="schema")
-@click.option("--cell", is_flag=True, help="Print the schema of cell files.")
-@click.option("--library", is_flag=True, help="Print the schema of library files.")
-@click.option("--journal", is_flag=True, help="Print the schema of the lines of a journal.")
+@click.option("--cell", is_flag=True, help="Print the schema of cell files instead.")
+@click.option("--library", is_flag=True, help="Print the schema of library files instead.")
+@click.option("--journal", is_flag=True, help="Print the schema of the lines of a journal instead.")
 def command(cell: bool, library: bool, journal: bool) -> None:
-    """Print the JSON Schema of mission files, including the installed skills.
+    """Print the JSON Schema of mission files.
 
-    A file that begins with `# yaml-language-server: $schema=mission.schema.json` names the schema beside it
-    to every editor with the YAML language server.
+    The schema includes the installed skills. Save it as mission.schema.json beside the missions: an editor
+    with the YAML language server uses it in files that begin with
+    `# yaml-language-server: $schema=mission.schema.json`.
     """
     if cell + library + journal > 1:
         raise click.UsageError("--cell, --library and --journal exclude each other; give one of them")
-    with stdout_kept_clean():
+    with keep_stdout_clean():
         from executive.mission.schema.files import make_library_schema, make_mission_schema
         from executive.mission.schema.types import make_cell_schema
         from executive.plugins import discover

@@ -1,4 +1,4 @@
-"""Standard streams: tolerant of write errors, safe from control characters; stdout holds only the result."""
+"""Standard streams that tolerate write errors and escape control characters; stdout for results only."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from executive.errors import escape_control_characters
 
 
 class TolerantStream(io.TextIOBase):
-    """A text stream that escapes control characters, and drops its output after the first write error.
+    """Text stream that escapes control characters, and drops all output after the first write error.
 
     Args:
-        stream: Underlying stream; None if the process was started with this stream closed.
-        is_unescaped: True to write control characters unchanged, for a library that draws on the terminal.
+        stream: Underlying stream; None: the process was started with this stream closed.
+        is_unescaped: True: write control characters unchanged, for a library that draws on the terminal.
 
     Attributes:
-        error: First write error as text, or "".
+        error: Message of the first write error, or "".
     """
 
     def __init__(self, stream: TextIO | None, *, is_unescaped: bool = False) -> None:
         if isinstance(stream, io.TextIOWrapper):
-            # A character that the encoding lacks is escaped; it would be an error otherwise.
+            # By default, a character that the encoding lacks would be an error.
             stream.reconfigure(errors="backslashreplace")
         self._stream = stream
         self._is_unescaped = is_unescaped
@@ -64,7 +64,7 @@ class TolerantStream(io.TextIOBase):
         return self._stream is not None and self._stream.isatty()
 
     def copy_unescaped(self) -> TolerantStream:
-        """Return the same stream without the escaping of control characters."""
+        """Return a stream to the same file that does not escape control characters."""
         return TolerantStream(self._stream, is_unescaped=True)
 
     def fileno(self) -> int:
@@ -85,15 +85,15 @@ class TolerantStream(io.TextIOBase):
 
 
 def open_unescaped_stderr() -> TextIO:
-    """Return standard error without escaping, for a library that draws with control characters."""
+    """Return stderr without escaping of control characters, for a library that draws on the terminal."""
     if isinstance(sys.stderr, TolerantStream):
         return cast(TextIO, sys.stderr.copy_unescaped())
     return sys.stderr
 
 
 @contextlib.contextmanager
-def tolerant_streams() -> Iterator[None]:
-    """Drop output after the first write error of a stream; report an error of standard output at the end."""
+def use_tolerant_streams() -> Iterator[None]:
+    """Make stdout and stderr tolerant in this context; report a write error of stdout at its end."""
     _open_closed_descriptors()
     with (
         contextlib.redirect_stdout(TolerantStream(sys.stdout)) as output,
@@ -111,7 +111,7 @@ def tolerant_streams() -> Iterator[None]:
 def _open_closed_descriptors() -> None:
     """Connect closed standard streams to the null device.
 
-    A file that is opened later would get the number of the closed stream, and libraries would print into it.
+    Otherwise a file that is opened later would get the number of the closed stream, and output of libraries.
     """
     for number in (0, 1, 2):
         try:
@@ -121,8 +121,8 @@ def _open_closed_descriptors() -> None:
 
 
 @contextlib.contextmanager
-def stdout_kept_clean() -> Iterator[None]:
-    """Send Python's output to stderr, and drop the output of C libraries such as pybullet to stdout."""
+def keep_stdout_clean() -> Iterator[None]:
+    """In this context, send Python's stdout to stderr, and drop the stdout of C libraries (pybullet)."""
     sys.stdout.flush()
     real_stdout = os.dup(1)
     null = os.open(os.devnull, os.O_WRONLY)
@@ -131,7 +131,7 @@ def stdout_kept_clean() -> Iterator[None]:
         with contextlib.redirect_stdout(sys.stderr):
             yield
     finally:
-        # Without a flush, the C library would write its buffer to the real standard output later.
+        # Without a flush, the C library would write its buffer to the real stdout later.
         ctypes.CDLL(None).fflush(None)
         os.dup2(real_stdout, 1)
         os.close(real_stdout)
@@ -139,5 +139,5 @@ def stdout_kept_clean() -> Iterator[None]:
 
 
 def print_json(value: Any) -> None:
-    """Write `value` to standard output as one JSON object or array."""
+    """Print `value` to stdout as one JSON object or array."""
     click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))

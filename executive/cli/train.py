@@ -1,4 +1,4 @@
-"""`executive train`: train the small detector."""
+"""`executive train`: train the small RF-DETR on a dataset."""
 
 from __future__ import annotations
 
@@ -9,52 +9,56 @@ from pathlib import Path
 import click
 
 from executive.cli.options import COUNT, FILE, FOLDER, seed_option
-from executive.cli.streams import stdout_kept_clean
+from executive.cli.streams import keep_stdout_clean
 
 
 @click.command(name="train")
 @click.option(
     "--dataset", type=FOLDER, required=True,
-    help="COCO or YOLO folder, from `executive dataset` or a Roboflow export.",
+    help="COCO or YOLO dataset, from `executive dataset` or an export of Roboflow.",
 )  # fmt: skip
-@click.option("--out", type=FOLDER, required=True, help="Folder for checkpoints and metrics.")
+@click.option("--out", type=FOLDER, required=True, help="Folder for model, checkpoints and metrics.")
 @click.option(
     "--from", "start", type=FILE, metavar="MODEL",
-    help="Model of an earlier training to fine-tune, .onnx or .pth; without it, random weights.",
+    help="Model of an earlier training to fine-tune, .onnx or .pth; by default random weights.",
 )  # fmt: skip
 @click.option(
     "--rate", type=click.FloatRange(min=0, min_open=True),
-    help="Learning rate; by default 1e-4 for a model that knows the same classes, else 3e-4.",
+    help="Learning rate; by default 1e-4 if --from is a model for the same classes, else 3e-4.",
 )  # fmt: skip
-@click.option("--epochs", type=COUNT, default=20, help="Number of passes over the data set.")
+@click.option("--epochs", type=COUNT, default=20, help="Number of passes over the dataset.")
 @seed_option
 def command(dataset: Path, out: Path, start: Path | None, rate: float | None, epochs: int, seed: int) -> None:
-    """Train the small RF-DETR; needs the extra `train`, about 3 GB to download on Linux."""
-    with stdout_kept_clean():
+    """Train the small RF-DETR detector.
+
+    Needs the extra `train`: uv sync --extra train (a download of about 3 GB on Linux).
+    """
+    with keep_stdout_clean():
         from executive.cli.progress import bar, report_polygons
         from executive.training.samples import list_splits
         from executive.training.train import Settings, train
 
         for split in list_splits(dataset):
             report_polygons(split)
-        with bar("training") as batches:
-            train(dataset, out, Settings(start, rate, epochs, seed), _epoch_printer(epochs), batches)
+        with bar("training") as report_batch:
+            settings = Settings(start, rate, epochs, seed)
+            train(dataset, out, settings, _make_epoch_printer(epochs), report_batch)
         click.echo(
-            "add these lines to the cell file, with paths relative to its folder:\n\n"
+            "add these lines to the cell file, with paths relative to the folder of the cell file:\n\n"
             "detectors:\n  trained:\n    kind: rfdetr\n"
             f"    model_path: {out / 'model.onnx'}\n    labels: {out / 'labels.txt'}",
             err=True,
         )
 
 
-def _epoch_printer(epochs: int) -> Callable[[int, dict[str, float]], None]:
+def _make_epoch_printer(epochs: int) -> Callable[[int, dict[str, float]], None]:
     """Return a function that prints the metrics of an epoch and the estimated remaining time."""
     start_time = time.monotonic()
 
     def print_epoch(epoch: int, metrics: dict[str, float]) -> None:
-        figures = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
+        values = ", ".join(f"{name} {value:.4g}" for name, value in metrics.items())
         minutes = (time.monotonic() - start_time) / epoch * (epochs - epoch) / 60
-        left = f"; about {minutes:.0f} min left" if epoch < epochs else ""
-        click.echo(f"epoch {epoch} of {epochs}: {figures}{left}", err=True)
+        remaining = f"; about {minutes:.0f} min left" if epoch < epochs else ""
+        click.echo(f"epoch {epoch} of {epochs}: {values}{remaining}", err=True)
 
     return print_epoch

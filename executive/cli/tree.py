@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from executive.cli.options import MISSION, json_option, overrides_option, refuse
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.options import check_usage, json_option, mission_argument, overrides_option
+from executive.cli.streams import keep_stdout_clean, print_json
 
 if TYPE_CHECKING:
     from executive.cell.protocols import Cell
@@ -18,37 +18,40 @@ if TYPE_CHECKING:
 
 
 @click.command(name="tree")
-@MISSION
+@mission_argument
 @overrides_option
 @click.option(
-    "--ports", is_flag=True, help="Print the inputs (? if it may be unset) and outputs of every skill."
+    "--ports", is_flag=True, help="Print the inputs (? if possibly unset) and outputs of every skill."
 )
 @click.option(
     "--reasons", is_flag=True,
-    help="Print the failure reasons of every skill, and those that every catch handles.",
+    help="Print the failure reasons of every skill, and the reasons that every catch handles.",
 )  # fmt: skip
-@click.option("--fold", is_flag=True, help="Print every subtree once, and afterwards only its name.")
-@click.option("--svg", "as_svg", is_flag=True, help="Print the tree as an SVG image on stdout.")
-@click.option("--dot", "as_dot", is_flag=True, help="Print the tree as Graphviz text on stdout.")
+@click.option("--fold", is_flag=True, help="Expand every subtree only where it is used first.")
+@click.option("--svg", "as_svg", is_flag=True, help="Print the tree as an SVG image.")
+@click.option("--dot", "as_dot", is_flag=True, help="Print the tree in the DOT language of Graphviz.")
 @json_option
 def command(
     mission: str, overrides: dict[str, str], ports: bool, reasons: bool, fold: bool, as_svg: bool,
     as_dot: bool, as_json: bool,
 ) -> None:  # fmt: skip
-    """Print the tree of MISSION with all subtrees expanded."""
-    forms = [name for name, wanted in (("--svg", as_svg), ("--dot", as_dot), ("--json", as_json)) if wanted]
-    extras = [name for name, wanted in (("--ports", ports), ("--reasons", reasons)) if wanted]
-    alone = f"{' and '.join(forms)} exclude each other: standard output holds one of them"
-    enough = f"{''.join(forms)} holds ports and reasons anyway; leave out {' and '.join(extras)}"
-    refuse((len(forms) > 1, alone), (forms and extras, enough))
-    with stdout_kept_clean():
+    """Print the behaviour tree of a mission.
+
+    MISSION is a file or the name of a shipped mission. All subtrees are expanded.
+    """
+    formats = [name for name, given in (("--svg", as_svg), ("--dot", as_dot), ("--json", as_json)) if given]
+    extras = [name for name, given in (("--ports", ports), ("--reasons", reasons)) if given]
+    conflict = f"{' and '.join(formats)} exclude each other; give one of them"
+    redundancy = f"{''.join(formats)} always contains ports and reasons; omit {' and '.join(extras)}"
+    check_usage((len(formats) > 1, conflict), (formats and extras, redundancy))
+    with keep_stdout_clean():
         from pydantic_core import to_json
 
         from executive.view.tree.dot import draw_dot
         from executive.view.tree.outline import draw_outline, fold_subtrees
         from executive.view.tree.svg import draw_svg
 
-        name, nodes = _outline_of(mission, overrides)
+        name, nodes = _load_outline(mission, overrides)
         nodes = fold_subtrees(nodes) if fold else nodes
         if as_svg:
             shown = draw_svg(nodes, name)
@@ -61,8 +64,8 @@ def command(
     (print_json if as_json else click.echo)(shown)
 
 
-def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:
-    """Return a mission's name and its tree's outline."""
+def _load_outline(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:
+    """Return the name of a mission and the nodes of its tree."""
     from executive.events import discard_event
     from executive.mission.build import build_tree
     from executive.mission.load import load_mission
@@ -72,6 +75,7 @@ def _outline_of(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[
 
     skills = discover()
     loaded = load_mission(mission, skills, overrides)
-    # A tree that never runs needs no cell, only a clock, which stands still.
-    nowhere = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
-    return loaded.mission.name, make_outline(build_tree(loaded, skills, nowhere, Blackboard(), discard_event))
+    # The tree is not run, so that it needs only the clock of a cell.
+    placeholder_cell = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
+    tree = build_tree(loaded, skills, placeholder_cell, Blackboard(), discard_event)
+    return loaded.mission.name, make_outline(tree)

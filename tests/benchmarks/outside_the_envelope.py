@@ -17,7 +17,7 @@ from executive.campaign.pool import run_jobs
 from executive.cell.config import CellConfig
 from executive.cells.sim.scene_file import load_scene
 from executive.cli.options import runs_option, workers_option
-from executive.cli.progress import bar, print_halting
+from executive.cli.progress import bar, print_halt
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from tests.benchmarks.ground_truth import FAULT, HUNG, AuditedRun, run_audited
@@ -96,7 +96,7 @@ def measure(
             jobs += [Job(case, seed, scene, runs, wall_time_limit) for seed in range(first, first + count)]
         with bar("outside the envelope") as progress:
             results = run_jobs(
-                jobs, run_job, _describe_broken, workers=workers, progress=progress, on_halt=print_halting
+                jobs, run_job, _describe_broken, workers=workers, progress=progress, on_halt=print_halt
             )
     done = [result for result in results if result is not None and result.run.status != HALTED]
     figures = {"asked": len(jobs), "runs": len(done), "first_seed": first_seed, **summarize(done)}

@@ -22,8 +22,8 @@ from rich.table import Table
 from executive.campaign.mission_under_test import MissionUnderTest, load_mission_under_test
 from executive.cell.json_values import to_json
 from executive.cli.cells import load_cells
-from executive.cli.options import MISSION, json_option, oracle_option, overrides_option, seed_option
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.options import json_option, mission_argument, oracle_option, overrides_option, seed_option
+from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import ExecutiveError, InputError
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.result import describe_disagreement
@@ -53,7 +53,7 @@ def run_command(measure: Callable[..., Figures], *options: Option) -> None:
     def command(as_json: bool, **values: Any) -> None:
         if "cell" in values:
             (values["cell"],) = load_cells((values["cell"],)).values()
-        with stdout_kept_clean():
+        with keep_stdout_clean():
             figures = measure(**values)
         if as_json:
             print_json(figures)
@@ -83,7 +83,7 @@ def run_mission_command(measure: Callable[..., Figures], *options: Option) -> No
         return measure(load_mission_under_test(mission, overrides, oracle, seed), **values)
 
     measure_mission.__doc__ = measure.__doc__
-    run_command(measure_mission, MISSION, *options, oracle_option, seed_option, overrides_option)
+    run_command(measure_mission, mission_argument, *options, oracle_option, seed_option, overrides_option)
 
 
 def record_subject(subject: MissionUnderTest, seed: int, runs: Path) -> tuple[Figures, str]:

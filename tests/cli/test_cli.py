@@ -123,9 +123,9 @@ def test_quiet_shows_a_run_with_rejected_objects_and_one_that_the_audit_contradi
 def test_what_libraries_print_does_not_reach_standard_output():
     code = """
 import ctypes, os
-from executive.cli.streams import print_json, stdout_kept_clean
+from executive.cli.streams import print_json, keep_stdout_clean
 libc = ctypes.CDLL(None)
-with stdout_kept_clean():
+with keep_stdout_clean():
     os.write(1, b"unbuffered\\n")
     libc.puts(b"buffered by C")
     print("from Python")
@@ -173,19 +173,19 @@ def test_help_names_every_command_and_every_exit_code():
     ("words", "sentence"),
     [
         ("chekc x", 'there is no command "chekc"; did you mean "check"?'),
-        ("run sort --set novalue", '"novalue" is no override; write it as KEY=VALUE'),
-        ("run sort --set =1", '"=1" is no override; write it as KEY=VALUE'),
+        ("run sort --set novalue", '"novalue" is not of the form KEY=VALUE'),
+        ("run sort --set =1", '"=1" is not of the form KEY=VALUE'),
         ("run sort --set a=1 --set a=2", '"a" is set twice'),
-        ("run sort --gui", "--gui needs a display, and DISPLAY names none; leave it out"),
+        ("run sort --gui", "--gui needs a display, but DISPLAY is not set; omit --gui"),
         (
             "run sort --paused",
-            "nobody could continue the run: --paused needs --view or a terminal to type in",
+            "--paused needs --view or a keyboard in a terminal to continue the run",
         ),
-        ("sweep sort --seeds 3-1", '"3-1" holds no seed: 1 is less than 3'),
-        ("sweep sort --seeds a-b", '"a-b" is no range of seeds; write it as 0-99'),
+        ("sweep sort --seeds 3-1", '"3-1" contains no seed: 1 is less than 3'),
+        ("sweep sort --seeds a-b", '"a-b" is not a range of seeds, for example 0-99'),
         (
             f"sweep sort --seeds {2**32}",
-            '"4294967296" holds the seed 4294967296; the largest seed is 4294967295',
+            'seed 4294967296 in "4294967296" is too large; the maximum is 4294967295',
         ),
         (f"run sort --seed {2**32}", "4294967296 is not in the range 0<=x<=4294967295"),
         ("dataset overhed --out x", 'Did you mean "overhead"?'),
@@ -202,7 +202,7 @@ def test_an_output_folder_that_is_a_link_to_a_missing_file_is_refused(project, t
     (tmp_path / "link").symlink_to("nowhere")
     shown = invoke("dataset", "overhead", "--out", str(tmp_path / "link"))
     assert (shown.exit_code, shown.stdout) == (2, "")
-    assert "link is a link that leads to no file" in shown.stderr
+    assert "link is a broken link: its target does not exist" in shown.stderr
 
 
 @pytest.mark.parametrize(
@@ -225,7 +225,7 @@ def test_a_bug_is_one_sentence_that_says_where_the_details_are(project):
     shown = invoke("run", "sort", "--quiet")
     assert (shown.exit_code, "Traceback" in shown.stderr) == (3, False)
     assert "internal error (ZeroDivisionError: division by zero)" in shown.stderr
-    path = Path(shown.stderr.split("the details are in ")[1].split(",")[0])
+    path = Path(shown.stderr.split("; ")[1].split(" contains the traceback")[0])
     assert "Traceback" in path.read_text()
     path.unlink()
     debugged = invoke("--debug", "run", "sort", "--quiet")
@@ -282,9 +282,9 @@ def test_a_warning_is_printed_and_the_run_continues(project):
     [
         (["SUCCESS"], 1, 0, "1 of 1 runs succeeded\n"),
         (["SUCCESS", "FAILURE"], 2, 1, "1 of 2 runs succeeded\n"),
-        (["SUCCESS", "FAILURE"], 6, 130, "2 of 6 runs, cut off; 1 of them succeeded\n"),
-        (["SUCCESS", "HALTED"], 6, 130, "1 of 6 runs, cut off; 1 of them succeeded\n"),
-        ([], 6, 130, "0 of 6 runs, cut off\n"),
+        (["SUCCESS", "FAILURE"], 6, 130, "2 of 6 runs, halted; 1 of them succeeded\n"),
+        (["SUCCESS", "HALTED"], 6, 130, "1 of 6 runs, halted; 1 of them succeeded\n"),
+        ([], 6, 130, "0 of 6 runs, halted\n"),
     ],
 )
 def test_a_sweep_ends_by_its_worst_run(project, monkeypatch, tmp_path, statuses, asked, code, expected):

@@ -30,6 +30,6 @@ def test_it_says_at_once_that_it_halts_and_then_how_far_it_came(tmp_path: Path, 
     figures = json.loads(shown)
     assert (figures["asked"], figures["cut_off"]) == (400, True)
     assert 1 <= figures["runs"] < 400
-    halting, summary = said.index("halting: no new runs start"), said.index(" of 400 runs, cut off; ")
+    halting, summary = said.index("halting: no new runs start"), said.index(" of 400 runs, halted; ")
     assert halting < summary
-    assert f"{figures['runs']} of 400 runs, cut off; {figures['succeeded']} of them succeeded" in said
+    assert f"{figures['runs']} of 400 runs, halted; {figures['succeeded']} of them succeeded" in said

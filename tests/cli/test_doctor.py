@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli import doctor
-from executive.cli.doctor import Diagnosed
+from executive.cli.doctor import CheckResult
 from executive.cli.main import main
 from executive.errors import InputError
 from executive.run import versions
@@ -40,10 +40,10 @@ def ended(code: int = 0, stdout: str = "", stderr: str = ""):
 @pytest.mark.parametrize(
     ("version", "mark", "end"),
     [
-        ((3, 9, 1), "problem", " has no pybullet wheel; use 3.10 or 3.11 (uv takes 3.11 by itself)"),
+        ((3, 9, 1), "problem", " has no pybullet wheel; use Python 3.10 or 3.11 (uv installs 3.11)"),
         ((3, 10, 0), "ok", ""),
         ((3, 11, 7), "ok", ""),
-        ((3, 12, 0), "problem", " has no pybullet wheel; use 3.10 or 3.11 (uv takes 3.11 by itself)"),
+        ((3, 12, 0), "problem", " has no pybullet wheel; use Python 3.10 or 3.11 (uv installs 3.11)"),
     ],
 )
 def test_python(version, mark, end):
@@ -56,12 +56,12 @@ def test_python(version, mark, end):
 def test_display(monkeypatch):
     monkeypatch.setenv("DISPLAY", ":1")
     assert shown(doctor.check_system())[1:] == [
-        "ok display: DISPLAY is :1, where --gui opens the simulator's window"
+        "ok display: DISPLAY is :1; --gui opens the window of the simulator there"
     ]
     monkeypatch.delenv("DISPLAY")
     assert shown(doctor.check_system())[1:] == [
         "note display: DISPLAY is not set; run without --gui; "
-        "the terminal, `--view` and the report also show a run"
+        "the terminal, --view and the report also show a run"
     ]
 
 
@@ -111,7 +111,7 @@ def test_everything_registered_is_counted_and_loaded(tmp_path: Path, monkeypatch
     assert shown(doctor.check_plugins()) == ["ok plugins: 13 skills, 2 kinds of cells, 4 kinds of detectors"]
     Path("pyproject.toml").write_text("[project]\n")
     assert shown(doctor.check_plugins())[0].endswith(
-        f"detectors; those of {tmp_path}/pyproject.toml included"
+        f"detectors, including those of {tmp_path}/pyproject.toml"
     )
     for group in ("cells", "detectors"):
         Path("pyproject.toml").write_text(f'[project.entry-points."executive.{group}"]\nbench = "no:Bench"\n')
@@ -123,8 +123,8 @@ def test_both_renderers_draw(monkeypatch):
     # A driver may print around the result, and crash after it.
     monkeypatch.setattr(subprocess, "run", ended(-11, "GL=Mesa\nmilliseconds: 41.7\nDestroy\n"))
     assert shown(doctor.check_renderer()) == [
-        "ok renderer: TinyRenderer, on the CPU: 42 ms for 640x480 of the overhead cell",
-        "ok egl: PyBullet's EGL plugin can be loaded and draws; no cell needs it",
+        "ok renderer: TinyRenderer, on the CPU: 42 ms for 640x480 pixels of the cell overhead",
+        "ok egl: PyBullet's EGL plugin can be loaded and renders; no cell needs it",
     ]
 
 
@@ -133,7 +133,7 @@ def test_both_renderers_draw(monkeypatch):
     [
         (ended(-11), "its process ended with exit code -11: no error output"),
         (ended(1, "GL=Mesa\n", "starting\nit fails\n\n"), "its process ended with exit code 1: it fails"),
-        (None, "no frame came in 30 s"),
+        (None, "no frame within 30 s"),
     ],
 )  # fmt: skip
 def test_no_renderer_draws(monkeypatch, run, why):
@@ -142,8 +142,8 @@ def test_no_renderer_draws(monkeypatch, run, why):
 
     monkeypatch.setattr(subprocess, "run", run or hanging)
     assert shown(doctor.check_renderer()) == [
-        f"problem renderer: TinyRenderer draws nothing: {why}; run `uv sync --reinstall-package pybullet`",
-        f"note egl: PyBullet's EGL plugin draws nothing: {why}; no cell needs it",
+        f"problem renderer: TinyRenderer renders no frame: {why}; run `uv sync --reinstall-package pybullet`",
+        f"note egl: PyBullet's EGL plugin renders no frame: {why}; no cell needs it",
     ]
 
 
@@ -154,7 +154,7 @@ def test_a_frame_is_really_drawn_in_a_process_of_its_own():
 
 
 HOSTED = "https://serverless.roboflow.com"
-KEYLESS = "note key: ROBOFLOW_API_KEY is not set; set it for models that Roboflow hosts"
+KEYLESS = "note key: ROBOFLOW_API_KEY is not set; set it to use models that Roboflow hosts"
 SILENT = (
     f"note roboflow: {HOSTED} does not answer within 3 s; "
     "check the network; only models that Roboflow hosts need it"
@@ -197,8 +197,8 @@ def test_any_answer_in_time_shows_that_a_server_is_there(monkeypatch):
         assert not doctor.is_reachable(f"http://127.0.0.1:{nobody.getsockname()[1]}", 10.0)
 
 
-NOTE = Diagnosed("note", "display", "is not set", "run without")
-PROBLEM = Diagnosed("problem", "packages", "av is missing", "run `uv sync`")
+NOTE = CheckResult("note", "display", "is not set", "run without")
+PROBLEM = CheckResult("problem", "packages", "av is missing", "run `uv sync`")
 
 
 @pytest.mark.parametrize(
@@ -206,7 +206,7 @@ PROBLEM = Diagnosed("problem", "packages", "av is missing", "run `uv sync`")
     [([], 0, "no problems"), ([PROBLEM], 1, "1 problem"), ([PROBLEM] * 2, 1, "2 problems")],
 )
 def test_marks_and_subjects_are_aligned_and_problems_counted(monkeypatch, findings, code, total):
-    monkeypatch.setattr(doctor, "examine", lambda: [Diagnosed("ok", "python", "3.11"), NOTE, *findings])
+    monkeypatch.setattr(doctor, "run_checks", lambda: [CheckResult("ok", "python", "3.11"), NOTE, *findings])
     result = CliRunner().invoke(main, ["doctor"])
     width = 8 if findings else 7
     assert result.stdout.splitlines() == [
@@ -229,7 +229,7 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
     monkeypatch.setattr("executive.plugins.discover", fail)
     monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.key", None)
     monkeypatch.setattr(doctor, "measure_frame_time", lambda renderer: (9.0, ""))
-    found = shown(doctor.examine())
+    found = shown(doctor.run_checks())
     assert [line.split(": ")[0].split(" ")[1] for line in found] == [
         "python", "display", "packages", "opencv", "view", "train", "film",
         "plugins", "renderer", "egl", "roboflow",

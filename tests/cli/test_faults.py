@@ -86,7 +86,7 @@ def test_one_fault_is_repeated_and_recorded(tmp_path: Path):
     ("words", "expected"),
     [
         (("--fault", "0"), "sort_overhead has no fault 0; the numbers are 1 to "),
-        (("--fault", "twelve"), '"twelve" is no fault; write it as 12, or 3+12 for two at once'),
+        (("--fault", "twelve"), '"twelve" is not a fault; write its number, or 3+12 for two faults'),
         (("--fault", "1", "--list"), "--pairs, --fault and --list exclude each other"),
         (("--pairs", "0"), "0 is not in the range x>=1"),
     ],

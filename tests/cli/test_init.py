@@ -11,7 +11,14 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from executive.cli.init.project import FOLDERS, PACKAGE, TEMPLATE, package_name, require_free, write_project
+from executive.cli.init.project import (
+    FOLDERS,
+    PACKAGE,
+    TEMPLATE,
+    check_package_name,
+    make_package_name,
+    write_project,
+)
 from executive.cli.main import main
 from executive.errors import InputError
 
@@ -125,14 +132,14 @@ def test_in_an_empty_working_directory_nothing_needs_to_be_entered(monkeypatch: 
 @pytest.mark.parametrize(
     ("held", "folder", "expected"),
     [
-        (["hall/notes"], "hall", 'the folder "hall" is not empty: it holds notes'),
+        (["hall/notes"], "hall", 'the folder "hall" is not empty: it contains notes'),
         (
             ["hall/.git", "hall/a", "hall/b"],
             "hall",
-            'the folder "hall" is not empty: it holds .git and 2 more',
+            'the folder "hall" is not empty: it contains .git and 2 more',
         ),
-        (["hall"], "hall", '"hall" is a file; name a folder that is empty, or not there yet\n'),
-        (["notes"], "notes/hall", "notes/hall cannot be written: Not a directory; name a folder that can\n"),
+        (["hall"], "hall", '"hall" is a file; name a folder that is empty or does not exist\n'),
+        (["notes"], "notes/hall", "notes/hall cannot be written: Not a directory; name a writable folder\n"),
         ([], "random", "random.py; give another name with --name"),
     ],
 )
@@ -153,26 +160,26 @@ def test_where_no_project_can_be_everything_stays_as_it_is(
     [("demo", "demo"), ("Blue-Table", "blue_table"), ("a b.c", "a_b_c"), ("x/line_2", "line_2"), ("q", "q")],
 )
 def test_the_package_is_named_after_the_folder(folder: str, name: str) -> None:
-    assert package_name(Path(folder)) == name
+    assert make_package_name(Path(folder)) == name
 
 
 @pytest.mark.parametrize("folder", ["3d", "_x", "x_", "tisch-grün", "a+b", "-"])
 def test_a_folder_that_names_no_package_is_refused(folder: str) -> None:
-    with pytest.raises(InputError, match="such a name begins with a letter, goes on with letters"):
-        package_name(Path(folder))
+    with pytest.raises(InputError, match="a package name starts with a letter, continues with letters"):
+        make_package_name(Path(folder))
 
 
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("class", "that is a word of Python's own"),
-        ("tests", "that is another folder of the project"),
-        ("skills", "a module of that name is installed already: .*skills/__init__.py"),
-        ("random", "a module of that name is installed already: .*random.py"),
+        ("class", "it is a Python keyword"),
+        ("tests", "the project has another folder of this name"),
+        ("skills", "a module of this name is already installed: .*skills/__init__.py"),
+        ("random", "a module of this name is already installed: .*random.py"),
     ],
 )
 def test_a_name_that_is_taken_is_refused(name: str, why: str) -> None:
     end = "; give another name with --name$"
     with pytest.raises(InputError, match=f'^a package cannot be called "{name}": {why}{end}'):
-        require_free(name, "")
+        check_package_name(name, "")
     assert {path.name for path in TEMPLATE.iterdir() if path.is_dir()} - {PACKAGE} < set(FOLDERS)

@@ -86,7 +86,7 @@ def test_the_text_tells_the_same():
     text = shown("PlaceNeatly").stdout
     for line in (
         "  held: str, required, names an item. what to put down",
-        "  beside: list[str] | None, may be left out. what it goes beside",
+        "  beside: list[str] | None, optional. what it goes beside",
         "  placed: str. what was put down",
         "  gap: float [m], default 0.01, at least 0, at most 0.05. between two items",
         "  bin: str, required, names a bin",
@@ -123,7 +123,7 @@ def test_the_list_has_two_lines_for_every_skill():
 def test_an_unknown_skill_is_refused_in_either_form():
     result = shown("Rets", "--json")
     assert (result.exit_code, result.stdout) == (2, "")
-    assert 'no skill "Rets" is installed. Did you mean "Rest"?' in result.stderr
+    assert 'there is no skill "Rets". Did you mean "Rest"?' in result.stderr
 
 
 def test_every_installed_skill_can_be_described(monkeypatch):

@@ -122,8 +122,8 @@ def test_json_tells_what_a_skill_reads_writes_and_fails_with(every_node):
         (("--svg", "--dot"), "--svg and --dot exclude each other"),
         (("--svg", "--json"), "--svg and --json exclude each other"),
         (("--json", "--dot", "--svg"), "--svg and --dot and --json exclude each other"),
-        (("--svg", "--ports"), "--svg holds ports and reasons anyway; leave out --ports"),
-        (("--json", "--reasons"), "--json holds ports and reasons anyway; leave out --reasons"),
+        (("--svg", "--ports"), "--svg always contains ports and reasons; omit --ports"),
+        (("--json", "--reasons"), "--json always contains ports and reasons; omit --reasons"),
     ],
 )
 def test_forms_that_exclude_each_other_are_refused(words, sentence):

@@ -18,7 +18,7 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.cli.streams import stdout_kept_clean
+from executive.cli.streams import keep_stdout_clean
 from executive.mission.findings import MEANING_BY_CODE, Finding, MissionError
 from executive.mission.load import FindCellKind, load_mission
 from executive.plugins import discover, load_cell_kind
@@ -117,6 +117,6 @@ def test_every_kind_of_finding_has_a_broken_mission() -> None:
 
 if __name__ == "__main__":
     os.chdir(FOLDER)
-    with stdout_kept_clean():
+    with keep_stdout_clean():
         texts = [rendered(path, findings_of(path, discover())) for path in BROKEN]
     WORDS.write_text("".join(texts), encoding="utf-8")

@@ -11,19 +11,20 @@ import click
 
 @click.command(name="init")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.option("--name", help="Name of the package; by default made from the name of DIR.")
+@click.option("--name", help="Name of the Python package; by default derived from the name of DIR.")
 def command(folder: Path, name: str | None) -> None:
-    """Create a working mission in DIR, with its cell, and a skill with tests.
+    """Create a project with a mission, a cell and a skill.
 
-    DIR must be empty, or not exist. The project need not be installed: in DIR, commands find its skill.
+    The mission can be run at once, and the skill has tests. The folder DIR must be empty or must not exist.
+    The project need not be installed: commands that are run in DIR find its skills.
     """
-    from executive.cli.init.project import MISSION, package_name, require_free, write_project
+    from executive.cli.init.project import MISSION_FILE, check_package_name, make_package_name, write_project
 
-    package = package_name(folder) if name is None else require_free(name, f'--name "{name}"')
+    package = make_package_name(folder) if name is None else check_package_name(name, f'--name "{name}"')
     written = write_project(folder, package)
     click.echo(f"{folder}: {', '.join(written)}")
-    # The environment may not be active in the user's shell: `uv run` activates it only for its command.
+    # The environment may not be active in the shell of the user: `uv run` activates it for one command only.
     click.echo(f"Type, after `. {shlex.quote(str(Path(sys.prefix) / 'bin' / 'activate'))}`:")
     change_folder = "" if folder.resolve() == Path.cwd() else f"cd {shlex.quote(str(folder))} && "
-    click.echo(f"  {change_folder}executive run {MISSION}")
+    click.echo(f"  {change_folder}executive run {MISSION_FILE}")
     click.echo("  pytest")

@@ -1,4 +1,4 @@
-"""Files of a new project, rendered from the template beside this module."""
+"""Creation of a new project from the folder `template`."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from jinja2 import Environment, StrictUndefined
 from executive.errors import InputError
 
 TEMPLATE = Path(__file__).parent / "template"
+"""Folder with the template of every file of a project."""
 SUFFIX = ".jinja"
-"""Suffix of every template file: without it, tools would treat the template as code of this project."""
+"""Suffix of every template file, so that tools do not treat the templates as code of this project."""
 PACKAGE = "package"
-"""Folder of the template that is renamed to the name of the package."""
-MISSION = "sort.yaml"
+"""Folder of the template that gets the name of the package."""
+MISSION_FILE = "sort.yaml"
+"""Name of the mission file of a project."""
 FOLDERS = ("cells", "runs", "tests")
-"""Folders beside the package in every new project."""
+"""Folders beside the package in a project; a package must not have one of these names."""
 
 _NAME_PATTERN = re.compile(r"[a-z]([a-z0-9_]*[a-z0-9])?")
 _ADVICE = "give another name with --name"
@@ -29,13 +31,13 @@ def write_project(folder: Path, package: str) -> list[str]:
     """Create a project in an empty or new folder; return the paths of its files.
 
     Raises:
-        InputError: The folder is not empty, is a file, or cannot be written to.
+        InputError: The folder is not empty, is a file, or cannot be written.
     """
     _require_empty(folder)
-    # The files are code and YAML, not HTML: nothing is escaped.
-    environment = Environment(autoescape=False, undefined=StrictUndefined, keep_trailing_newline=True)
+    # The files are code and YAML, not HTML, so that nothing is escaped.
+    templates = Environment(autoescape=False, undefined=StrictUndefined, keep_trailing_newline=True)
     files = {
-        _locate(file, package): environment.from_string(file.read_text(encoding="utf-8")).render(name=package)
+        _map_path(file, package): templates.from_string(file.read_text(encoding="utf-8")).render(name=package)
         for file in sorted(TEMPLATE.rglob(f"*{SUFFIX}"))
     }
     try:
@@ -45,54 +47,54 @@ def write_project(folder: Path, package: str) -> list[str]:
             path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InputError(
-            f"{error.filename or folder} cannot be written: {error.strerror}; name a folder that can"
+            f"{error.filename or folder} cannot be written: {error.strerror}; name a writable folder"
         ) from None
     return list(files)
 
 
 def _require_empty(folder: Path) -> None:
-    """Raise an InputError if a folder is a file, or holds files."""
+    """Raise an InputError if `folder` is a file or contains files."""
     if folder.is_file():
-        raise InputError(f'"{folder}" is a file; name a folder that is empty, or not there yet')
+        raise InputError(f'"{folder}" is a file; name a folder that is empty or does not exist')
     entries = sorted(os.listdir(folder)) if folder.exists() else []
     if entries:
         raise InputError(
-            f'the folder "{folder}" is not empty: it holds {entries[0]}'
+            f'the folder "{folder}" is not empty: it contains {entries[0]}'
             f"{f' and {len(entries) - 1} more' if entries[1:] else ''}; "
-            "name one that is empty, or not there yet"
+            "name a folder that is empty or does not exist"
         )
 
 
-def _locate(file: Path, package: str) -> str:
-    """Return the path of a template file in the project."""
+def _map_path(file: Path, package: str) -> str:
+    """Return the path of the file in a project that is rendered from a template file."""
     parts = file.relative_to(TEMPLATE).with_suffix("").parts
     return str(PurePosixPath(*(package if part == PACKAGE else part for part in parts)))
 
 
-def package_name(folder: Path) -> str:
+def make_package_name(folder: Path) -> str:
     """Return a package name made from the name of a folder: `blue_table` for `Blue-Table`.
 
     Raises:
-        InputError: The result is not a valid name, or another module has it and might be imported instead.
+        InputError: The name is not valid, or belongs to another module, which could be imported instead.
     """
     folder_name = folder.resolve().name
-    return require_free(re.sub(r"[-. ]", "_", folder_name).lower(), f'the folder "{folder_name}"')
+    return check_package_name(re.sub(r"[-. ]", "_", folder_name).lower(), f'the folder "{folder_name}"')
 
 
-def require_free(name: str, source: str) -> str:
-    """Return `name` if it is a valid and free name of a package.
+def check_package_name(name: str, source: str) -> str:
+    """Check that a name is valid for a package and not in use, and return it.
 
     Args:
-        name: The name.
-        source: Origin of the name, for an error message.
+        name: Name of the package.
+        source: Origin of the name, for the error message.
 
     Raises:
-        InputError: The name is invalid, or taken.
+        InputError: The name is invalid or in use.
     """
     if _NAME_PATTERN.fullmatch(name) is None:
         raise InputError(
-            f"{source} names no package: such a name begins with a letter, goes on with letters, digits and "
-            f'"_", and does not end with "_"; {_ADVICE}'
+            f"{source} is not a valid package name: a package name starts with a letter, continues with "
+            f'letters, digits and "_", and does not end with "_"; {_ADVICE}'
         )
     if conflict := _find_conflict(name):
         raise InputError(f'a package cannot be called "{name}": {conflict}; {_ADVICE}')
@@ -100,13 +102,13 @@ def require_free(name: str, source: str) -> str:
 
 
 def _find_conflict(name: str) -> str:
-    """Return the reason why a name is not free, or ""."""
+    """Return the reason why a name cannot be used for a package, or ""."""
     if keyword.iskeyword(name):
-        return "that is a word of Python's own"
+        return "it is a Python keyword"
     if name in FOLDERS:
-        return "that is another folder of the project"
+        return "the project has another folder of this name"
     spec = find_spec(name)
-    # A folder without an `__init__.py` is no module: it may be the folder of the new project.
+    # A folder without `__init__.py` is not a module; it may be the folder of the new project.
     if spec is not None and spec.origin is not None:
-        return f"a module of that name is installed already: {spec.origin}"
+        return f"a module of this name is already installed: {spec.origin}"
     return ""

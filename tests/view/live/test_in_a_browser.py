@@ -59,7 +59,7 @@ def address(tmp_path: Path) -> Iterator[str]:
     )  # fmt: skip
     assert process.stderr is not None
     said = process.stderr.readline()
-    found = re.fullmatch(r"watch it at (http://127\.0\.0\.1:[0-9]+/[\w-]{32}/)\n", said)
+    found = re.fullmatch(r"watch the run at (http://127\.0\.0\.1:[0-9]+/[\w-]{32}/)\n", said)
     assert found, said
     # Whatever it says later must not fill the pipe.
     threading.Thread(target=process.stderr.read, daemon=True).start()
