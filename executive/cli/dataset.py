@@ -30,11 +30,11 @@ def command(
     """
     with keep_stdout_clean():
         from executive.cli.cells import load_cells
-        from executive.cli.progress import bar
+        from executive.cli.progress import show_progress
         from executive.training.rendering import generate_dataset
 
         configs = load_cells(cells)
-        with bar("rendering") as progress:
+        with show_progress("rendering") as progress:
             generate_dataset(
                 configs, out, images=images, seed=seed, layout=layout, workers=workers, valid_fraction=valid,
                 progress=progress,

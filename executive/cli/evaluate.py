@@ -54,7 +54,7 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 @options.overrides_option
 @click.option(
     "--out", type=options.FILE, metavar="FILE",
-    help="File for the measurement; by default CELL.measured.json beside the cell file, which runs read.",
+    help="File for the measurement; by default CELL.measured.json beside the cell file. Runs read it.",
 )  # fmt: skip
 @options.workers_option
 @click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Image file for the worst mistakes.")
@@ -68,8 +68,9 @@ def command(
     """Measure the accuracy of a detector.
 
     The detector belongs to a cell (--cell), or is a model file (--weights) or the shipped model. The images
-    are rendered scenes of the cell (by default of the shipped cell overhead), or those of --dataset. For a
-    detector of a cell, the error rates are stored for runs, unless an option changes its conditions.
+    are rendered scenes of the cell (by default of the shipped cell overhead), or those of --dataset. The
+    error rates of a detector of a cell are stored for runs, except with --threshold, --varied, --scene,
+    --view full, and --set without --out.
     """
     unknown_key = next((key for key in overrides if not key.startswith("cell.")), "")
     is_image = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES
@@ -92,12 +93,11 @@ def command(
     with keep_stdout_clean():
         from executive.campaign import evaluation
         from executive.cli.cells import find_cell, load_cells
-        from executive.cli.progress import bar, report_polygons
+        from executive.cli.progress import report_polygons, show_progress
         from executive.training.evaluation.worst_mistakes import WorstMistakes
         from executive.view.figures.detector import print_metrics
 
-        mistakes = WorstMistakes()
-        scenes = evaluation.SceneSettings(images, seed, varied, view, workers, scene)
+        worst, scenes = WorstMistakes(), evaluation.SceneSettings(images, seed, varied, view, workers, scene)
         names = cells or (() if dataset else ("overhead",))
         configs_by_file = dict(zip(map(find_cell, names), load_cells(names, overrides).values(), strict=True))
         detectors = list(evaluation.list_detectors(configs_by_file, detector_name, weights, labels))
@@ -108,7 +108,7 @@ def command(
         for detector in detectors:
             measurement, start_time = detector.make_measurement_name(dataset), time.monotonic()
             result = evaluation.measure_detector(
-                detector, dataset, scenes, threshold=threshold, worst_mistakes=mistakes, progress=bar
+                detector, dataset, scenes, threshold=threshold, worst_mistakes=worst, progress=show_progress
             )
             print_metrics(measurement, detector.name, result)
             kind = detector.configs[detector.name].kind
@@ -123,8 +123,8 @@ def command(
             from executive.training.dataset import save_image
             from executive.training.evaluation.worst_mistakes import draw_sheet
 
-            save_image(sheet, draw_sheet(mistakes.kept, ", ".join(results)))
-            click.echo(f"{sheet}: the {len(mistakes.kept)} worst mistakes", err=True)
+            save_image(sheet, draw_sheet(worst.kept, ", ".join(results)))
+            click.echo(f"{sheet}: the {len(worst.kept)} worst mistakes", err=True)
     if as_json:
         named_files = {"scene": scene and str(scene), "weights": weights and str(weights)}
         print_json({"seed": seed, "varied": varied, **named_files, "measured": results})

@@ -56,11 +56,11 @@ def command(
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record_trial
         from executive.campaign.mission_under_test import load_mission_under_test
-        from executive.cli.progress import bar, print_halt
+        from executive.cli.progress import print_halt, show_progress
         from executive.view.figures.fault import format_results, format_trial, results_to_json, trial_to_json
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)
-        with bar("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:
+        with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:
             campaign = Campaign(mission_under_test, workers=workers, progress=progress, on_halt=print_halt)
             value: Any
             if list_only:

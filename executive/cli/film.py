@@ -37,7 +37,7 @@ def command(
     cell can be filmed, also a run that was halted, interrupted or resumed. No display is needed.
     """
     with keep_stdout_clean():
-        from executive.cli.progress import bar
+        from executive.cli.progress import show_progress
         from executive.record.run_directory import RunDirectory, find_run
         from executive.view.film.film import END_DURATION, write_film
         from executive.view.film.formats import choose_format, prepare_file
@@ -52,7 +52,7 @@ def command(
             if not quiet:
                 seconds = source.events[-1].clock / speed + END_DURATION
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)
-            with bar("frames", quiet=quiet, print_lines=True) as progress:
+            with show_progress("frames", quiet=quiet, print_lines=True) as progress:
                 frames = write_film(
                     source, partial_file, film_format, speed=speed, workers=workers, progress=progress
                 )

@@ -19,7 +19,7 @@ LINE_PERIOD = 10.0
 
 
 @contextmanager
-def bar(
+def show_progress(
     description: str, *, quiet: bool = False, print_lines: bool = False
 ) -> Iterator[Callable[[int, int], None]]:
     """Show a progress bar with the remaining time; the context is its update function `(done, total)`.

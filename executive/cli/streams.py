@@ -111,7 +111,7 @@ def use_tolerant_streams() -> Iterator[None]:
 def _open_closed_descriptors() -> None:
     """Connect closed standard streams to the null device.
 
-    Otherwise a file that is opened later would get the number of the closed stream, and output of libraries.
+    Otherwise a file that is opened later would get the number of a closed stream, and its output.
     """
     for number in (0, 1, 2):
         try:

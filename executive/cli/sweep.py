@@ -51,7 +51,7 @@ def command(
     with keep_stdout_clean():
         from executive.campaign.sweep import Job, run_sweep, summarize_results
         from executive.cell.json_values import to_json
-        from executive.cli.progress import bar, print_halt
+        from executive.cli.progress import print_halt, show_progress
         from executive.mission.load import load_mission
         from executive.plugins import discover, load_cell_kind
         from executive.record.run_directory import check_runs_folder
@@ -63,7 +63,7 @@ def command(
 
             load_scene(scene, loaded.cell_config)
         check_runs_folder(runs)
-        with bar(mission) as progress:
+        with show_progress(mission) as progress:
             jobs = [Job(mission, seed, overrides, runs, frames, scene) for seed in seeds]
             results = run_sweep(jobs, workers=workers, progress=progress, on_halt=print_halt)
         summary = summarize_results(results, len(seeds))

@@ -34,13 +34,13 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
     Needs the extra `train`: uv sync --extra train (a download of about 3 GB on Linux).
     """
     with keep_stdout_clean():
-        from executive.cli.progress import bar, report_polygons
+        from executive.cli.progress import report_polygons, show_progress
         from executive.training.samples import list_splits
         from executive.training.train import Settings, train
 
         for split in list_splits(dataset):
             report_polygons(split)
-        with bar("training") as report_batch:
+        with show_progress("training") as report_batch:
             settings = Settings(start, rate, epochs, seed)
             train(dataset, out, settings, _make_epoch_printer(epochs), report_batch)
         click.echo(

@@ -13,7 +13,7 @@ from executive.campaign.evaluation import SceneSettings, check_detector, list_de
 from executive.cell.config import CellConfig
 from executive.cli.cells import find_cell, load_cells
 from executive.cli.options import seed_option, workers_option
-from executive.cli.progress import bar
+from executive.cli.progress import show_progress
 from executive.training.evaluation.metrics import NO_OBJECT, Evaluation
 from executive.training.evaluation.worst_mistakes import WorstMistakes
 from tests.benchmarks.report import Figures, run_command, write_json
@@ -112,7 +112,7 @@ def evaluate_scene(
     check_detector(detector, renders_scenes=True, scene=scene)
     scenes = SceneSettings(images, seed, is_varied=False, view="table", workers=workers, scene=scene)
     return measure_detector(
-        detector, None, scenes, threshold=THRESHOLD, worst_mistakes=WorstMistakes(), progress=bar
+        detector, None, scenes, threshold=THRESHOLD, worst_mistakes=WorstMistakes(), progress=show_progress
     )
 
 

@@ -16,7 +16,7 @@ from executive.cell.detection import Answer
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock, Request
 from executive.cli.options import runs_option, workers_option
-from executive.cli.progress import bar, print_halt
+from executive.cli.progress import print_halt, show_progress
 from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.rated_detectors import build_rated_detectors
 from tests.benchmarks.ground_truth import FAULT, AuditedRun, FoundObject, run_audited
@@ -135,7 +135,7 @@ def measure(
     jobs = [
         Job(mission, seed, misnaming, runs, wall_time_limit) for seed in range(first_seed, first_seed + seeds)
     ]
-    with bar("misclassifying server") as progress:
+    with show_progress("misclassifying server") as progress:
         results = run_jobs(
             jobs, run_job, _describe_broken, workers=workers, progress=progress, on_halt=print_halt
         )

@@ -17,7 +17,7 @@ from executive.campaign.pool import run_jobs
 from executive.cell.config import CellConfig
 from executive.cells.sim.scene_file import load_scene
 from executive.cli.options import runs_option, workers_option
-from executive.cli.progress import bar, print_halt
+from executive.cli.progress import print_halt, show_progress
 from executive.mission.load import load_mission
 from executive.plugins import discover
 from tests.benchmarks.ground_truth import FAULT, HUNG, AuditedRun, run_audited
@@ -94,7 +94,7 @@ def measure(
             first = first_seed + SEEDS_PER_CASE * case.number
             count = declared_runs if case.group == DECLARED else runs_per_scene
             jobs += [Job(case, seed, scene, runs, wall_time_limit) for seed in range(first, first + count)]
-        with bar("outside the envelope") as progress:
+        with show_progress("outside the envelope") as progress:
             results = run_jobs(
                 jobs, run_job, _describe_broken, workers=workers, progress=progress, on_halt=print_halt
             )

@@ -11,7 +11,7 @@ from at_terminal import COLOUR, call
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.cli.progress import bar
+from executive.cli.progress import show_progress
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 
 FAKE = ("--set", "cell.kind=fake")
@@ -22,7 +22,7 @@ def test_a_bar_shows_how_many_of_how_many(
 ) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
-    with bar("sorting") as move:
+    with show_progress("sorting") as move:
         move(3, 10)
     captured = capsys.readouterr()
     assert captured.out == ""
@@ -41,7 +41,7 @@ def test_nothing_is_drawn_where_nothing_can_be_drawn_over(
     monkeypatch.delenv("FORCE_COLOR", raising=False)
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
-    with bar("sorting", quiet=quiet) as move:
+    with show_progress("sorting", quiet=quiet) as move:
         move(3, 10)
     assert capsys.readouterr() == ("", "")
 
@@ -51,7 +51,7 @@ def test_without_a_terminal_some_work_writes_lines(
 ) -> None:
     times = iter([0.0, 4.0, 12.0, 13.0])
     monkeypatch.setattr("time.monotonic", lambda: next(times))
-    with bar("frames", print_lines=True) as move:
+    with show_progress("frames", print_lines=True) as move:
         for done in (1, 3, 4):
             move(done, 9)
     assert capsys.readouterr() == ("", "frames: 3 of 9, about 24 s left\n")

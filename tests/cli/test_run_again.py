@@ -81,7 +81,7 @@ def test_a_replay_says_what_is_decided_otherwise(runs: Path, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ((), "name a MISSION, or a run to resume with --resume RUN"),
+        ((), "give a MISSION, or a run with --resume RUN"),
         (
             ("sort_fruit", "--resume", "latest"),
             "--resume takes mission, seed, params, requests and scene from the run",
