@@ -1,1 +1,1 @@
-"""Training of the small RF-DETR: everything here needs the `train` extra and is imported only by it."""
+"""Datasets, training of the small RF-DETR (needs the extra `train`), and evaluation of detectors."""

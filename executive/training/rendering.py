@@ -146,10 +146,7 @@ def _render_frames(
 ) -> dict[int, LabelledImage]:
     """Render the frames with these numbers, in a worker process."""
     samples = _draw_samples([config], seed, numbers, scene)
-    return {
-        number: to_labelled_frame(sample, camera, f"{camera}_{number:06d}")
-        for number, camera, sample in samples
-    }
+    return {i: to_labelled_frame(sample, camera, f"{camera}_{i:06d}") for i, camera, sample in samples}
 
 
 def _make_entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEntry:

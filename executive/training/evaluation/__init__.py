@@ -1,1 +1,1 @@
-"""How good a detector is: what it finds, what it imagines, how far off its boxes are, how long it takes."""
+"""Evaluation of detectors: error rates, average precision, position errors, latency, worst mistakes."""

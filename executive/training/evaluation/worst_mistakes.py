@@ -142,9 +142,8 @@ def _draw_tile(mistake: Mistake) -> Picture:
     shift = zoom * (0.5 - corner) - 0.5
     matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
     image = mistake.sample.image[..., ::-1]  # The annotators expect BGR.
-    tile = cv2.warpAffine(
-        image, matrix, (TILE_SIZE, TILE_SIZE), flags=cv2.INTER_CUBIC, borderValue=BACKGROUND[::-1]
-    )
+    size, border = (TILE_SIZE, TILE_SIZE), BACKGROUND[::-1]
+    tile = cv2.warpAffine(image, matrix, size, flags=cv2.INTER_CUBIC, borderValue=border)
     detected = sv.BoxAnnotator, [detection.box for detection in mistake.found], DETECTED_COLOUR
     layers: Any = (detected, (sv.BoxCornerAnnotator, mistake.sample.boxes, TRUE_COLOUR))
     for annotator, boxes, colour in layers:
