@@ -39,7 +39,7 @@ class MixedPrecisionModel(RFDETRModelModule):
     Args:
         model_config: RF-DETR's configuration of the model.
         train_config: RF-DETR's configuration of the training.
-        is_mixed: True: train in mixed precision; False: train in float32.
+        is_mixed: True: train in mixed precision on the CPU; False: use RF-DETR's own training step.
     """
 
     def __init__(self, model_config: Any, train_config: Any, is_mixed: bool) -> None:

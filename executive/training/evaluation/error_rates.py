@@ -56,8 +56,7 @@ class MeasuredErrorRates:
         confusion_rate: Proportion of wrong classes among the detected, fully visible objects.
         false_detections: Mean number of false detections per image.
         jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
-        repeated: Laplace estimate of the fraction of the errors that a second look from the same pose makes
-            again.
+        repeated: Laplace estimate of the fraction of errors that a second look from the same pose repeats.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
     """
 
