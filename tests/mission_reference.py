@@ -20,14 +20,14 @@ from executive.mission.findings import MEANING_BY_CODE
 from executive.mission.model import grammar
 from executive.mission.parse.control import find_inner_keys
 from executive.mission.schema.types import Json, make_type_schema
-from executive.mission.text.files import list_shipped_missions
-from executive.perception.detectors.registry import find_detector_kinds
+from executive.mission.text.file_search import list_shipped_missions
+from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.rfdetr import RfdetrOptions
-from executive.perception.detectors.roboflow.options import RoboflowOptions
+from executive.perception.detectors.roboflow.server_options import RoboflowOptions
 from executive.plugins import discover
 from executive.tree.keys import KeySection, Kind
 from executive.tree.node import ControlNode
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 
 MISSIONS = Path(__file__).parent.parent / "missions"
 PATH = MISSIONS / "reference.md"

@@ -96,14 +96,14 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("result = run_skill(...)", "testing/run_skill.py", "SkillResult"),
         ("executive.testing.run_mission", "testing/run_mission.py", ""),
         ("result = run_mission(...)", "testing/run_mission.py", "MissionResult"),
-        ("class MissionResult(RunEnded)", "events/run.py", "RunEnded"),
+        ("class MissionResult(RunEnded)", "events/run_events.py", "RunEnded"),
         ("executive.testing.substitutes", "testing/substitutes.py", ""),
     ],
     "Test kit: faults": [
         ("Times of faults", "testing/faults/script.py", ""),
-        ("Effects on tool, arm, camera, localizer, table and operator", "testing/faults/robot.py", ""),
-        ("Effects on objects", "testing/faults/objects.py", ""),
-        ("Effects on detectors", "testing/faults/detector.py", ""),
+        ("Effects on tool, arm, camera, localizer, table and operator", "testing/faults/robot_faults.py", ""),
+        ("Effects on objects", "testing/faults/object_faults.py", ""),
+        ("Effects on detectors", "testing/faults/detector_faults.py", ""),
         ("effect = Effect(...)", "testing/faults/effect.py", "Effect"),
     ],
     "Test kit: conformance": [

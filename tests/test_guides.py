@@ -25,14 +25,14 @@ from executive.events import Event
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.parse.cell_file import load_cell
-from executive.mission.schema.files import make_mission_schema
+from executive.mission.schema.file_schemas import make_mission_schema
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml, to_python_value
 from executive.plugins import discover, load_cell_kind
 from executive.record.result import EXIT_CODE_BY_STATUS
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 
 LONGEST = 300.0
 """Time on the run's clock within which every mission shown is done on the fake cell [s]."""

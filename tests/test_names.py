@@ -100,3 +100,30 @@ def _is_participle(name: str) -> bool:
     return IRREGULAR_PARTICIPLES.fullmatch(first) is not None or (
         re.fullmatch(r"\w\w+(ed|ing)", first) is not None and first not in NO_PARTICIPLES
     )
+
+
+PARALLEL_PACKAGES = (
+    {
+        "executive/cell",
+        "executive/cell/config",
+        "executive/cells",
+        "executive/cells/sim",
+        "executive/cells/fake",
+    },
+    {"executive/view/film", "executive/view/live", "executive/view/report"},
+)
+"""Packages with the same structure; `executive/cli` mirrors the packages whose commands it contains."""
+
+
+def test_modules_have_the_same_name_only_in_parallel_packages() -> None:
+    packages: dict[str, set[str]] = {}
+    for path, _ in _modules("executive", "skills"):
+        package, _, name = path.rpartition("/")
+        if not name.startswith("__") and package != "executive/cli":
+            packages.setdefault(name, set()).add(package)
+    repeated = {name: found for name, found in packages.items() if len(found) > 1}
+    assert {
+        name: found
+        for name, found in repeated.items()
+        if not any(found <= parallel for parallel in PARALLEL_PACKAGES)
+    } == {}

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from executive.errors import InputError
-from executive.perception.detectors.registry import find_detector_kinds
+from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.plugins import discover, list_entries, load_cell_kind
 
 Write = Callable[..., Path]

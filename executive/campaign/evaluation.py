@@ -16,7 +16,7 @@ from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import list_choices
-from executive.perception.detectors.registry import find_problems
+from executive.perception.detectors.detector_registry import find_problems
 from executive.perception.envelope.fingerprint import compute_fingerprint
 from executive.perception.envelope.measurement import (
     SUFFIX,

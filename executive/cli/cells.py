@@ -38,7 +38,7 @@ def find_cell(name: str) -> Path:
     """
     from executive.errors import InputError
     from executive.mission.findings import list_choices
-    from executive.mission.text.files import get_shipped_folder
+    from executive.mission.text.file_search import get_shipped_folder
 
     path = Path(name)
     if path.is_file():

@@ -132,11 +132,11 @@ def check_packages() -> Iterator[CheckResult]:
 
 def check_plugins() -> Iterator[CheckResult]:
     """Load all installed skills, kinds of cells and kinds of detectors."""
-    from executive.perception.detectors import registry
+    from executive.perception.detectors import detector_registry
     from executive.plugins import CELL_KIND_GROUP, discover, find_project, list_entries
 
     skills, project = discover(), find_project()
-    kinds, detectors = list_entries(CELL_KIND_GROUP, "kind of cell"), registry.find_detector_kinds()
+    kinds, detectors = list_entries(CELL_KIND_GROUP, "kind of cell"), detector_registry.find_detector_kinds()
     for entry in (*kinds.values(), *detectors.values()):
         entry.load()
     message = f"{len(skills)} skills, {len(kinds)} kinds of cells, {len(detectors)} kinds of detectors"
@@ -159,7 +159,7 @@ def check_renderer() -> Iterator[CheckResult]:
 def check_roboflow() -> Iterator[CheckResult]:
     """Check whether a key for Roboflow is set, without showing the key, and whether its server answers."""
     from executive.perception.detectors.roboflow.key import KEY_VARIABLE, ApiKey
-    from executive.perception.detectors.roboflow.options import HOSTED_URL
+    from executive.perception.detectors.roboflow.server_options import HOSTED_URL
 
     fix, is_set = "set it to use models that Roboflow hosts", ApiKey(os.environ).is_set
     yield _make_result(is_set, "key", f"{KEY_VARIABLE} is set", "note", f"{KEY_VARIABLE} is not set", fix)

@@ -57,7 +57,12 @@ def command(
         from executive.campaign.faults.trial import record_trial
         from executive.campaign.mission_under_test import load_mission_under_test
         from executive.cli.progress import print_halt, show_progress
-        from executive.view.figures.fault import format_results, format_trial, results_to_json, trial_to_json
+        from executive.view.figures.fault_figures import (
+            format_results,
+            format_trial,
+            results_to_json,
+            trial_to_json,
+        )
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)
         with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:

@@ -29,7 +29,7 @@ def command(ctx: click.Context, run: str, mission_file: Path | None, runs: Path,
     with keep_stdout_clean():
         from executive.plugins import discover
         from executive.record.journal import read_journal
-        from executive.record.replay import replay_run
+        from executive.record.replayed_run import replay_run
         from executive.record.run_directory import find_run
 
         path = find_run(run, runs)

@@ -72,7 +72,7 @@ def command(
     )
     with keep_stdout_clean():
         from executive.cell.json_values import to_json
-        from executive.record.diagnosis.text import format_diagnosis
+        from executive.record.diagnosis.diagnosis_text import format_diagnosis
         from executive.record.guarded_view import GuardedView
         from executive.record.recorded_run import RecordOptions
         from executive.record.result import describe_disagreement, find_exit_code

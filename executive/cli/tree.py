@@ -48,8 +48,8 @@ def command(
         from pydantic_core import to_json
 
         from executive.view.tree.dot import draw_dot
-        from executive.view.tree.outline import draw_outline, fold_subtrees
         from executive.view.tree.svg import draw_svg
+        from executive.view.tree.tree_text import draw_outline, fold_subtrees
 
         name, nodes = _load_outline(mission, overrides)
         nodes = fold_subtrees(nodes) if fold else nodes

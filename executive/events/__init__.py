@@ -4,10 +4,10 @@ The parts of a run emit events; observers (journal, trace, pictures, views) rece
 The journal has one JSON object per event, whose keys are the fields of these classes.
 """
 
-from executive.events.cell import FaultInjected, InputRead, MotionPlanned, ToolCommanded
+from executive.events.cell_events import FaultInjected, InputRead, MotionPlanned, ToolCommanded
 from executive.events.event import Emit, Event, Observer, TimedEvent, discard_event
-from executive.events.ledger import DetectedObject, FrameSearched, ItemChanged, TargetSelected
-from executive.events.run import (
+from executive.events.ledger_events import DetectedObject, FrameSearched, ItemChanged, TargetSelected
+from executive.events.run_events import (
     JOURNAL_FORMAT,
     FaultRaised,
     OperatorAsked,
@@ -17,7 +17,7 @@ from executive.events.run import (
     RunResumed,
     RunStarted,
 )
-from executive.events.tree import BranchChosen, NodeEnded, NodeStarted
+from executive.events.tree_events import BranchChosen, NodeEnded, NodeStarted
 
 __all__ = [
     "JOURNAL_FORMAT",

@@ -8,7 +8,7 @@ from statistics import median_low
 
 from executive.cell.detection import Detections, Observation
 from executive.ledger.belief import LOG_ODDS_OF_PROOF, Belief
-from executive.ledger.bins import BinContents
+from executive.ledger.bin_contents import BinContents
 from executive.ledger.item import Record, State
 from executive.ledger.records import Records
 

@@ -17,7 +17,7 @@ from executive.cell.protocols import Routes
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
-from executive.ledger.bins import BinContents, find_probable_bin
+from executive.ledger.bin_contents import BinContents, find_probable_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, Record, State

@@ -18,7 +18,7 @@ from executive.mission.model.wiring import find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.blackboard import Blackboard
 from executive.tree.node import ControlNode, NodeContext
-from executive.tree.registry import ControlNodes, load_control_nodes
+from executive.tree.node_registry import ControlNodes, load_control_nodes
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 
 TreeNode = ControlNode | SkillLeaf

@@ -17,15 +17,15 @@ from executive.mission.expand.expand import expand
 from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
 from executive.mission.flow.unhandled_failures import UnhandledFailure, find_unhandled_failures
 from executive.mission.model.mission import Mission
+from executive.mission.model.node_paths import assign_paths
 from executive.mission.model.nodes import Node, UnknownNode
-from executive.mission.model.paths import assign_paths
 from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import MissionFiles, RecordedCell, read_mission
 from executive.mission.parse.validate import find_mark
-from executive.mission.text.files import find_mission, get_shipped_folder
+from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
 from executive.skill import Skill
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 
 FindCellKind = Callable[[str], CellKind]
 """Function from the name of a kind of cell to its class; raises InputError if it is not installed."""

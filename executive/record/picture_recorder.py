@@ -12,7 +12,7 @@ from executive.cell.detection import Detection
 from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawer import PictureDrawer
-from executive.record.pictures.scene import PictureScene
+from executive.record.pictures.picture_scene import PictureScene
 from executive.record.timeline.activation import to_skill_name
 from executive.record.timeline.timeline import Timeline
 

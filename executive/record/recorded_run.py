@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 from executive.errors import ExecutiveError
 from executive.events import Observer, RunEnded, TimedEvent
 from executive.mission.outline import make_outline
-from executive.mission.text.files import read_source
+from executive.mission.text.file_search import read_source
 from executive.record.diagnosis.diagnose import diagnose
 from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder

@@ -15,7 +15,7 @@ from executive.record.journal import find_end, find_start, read_journal
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import Recording, RecordOptions
 from executive.record.recorder import Recorder
-from executive.record.replay import compare_replay
+from executive.record.replayed_run import compare_replay
 from executive.record.result import FINAL_STATUSES, Result, read_result
 from executive.record.run_directory import RunDirectory
 from executive.replay.input_log import UNKNOWN_ACTION, InputLog

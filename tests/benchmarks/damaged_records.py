@@ -24,15 +24,15 @@ from executive.errors import ExecutiveError, InputError
 from executive.events import NodeEnded, RunResumed, TimedEvent
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replay import compare_replay, replay_run
+from executive.record.replayed_run import compare_replay, replay_run
 from executive.record.result import Result, describe_disagreement
 from executive.record.resumed_run import resume_run
 from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
 from executive.view.film.film import write_film
+from executive.view.film.film_source import FilmSource
 from executive.view.film.formats import choose_format
-from executive.view.film.source import FilmSource
 from executive.view.report.page import write_report
 from tests.benchmarks.damage import BLOCK, copy_run, damage_run
 from tests.benchmarks.forks import ForkRunner

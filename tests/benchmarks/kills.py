@@ -27,7 +27,7 @@ from executive.plugins import load_cell_kind
 from executive.record.journal import find_end, read_journal
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
-from executive.record.replay import compare_replay
+from executive.record.replayed_run import compare_replay
 from executive.record.result import Result, describe_disagreement
 from executive.record.resumed_run import resume_run
 from executive.record.run_directory import LATEST_LINK, find_run

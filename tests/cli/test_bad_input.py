@@ -18,7 +18,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.mission.text.files import list_shipped_missions
+from executive.mission.text.file_search import list_shipped_missions
 
 MISSION = """\
 mission: small

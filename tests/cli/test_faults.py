@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.view.figures.fault import Branch, FaultFigures, Trial
+from executive.view.figures.fault_figures import Branch, FaultFigures, Trial
 
 FAKE = ("sort_overhead", "--set", "cell.kind=fake")
 TRIAL = Trial(

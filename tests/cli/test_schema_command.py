@@ -8,10 +8,10 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.mission.schema.files import make_library_schema, make_mission_schema
+from executive.mission.schema.file_schemas import make_library_schema, make_mission_schema
 from executive.mission.schema.types import make_cell_schema
 from executive.plugins import discover
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 
 
 @pytest.mark.parametrize(

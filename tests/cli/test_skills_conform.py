@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 from executive.cell.protocols import Cell, Steps
 from executive.cli.main import main
 from executive.skill import In, Metres, Skill, param, port
-from executive.testing.conformance.check import RULES
+from executive.testing.conformance.conformance_check import RULES
 
 
 class Rest(Skill):

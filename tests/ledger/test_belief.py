@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from executive.cell.error_rates import ErrorRates
 from executive.ledger.association import find_max_distance
 from executive.ledger.belief import Belief
-from executive.ledger.bins import update_bin_log_odds
+from executive.ledger.bin_contents import update_bin_log_odds
 from executive.ledger.item import Record
 
 GOOD = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.7)

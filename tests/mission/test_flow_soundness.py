@@ -18,14 +18,14 @@ from executive.mission.check.checks import run_checks
 from executive.mission.check.context import CheckContext
 from executive.mission.expand.expand import expand
 from executive.mission.flow.unhandled_failures import find_unhandled_failures
-from executive.mission.model.paths import assign_paths
+from executive.mission.model.node_paths import assign_paths
 from executive.mission.parse.mission_file import parse_mission
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
 from executive.tree.blackboard import Blackboard
 from executive.tree.halting import halt
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 
 MOST_TICKS = 400
 

@@ -15,9 +15,9 @@ from collections.abc import Iterator
 import pytest
 from editor import Editor
 
-from executive.mission.text.files import get_shipped_folder
+from executive.mission.text.file_search import get_shipped_folder
 from executive.plugins import discover
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 
 SERVER = os.environ.get("YAML_LANGUAGE_SERVER") or shutil.which("yaml-language-server")
 pytestmark = [

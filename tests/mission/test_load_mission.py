@@ -15,7 +15,7 @@ from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
 from executive.mission.model import nodes
 from executive.mission.model.values import Reference
-from executive.mission.text.files import find_mission, get_shipped_folder
+from executive.mission.text.file_search import find_mission, get_shipped_folder
 
 Load = Callable[..., LoadedMission]
 

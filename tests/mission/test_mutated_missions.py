@@ -27,7 +27,7 @@ from executive.run import assembly
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 from tests.mission.mutations import places
 from tests.mission.mutator import Base, Mutator
 from tests.mission.unkind_cell import UnkindCell

@@ -13,14 +13,14 @@ from referencing import Registry
 
 from executive.mission.findings import MissionError
 from executive.mission.load import LoadedMission
-from executive.mission.schema.files import make_library_schema, make_mission_schema
+from executive.mission.schema.file_schemas import make_library_schema, make_mission_schema
 from executive.mission.schema.types import make_cell_schema
 from executive.mission.source import Source
-from executive.mission.text.files import get_shipped_folder
+from executive.mission.text.file_search import get_shipped_folder
 from executive.mission.text.yaml_text import parse_yaml, to_python_value
 from executive.plugins import discover
 from executive.skill import Skill
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 
 MISSIONS = get_shipped_folder()
 SCHEMAS: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {

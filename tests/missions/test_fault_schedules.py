@@ -11,7 +11,7 @@ from executive.cell.detection import Answer, Detection
 from executive.cells.fake.cell import FakeCell
 from executive.plugins import load_cell_kind
 from executive.testing.faults import ScheduledFault, after, during, object_bumped, with_probability
-from executive.testing.faults.detector import faulty_detector
+from executive.testing.faults.detector_faults import faulty_detector
 from executive.testing.faults.effect import Effect, Occurrence
 from executive.testing.run_mission import MissionResult, run_mission
 

@@ -9,10 +9,14 @@ import pytest
 
 from executive.cell.config import DetectorConfig
 from executive.errors import InputError
-from executive.perception.detectors import registry
-from executive.perception.detectors.registry import build_detectors, find_detectable_labels, find_problems
+from executive.perception.detectors import detector_registry
+from executive.perception.detectors.detector_registry import (
+    build_detectors,
+    find_detectable_labels,
+    find_problems,
+)
 
-INSTALLED = ", ".join(sorted(registry.find_detector_kinds()))
+INSTALLED = ", ".join(sorted(detector_registry.find_detector_kinds()))
 
 
 class Oracle:
@@ -46,9 +50,9 @@ def build(base=None, **configs):
 @pytest.fixture
 def oracle_installed(monkeypatch):
     """The kind `oracle` is installed beside the shipped ones."""
-    found = registry.find_detector_kinds()
-    oracle = EntryPoint("oracle", f"{__name__}:Oracle", registry.DETECTOR_GROUP)
-    monkeypatch.setattr(registry, "find_detector_kinds", lambda: {**found, "oracle": oracle})
+    found = detector_registry.find_detector_kinds()
+    oracle = EntryPoint("oracle", f"{__name__}:Oracle", detector_registry.DETECTOR_GROUP)
+    monkeypatch.setattr(detector_registry, "find_detector_kinds", lambda: {**found, "oracle": oracle})
     monkeypatch.setattr(Oracle, "made", [])
 
 
@@ -79,7 +83,9 @@ def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypa
     info = tmp_path / "theirs-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[{registry.DETECTOR_GROUP}]\noracle = {__name__}:Oracle\n")
+    (info / "entry_points.txt").write_text(
+        f"[{detector_registry.DETECTOR_GROUP}]\noracle = {__name__}:Oracle\n"
+    )
     monkeypatch.syspath_prepend(tmp_path)
     mine = build(tmp_path, mine=oracle(wish=3))["mine"]
     assert mine.config.options == {"wish": 3}

@@ -21,7 +21,7 @@ from executive.mission.load import load_mission
 from executive.plugins import discover
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replay import ReplayResult, compare_replay, replay_run
+from executive.record.replayed_run import ReplayResult, compare_replay, replay_run
 from executive.record.run_directory import find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions

@@ -29,7 +29,7 @@ from executive.mission.load import LoadedMission, load_mission
 from executive.plugins import discover
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replay import replay_run
+from executive.record.replayed_run import replay_run
 from executive.record.result import Result
 from executive.record.resumed_run import resume_run
 from executive.record.run_directory import find_run

@@ -16,7 +16,7 @@ from executive.errors import InputError, Stopped
 from executive.events import Event, NodeEnded, NodeStarted, OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.record.replay import compare_replay
+from executive.record.replayed_run import compare_replay
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions, assemble
 from executive.run.operator import ScriptedOperator, TerminalOperator, parse_request

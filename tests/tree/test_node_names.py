@@ -9,7 +9,7 @@ from pathlib import Path
 
 import executive
 from executive.mission.model.grammar import SEQUENCE_KEYWORD, USE_KEYWORD
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 
 PACKAGE = Path(inspect.getfile(executive)).parent
 
@@ -17,7 +17,7 @@ GRAMMAR = {("mission/model/grammar.py", SEQUENCE_KEYWORD), ("mission/model/gramm
 """The two words that belong to the grammar: a bare list is a sequence, and `use` stands before a subtree."""
 
 OTHER_MEANINGS = {
-    ("record/diagnosis/text.py", "repeat"),  # label before the command that repeats a run
+    ("record/diagnosis/diagnosis_text.py", "repeat"),  # label before the command that repeats a run
     ("view/report/activity_times.py", "retry"),  # activity: time of attempts that failed
 }
 """Strings that equal a word and mean something else."""

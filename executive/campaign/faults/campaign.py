@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from executive.campaign.faults.fault import PlannedFault
 from executive.campaign.faults.fault_list import list_faults
 from executive.campaign.faults.nominal_run import execute_nominal_run
+from executive.campaign.faults.planned_fault import PlannedFault
 from executive.campaign.faults.trial import FaultsByNumber, make_empty_trial, run_trial
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.campaign.pool import run_jobs
@@ -18,7 +18,7 @@ from executive.errors import InputError
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, UseNode
 from executive.mission.source import Mark
-from executive.view.figures.fault import Branch, FaultFigures, Trial
+from executive.view.figures.fault_figures import Branch, FaultFigures, Trial
 
 MAX_FAULTS_PER_RUN = 4
 """Maximum number of faults in a run: the fault under test, and the faults that let it occur."""

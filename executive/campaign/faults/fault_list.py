@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from executive.campaign.faults.fault import Occasion, PlannedFault, SkillFault
 from executive.campaign.faults.nominal_run import NominalRun
+from executive.campaign.faults.planned_fault import Occasion, PlannedFault, SkillFault
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.config import TableConfig
 from executive.cell.objects import Target

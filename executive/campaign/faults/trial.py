@@ -11,9 +11,14 @@ from typing import Any
 
 from executive.campaign.end_checks import check_arm_at_rest, check_held_item, check_journal
 from executive.campaign.faults import trial_checks
-from executive.campaign.faults.fault import INJECTED_MESSAGE, InjectedError, PlannedFault, make_substitutes
 from executive.campaign.faults.fault_list import list_skill_nodes
 from executive.campaign.faults.nominal_run import ActivationRecorder, NominalRun
+from executive.campaign.faults.planned_fault import (
+    INJECTED_MESSAGE,
+    InjectedError,
+    PlannedFault,
+    make_substitutes,
+)
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
@@ -23,7 +28,7 @@ from executive.record.recorded_run import Recording, make_run_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults import FaultyCell, with_faults
-from executive.view.figures.fault import Trial
+from executive.view.figures.fault_figures import Trial
 from executive.view.report.page import try_write_report
 
 FaultsByNumber = Mapping[int, PlannedFault]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.campaign.faults.fault import InjectedError, PlannedFault
+from executive.campaign.faults.planned_fault import InjectedError, PlannedFault
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.frame import Frame, FrameCaptured
 from executive.events import FaultInjected, FrameSearched, ItemChanged, RunEnded, TimedEvent

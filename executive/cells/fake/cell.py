@@ -25,7 +25,7 @@ from executive.errors import Fault, InputError
 from executive.events import Emit, discard_event
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
-from executive.mission.text.files import get_shipped_folder
+from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import find_arm_errors
 from executive.perception.detectors.screening import make_screened_detectors
 from executive.perception.localization import build_localizer

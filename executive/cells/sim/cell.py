@@ -27,9 +27,9 @@ from executive.cells.sim.visuals import SimVisuals
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
 from executive.events import Emit
-from executive.mission.text.files import get_shipped_folder
+from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import build_planner, find_arm_errors
-from executive.perception.detectors.registry import find_detectable_labels, find_problems
+from executive.perception.detectors.detector_registry import find_detectable_labels, find_problems
 from executive.perception.detectors.screening import make_screened_detectors
 from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.rated_detectors import build_rated_detectors

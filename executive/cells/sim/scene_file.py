@@ -16,7 +16,7 @@ from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, list_choices, make_error, sort_findings
 from executive.mission.parse.validate import find_mark, validate
-from executive.mission.text.files import read_source
+from executive.mission.text.file_search import read_source
 from executive.mission.text.yaml_text import YamlNode, parse_yaml
 from executive.perception.camera_model import compute_calibration, compute_field_of_view
 

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import islice
 
-from executive.mission.check import inner_nodes, parallel, port_types, reach, reasons, skills, variables
+from executive.mission.check import (
+    connection_types,
+    inner_nodes,
+    parallel_branches,
+    reach,
+    reasons,
+    skill_settings,
+    variables,
+)
 from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding
 
@@ -13,26 +21,26 @@ Check = Callable[[CheckContext], Iterator[Finding]]
 """Function that yields the findings of one check."""
 
 CHECKS: tuple[Check, ...] = (
-    skills.find_unknown_skills,
-    skills.check_settings,
+    skill_settings.find_unknown_skills,
+    skill_settings.check_settings,
     inner_nodes.check_constants,
     reasons.check_labels,
-    skills.check_routes,
-    skills.find_undetectable_classes,
+    skill_settings.check_routes,
+    skill_settings.find_undetectable_classes,
     reasons.check_failure_names,
     variables.find_unwritten_inputs,
     variables.find_unwritten_library_inputs,
     variables.find_overwritten_loop_variables,
     variables.find_unread_variables,
     variables.find_unwritten_returns,
-    port_types.check_port_types,
+    connection_types.check_port_types,
     reach.check_tool_states,
     reach.check_tool_at_end,
     reach.find_unreachable,
     inner_nodes.check_class_rules,
-    parallel.find_shared_resources,
-    parallel.find_shared_variables,
-    parallel.find_racing_reads,
+    parallel_branches.find_shared_resources,
+    parallel_branches.find_shared_variables,
+    parallel_branches.find_racing_reads,
 )
 """All checks. Each tolerates the errors that other checks report, and reports no consequence of them."""
 

@@ -15,7 +15,7 @@ from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.values import Reference
 from executive.mission.model.wiring import Wire, find_wires, find_written_variables
 from executive.skill import Direction, Skill
-from executive.tree.registry import ControlNodes
+from executive.tree.node_registry import ControlNodes
 
 
 @dataclass(frozen=True)

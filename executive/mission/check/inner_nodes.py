@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 from typing import cast
 
 from executive.mission.check.context import CheckContext
-from executive.mission.check.min_times import compute_min_time
+from executive.mission.check.node_min_times import compute_min_time
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, make_warning
 from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
+from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, KeyValue, Node, SectionNode, SkillNode, iterate_keys
-from executive.mission.model.paths import get_path_name
 from executive.mission.model.values import FailureName, Literal, Reference
 from executive.skill import Skill
 from executive.tree.failure import Reason

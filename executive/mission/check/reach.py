@@ -8,8 +8,8 @@ from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error, make_warning
 from executive.mission.flow.analysis import FlowAnalysis
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
+from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode
-from executive.mission.model.paths import get_path_name
 from executive.mission.source import Mark
 from executive.skill import EMPTY, HOLDING
 from executive.tree.flow import PossibleToolState

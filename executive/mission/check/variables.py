@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 
 from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, find_similar_word, list_choices, make_error, make_warning
+from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import Node, UseNode
-from executive.mission.model.paths import get_type_name
 from executive.mission.model.values import LocatedName, Reference
 from executive.mission.model.wiring import (
     find_control_node_inputs,

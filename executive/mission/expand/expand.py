@@ -13,8 +13,8 @@ from typing import TypeVar, cast
 
 from executive.mission.findings import Finding, find_similar_word, list_choices, make_error, make_warning
 from executive.mission.model.mission import Mission, Subtree
+from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import Node, SectionNode, SkillNode, UnknownNode, UseNode
-from executive.mission.model.paths import get_type_name
 from executive.mission.model.values import LocatedName, Reference, Setting, Value
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
 from executive.mission.source import Mark

@@ -15,7 +15,7 @@ from executive.mission.parse.cell_layout import find_overlaps
 from executive.mission.parse.overrides import CELL_PREFIX, make_override_source, override_cell
 from executive.mission.parse.validate import KeyPath, find_mark, validate
 from executive.mission.source import Source
-from executive.mission.text.files import find_file_below, read_source
+from executive.mission.text.file_search import find_file_below, read_source
 from executive.mission.text.yaml_text import (
     YamlEntry,
     YamlMapping,

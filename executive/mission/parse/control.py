@@ -17,7 +17,7 @@ from executive.tree.keys import KeySection as DeclaredSection
 from executive.tree.node import ControlNode
 
 if TYPE_CHECKING:
-    from executive.mission.parse.nodes import NodeParser
+    from executive.mission.parse.node_parser import NodeParser
 
 
 def make_unknown_node(mark: Mark) -> model.Node:

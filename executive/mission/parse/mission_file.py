@@ -11,11 +11,11 @@ from executive.mission.model import grammar
 from executive.mission.model.mission import Argument, Library, Mission, Route, Subtree
 from executive.mission.model.values import LocatedName
 from executive.mission.parse.fields import NAME_PATTERN, Fields, read_value
-from executive.mission.parse.nodes import NodeParser, Skills
+from executive.mission.parse.node_parser import NodeParser, Skills
 from executive.mission.parse.params import parse_params
 from executive.mission.source import Mark
 from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, describe_node
-from executive.tree.registry import ControlNodes
+from executive.tree.node_registry import ControlNodes
 
 _MISSION_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 

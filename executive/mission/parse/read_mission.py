@@ -13,11 +13,11 @@ from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.values import LocatedName
 from executive.mission.parse.cell_file import CellFile, read_cell
 from executive.mission.parse.mission_file import parse_library, parse_mission
-from executive.mission.parse.nodes import Skills
+from executive.mission.parse.node_parser import Skills
 from executive.mission.source import Source
-from executive.mission.text.files import find_file_below, read_source
+from executive.mission.text.file_search import find_file_below, read_source
 from executive.mission.text.yaml_text import parse_yaml
-from executive.tree.registry import ControlNodes
+from executive.tree.node_registry import ControlNodes
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
 from executive.perception.camera_model import compute_calibration
-from executive.perception.detectors.registry import find_detector_kinds
+from executive.perception.detectors.detector_registry import find_detector_kinds
 
 Fingerprint = Mapping[str, str]
 """Value of each property as text, by name; a measurement applies to a detector if all values are equal."""

@@ -11,7 +11,7 @@ from executive.cell.error_rates import ErrorRates, assume_rates
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
 from executive.errors import InputError
-from executive.perception.detectors.registry import build_detectors, find_detector_kinds
+from executive.perception.detectors.detector_registry import build_detectors, find_detector_kinds
 from executive.perception.detectors.requests import ChangedRequest
 from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.fingerprint import compute_fingerprint, describe_changes

@@ -13,7 +13,7 @@ from executive.record.diagnosis.failure_path import FailurePathNode
 from executive.record.timeline.activation import Reading
 from executive.record.timeline.items import ItemTimeline
 from executive.tree.inspection import Advice
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 
 REMEDY_BY_REASON: Mapping[str, str] = {
     "camera_moved": "mount camera and bins as the cell file says, or measure the pose again"

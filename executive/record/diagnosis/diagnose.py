@@ -9,8 +9,8 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING
 
 from executive.events import RunEnded
+from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import Node, SkillNode
-from executive.mission.model.paths import get_path_name
 from executive.record.diagnosis.advice import give_advice
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
 from executive.record.diagnosis.failed_run import FailedRun, describe_cause

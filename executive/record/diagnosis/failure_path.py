@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
+from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, Node, UseNode
-from executive.mission.model.paths import get_path_name
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 from executive.tree.failure import Reason

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from executive.cell.frame import Box
 from executive.record.pictures.palette import BACKGROUND, OUTLINE, choose_class_colour, to_bgr
-from executive.record.pictures.scene import PictureScene
+from executive.record.pictures.picture_scene import PictureScene
 from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT, draw_status_bar
 
 PICTURE_WIDTH = 640

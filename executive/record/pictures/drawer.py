@@ -9,7 +9,7 @@ from pathlib import Path
 from executive.errors import ExecutiveError, explain_os_errors
 from executive.record.atomic_file import replace_atomically
 from executive.record.pictures.draw import draw_picture
-from executive.record.pictures.scene import PictureScene
+from executive.record.pictures.picture_scene import PictureScene
 
 MAX_QUEUED_PICTURES = 64
 """Maximum number of queued pictures, of about 1.2 MB each; further pictures are not drawn."""

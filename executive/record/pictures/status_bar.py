@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.record.pictures.palette import BACKGROUND, FAILURE_TEXT, SECONDARY_TEXT, TEXT, to_bgr
-from executive.record.pictures.scene import PictureScene
+from executive.record.pictures.picture_scene import PictureScene
 
 STATUS_BAR_HEIGHT = 116
 """Height of the status bar [pixel]."""

@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from executive.mission.check.skills import find_param_problem
+from executive.mission.check.skill_settings import find_param_problem
 from executive.skill import Param, Port
 from executive.testing.conformance import source_code
 from executive.testing.conformance.skill_runs import SkillRuns

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from executive.skill import Skill
-from executive.testing.conformance.faults import NamedFault, list_skill_faults
 from executive.testing.conformance.situations import Arrange, NotTestable, Situation, list_situations
+from executive.testing.conformance.skill_faults import NamedFault, list_skill_faults
 from executive.testing.conformance.skill_test_run import SkillTestRun
 
 MAX_HALTS = 40

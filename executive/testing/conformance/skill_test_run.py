@@ -20,8 +20,8 @@ from executive.cell.proxy import Access, intercept
 from executive.errors import Fault
 from executive.events import NodeStarted, TimedEvent
 from executive.skill import Skill, SkillFailed
-from executive.testing.conformance.faults import NamedFault
 from executive.testing.conformance.situations import Arrange, Situation, prepare_scene
+from executive.testing.conformance.skill_faults import NamedFault
 from executive.testing.conformance.source_code import find_skill_line
 from executive.testing.faults import FaultyCell, during
 from executive.tree.skill_run import SkillRun

@@ -9,7 +9,7 @@ Examples of faults in a script for `run_mission(faults=[...])`:
   `with_probability(0.1, "*/Transit", seal_breaks(), seed=1)`
 """
 
-from executive.testing.faults.detector import (
+from executive.testing.faults.detector_faults import (
     detector_blind,
     detector_dead,
     detector_hangs,
@@ -18,8 +18,13 @@ from executive.testing.faults.detector import (
     detector_unsure,
 )
 from executive.testing.faults.faulty_cell import FaultyCell, with_faults
-from executive.testing.faults.objects import object_bumped, object_moved, object_removed, object_unsealable
-from executive.testing.faults.robot import (
+from executive.testing.faults.object_faults import (
+    object_bumped,
+    object_moved,
+    object_removed,
+    object_unsealable,
+)
+from executive.testing.faults.robot_faults import (
     arm_collides,
     no_depth,
     no_path,

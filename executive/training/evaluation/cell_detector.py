@@ -12,7 +12,7 @@ from executive.cell.config import CameraConfig, DetectorConfig
 from executive.cell.detection import Answer
 from executive.cell.frame import Frame
 from executive.errors import Unavailable
-from executive.perception.detectors.registry import build_detectors
+from executive.perception.detectors.detector_registry import build_detectors
 
 LOOK_INTERVAL = 1.0
 """Simulated time between two requests [s]; similar to the time between two looks in a run."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from executive.perception.envelope.frame_statistics import FrameRange
-from executive.training.evaluation.error_rates import MeasuredErrorRates
+from executive.training.evaluation.measured_rates import MeasuredErrorRates
 
 NO_OBJECT = "nothing"
 """Class name in a confusion matrix for a missed object or a false detection."""

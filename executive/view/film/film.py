@@ -11,10 +11,10 @@ from PIL import Image
 
 from executive.cells.sim.pictures import PictureSource, count_steps, render_pictures
 from executive.cells.sim.viewpoint import compute_viewpoint
+from executive.view.film.film_source import FilmSource
 from executive.view.film.formats import FilmFormat
 from executive.view.film.page import SCENE_SIZE, draw_page, draw_result
 from executive.view.film.run_state import FilmRunState
-from executive.view.film.source import FilmSource
 
 CELL_BOX = (24, 76, 776, 644)
 """Left, top, right and bottom of the box in the image in which arm, workspace and bins appear [pixel]."""

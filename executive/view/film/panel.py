@@ -12,7 +12,7 @@ from executive.mission.outline import OutlineNode
 from executive.view.film import style
 from executive.view.film.run_state import FilmRunState
 from executive.view.film.style import FAILURE, INACTIVE, LINE, MINOR_TEXT, RUNNING, SUCCESS, TEXT
-from executive.view.tree.outline import draw_line_prefixes, select_active_nodes
+from executive.view.tree.tree_text import draw_line_prefixes, select_active_nodes
 
 TEXT_SIZE, HEADING_SIZE, MARK_SIZE = 14, 12, 11
 """Font sizes of text and of column headings, and side of a status mark [pixel]."""

@@ -9,7 +9,7 @@ from executive.events import FaultRaised, NodeEnded, RunHalted, RunResumed, Time
 from executive.mission.outline import OutlineNode
 from executive.record.timeline.activation import Activation, to_skill_name
 from executive.record.timeline.timeline import Timeline
-from executive.view.tree.outline import find_skill_names
+from executive.view.tree.tree_text import find_skill_names
 
 FAILURE_DISPLAY_TIME = 1.6
 """Time for which a film shows a failure, on the clock of the run [s]."""

@@ -13,7 +13,7 @@ from aiohttp import WSMsgType, web
 from executive.cell.visuals import Shape
 
 if TYPE_CHECKING:
-    from executive.view.live.scene import LiveScene
+    from executive.view.live.live_scene import LiveScene
 
 CONTENT_POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' data: blob:; "
@@ -93,7 +93,7 @@ class SceneProxy:
 
 
 def _make_scene(path: Path, shapes: Sequence[Shape]) -> LiveScene:
-    from executive.view.live.scene import LiveScene
+    from executive.view.live.live_scene import LiveScene
 
     return LiveScene(path, shapes)
 

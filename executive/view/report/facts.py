@@ -5,15 +5,15 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from executive.mission.text.files import get_shipped_folder
-from executive.record.diagnosis.text import make_resume_command
+from executive.mission.text.file_search import get_shipped_folder
+from executive.record.diagnosis.diagnosis_text import make_resume_command
 from executive.record.journal import find_end, find_start, read_journal
 from executive.record.recorded_mission import read_tree
 from executive.record.result import FINAL_STATUSES, list_requests, read_result
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
 from executive.view.report.activity_times import compute_activity_times
-from executive.view.report.pictures import collect_pictures
+from executive.view.report.report_pictures import collect_pictures
 from executive.view.terminal.summary import format_repeat_command
 
 INTERRUPTED = "INTERRUPTED"

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from executive.errors import ExecutiveError
 from executive.perception.evidence import describe_unknown
 from executive.record.atomic_file import write_atomically
-from executive.record.diagnosis import text
+from executive.record.diagnosis import diagnosis_text
 from executive.record.pictures.palette import PALETTE
 from executive.record.result import describe_disagreement
 from executive.record.run_directory import RunDirectory, convert_os_errors
@@ -75,7 +75,7 @@ def render_report(facts: ReportFacts) -> str:
         audit=asdict(result.audit) if result is not None and result.audit is not None else {},
         unknown=describe_unknown({} if result is None else result.unknown),
         story=story,
-        story_facts=[] if story is None else list(text.list_facts(story)),
+        story_facts=[] if story is None else list(diagnosis_text.list_facts(story)),
         last_picture=next((one for one in facts.pictures if story and one.file == story.picture), None),
         titles={node.path: node.title for node in facts.nodes},
         describe_place=describe_place_on_table,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TextIO
 from executive import events
 from executive.mission.outline import make_outline
 from executive.record.timeline.timeline import Timeline
-from executive.view.tree.outline import find_skill_names
+from executive.view.tree.tree_text import find_skill_names
 
 if TYPE_CHECKING:
     from executive.run.run import Run

@@ -16,8 +16,8 @@ from executive.mission.outline import OutlineNode, make_outline
 from executive.record.timeline.timeline import Timeline
 from executive.run.run import Run
 from executive.run.run_control import RunControl
-from executive.view.terminal.keys import HELP, HELP_PAUSED, KeyReader
-from executive.view.tree.outline import draw_line_prefixes, select_active_nodes
+from executive.view.terminal.keyboard import HELP, HELP_PAUSED, KeyReader
+from executive.view.tree.tree_text import draw_line_prefixes, select_active_nodes
 
 REDRAWS_PER_SECOND = 10
 """Frequency at which the view is drawn [1/s]."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from executive.mission.outline import OutlineNode
 from executive.tree.node import ControlNode
 from executive.view.text import fit_text
-from executive.view.tree.outline import describe_reads, describe_reasons, describe_writes
+from executive.view.tree.tree_text import describe_reads, describe_reasons, describe_writes
 
 MAX_LINE_LENGTH = 28
 """Maximum length of a line of text in the box of a node [characters]."""

@@ -15,7 +15,7 @@ from types import MappingProxyType
 from executive.mission.outline import OutlineNode, list_child_indices
 from executive.view.text import fit_text, measure_text, render_template
 from executive.view.tree.card import MAX_LINE_LENGTH, Card, make_card
-from executive.view.tree.layout import FRAME_PADDING, Layout, NodeSize, compute_layout
+from executive.view.tree.tree_layout import FRAME_PADDING, Layout, NodeSize, compute_layout
 
 TITLE_SIZE, LINE_SIZE, EDGE_LABEL_SIZE, SUBTREE_NAME_SIZE = 13.0, 11.0, 11.0, 12.0
 """Font sizes of titles, lines, labels of edges and names of subtrees, as in `tree.svg` [pixel]."""

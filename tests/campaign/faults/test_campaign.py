@@ -18,7 +18,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import discover
-from executive.view.figures.fault import FaultFigures, Trial
+from executive.view.figures.fault_figures import FaultFigures, Trial
 
 MISSION = """\
 mission: small

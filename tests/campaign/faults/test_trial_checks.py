@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from events import at, frame_searched, item_changed
 
-from executive.campaign.faults.fault import PlannedFault, SkillFault
+from executive.campaign.faults.planned_fault import PlannedFault, SkillFault
 from executive.campaign.faults.trial_checks import (
     UnobservedCounts,
     check_end,

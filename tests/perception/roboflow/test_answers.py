@@ -14,7 +14,7 @@ from executive.perception.detectors.roboflow.complaints import (
     describe_invalid_answer,
     shorten_to_line,
 )
-from executive.perception.detectors.roboflow.options import RoboflowOptions
+from executive.perception.detectors.roboflow.server_options import RoboflowOptions
 
 CUBE = {"x": 50.0, "y": 40.0, "width": 20, "height": 10.0, "confidence": 0.9, "class": "cube", "class_id": 0}
 

@@ -8,7 +8,7 @@ from executive.cell.config import DetectorConfig
 from executive.errors import InputError
 from executive.perception.detectors.roboflow.detector import RoboflowDetector
 from executive.perception.detectors.roboflow.key import ApiKey
-from executive.perception.detectors.roboflow.options import RoboflowOptions
+from executive.perception.detectors.roboflow.server_options import RoboflowOptions
 
 SECRET = "SECRET1234567890"
 

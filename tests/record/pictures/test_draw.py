@@ -10,7 +10,7 @@ import pytest
 from executive.cell.detection import Detection
 from executive.record.pictures.draw import PICTURE_WIDTH, draw_picture, make_captions
 from executive.record.pictures.palette import BACKGROUND, PALETTE, choose_class_colour, to_bgr
-from executive.record.pictures.scene import PictureScene
+from executive.record.pictures.picture_scene import PictureScene
 from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT
 
 GREY = 150

@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.detection import Detection
 from executive.record.pictures import drawer as module
 from executive.record.pictures.drawer import MAX_QUEUED_PICTURES, PictureDrawer
-from executive.record.pictures.scene import PictureScene
+from executive.record.pictures.picture_scene import PictureScene
 
 SCENE = PictureScene(
     np.full((480, 640, 3), 150, np.uint8),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.record.pictures.scene import PictureScene
+from executive.record.pictures.picture_scene import PictureScene
 from executive.record.pictures.status_bar import (
     ROW_COUNT,
     STATUS_BAR_HEIGHT,

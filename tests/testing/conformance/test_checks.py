@@ -14,7 +14,7 @@ import pytest
 from executive.plugins import discover
 from executive.skill import Skill
 from executive.testing.conformance import list_conformance_checks
-from executive.testing.conformance.check import RULES, Check, ConformanceError
+from executive.testing.conformance.conformance_check import RULES, Check, ConformanceError
 
 ARRANGE = "skills/README.md has an example."
 FAULT = " This is a fault, which ends the run: fail with a declared reason, or correct the code."

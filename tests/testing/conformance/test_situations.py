@@ -13,7 +13,7 @@ from executive.cell.protocols import Cell, Steps
 from executive.plugins import discover
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 from executive.testing.conformance import SkillScene
-from executive.testing.conformance.check import arrange_nothing
+from executive.testing.conformance.conformance_check import arrange_nothing
 from executive.testing.conformance.situations import (
     Arrange,
     ArrangementFailed,

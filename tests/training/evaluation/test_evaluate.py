@@ -9,8 +9,8 @@ import pytest
 
 from executive.errors import NoDepth
 from executive.perception.envelope.measurement import StoredErrorRates
-from executive.training.evaluation.error_rates import CountedRate, MeasuredErrorRates, round_up
 from executive.training.evaluation.evaluate import evaluate
+from executive.training.evaluation.measured_rates import CountedRate, MeasuredErrorRates, round_up
 from executive.training.evaluation.metrics import ClassMetrics, Distribution
 from executive.training.evaluation.worst_mistakes import WorstMistakes
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from executive.view.figures.fault import (
+from executive.view.figures.fault_figures import (
     Branch,
     FaultFigures,
     Trial,

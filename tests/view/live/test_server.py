@@ -17,7 +17,6 @@ from events import at, run_started
 
 from executive.cell.visuals import Shape
 from executive.geometry import Pose
-from executive.view.live import scene
 from executive.view.live.messages import PageChange, PageCommand
 from executive.view.live.page_state import PageState
 from executive.view.live.scene_proxy import SceneProxy
@@ -103,7 +102,7 @@ def test_serves_the_page_to_the_page_and_nothing_else() -> None:
             assert (status, headers["Content-Type"]) == (200, f"{kind}; charset=utf-8")
             assert text
             assert headers.items() >= (SECURITY_HEADERS | {"Content-Security-Policy": CONTENT_POLICY}).items()
-        for path in ("page.py", "../guard.py", "%2e%2e/guard.py", "scene.py"):
+        for path in ("page.py", "../guard.py", "%2e%2e/guard.py", "live_scene.py"):
             status, text, _ = await get(site, f"/{TOKEN}/{path}")
             assert (status, text) in [(404, "there is no such file\n"), (403, text)]
         for path in ("/", "/live", "/scene", "/wrong/", "/wrong/live", "/wrong/scene/"):
@@ -195,7 +194,7 @@ class Built:
 @pytest.mark.parametrize("looked_at", [True, False])
 def test_the_scene_is_built_once_when_somebody_looks_and_there_is_one(monkeypatch, looked_at) -> None:
     monkeypatch.setattr(Built, "made", [])
-    monkeypatch.setattr(scene, "LiveScene", Built)
+    monkeypatch.setattr(live_scene, "LiveScene", Built)
 
     async def work() -> None:
         scene_proxy = SceneProxy(Path("socket"))

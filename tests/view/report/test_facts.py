@@ -13,7 +13,7 @@ from executive.cell.json_values import to_json
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import Event, FaultInjected, RequestGiven, RunResumed
-from executive.mission.text.files import get_shipped_folder
+from executive.mission.text.file_search import get_shipped_folder
 from executive.plugins import discover
 from executive.record.journal_format import encode_event
 from executive.record.recorded_run import RecordOptions

@@ -20,7 +20,7 @@ from executive.run.run_control import RunControl
 from executive.view.terminal.lines import LineView
 from executive.view.terminal.screen import TerminalView
 from executive.view.terminal.summary import format_repeat_command, format_summary
-from executive.view.tree.outline import find_skill_names, select_active_nodes
+from executive.view.tree.tree_text import find_skill_names, select_active_nodes
 
 GRASP = "tree/sort/repeat/Grasp"
 

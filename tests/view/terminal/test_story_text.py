@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, PassedNode
-from executive.record.diagnosis.text import MAX_LINE_WIDTH, format_diagnosis
+from executive.record.diagnosis.diagnosis_text import MAX_LINE_WIDTH, format_diagnosis
 from executive.record.timeline.items import Sighting
 from tests.record.failed_runs import PICK, FailedRun
 

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from executive.view.tree.layout import NodeSize, Rectangle, compute_layout
+from executive.view.tree.tree_layout import NodeSize, Rectangle, compute_layout
 
 
 def drawn_by_chance(seed: int) -> tuple[list[int], list[NodeSize]]:

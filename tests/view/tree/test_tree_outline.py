@@ -16,7 +16,7 @@ from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 from executive.tree.try_catch import Catch, TryCatch
-from executive.view.tree.outline import MAX_LINE_LENGTH, draw_outline, fold_subtrees
+from executive.view.tree.tree_text import MAX_LINE_LENGTH, draw_outline, fold_subtrees
 
 CELL: Any = SimpleNamespace()
 MISSED = (Reason("Pick", "missed"),)

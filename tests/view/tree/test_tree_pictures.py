@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 from executive.mission.outline import Connection, OutlineNode
 from executive.tree.node import ControlNode
-from executive.tree.registry import load_control_nodes
+from executive.tree.node_registry import load_control_nodes
 from executive.view.text import replace_invalid_characters
 from executive.view.tree.card import make_card
 from executive.view.tree.dot import draw_dot

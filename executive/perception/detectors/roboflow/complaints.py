@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from executive.perception.detectors.roboflow.key import KEY_VARIABLE
-from executive.perception.detectors.roboflow.options import RoboflowOptions
+from executive.perception.detectors.roboflow.server_options import RoboflowOptions
 
 MAX_QUOTATION_LENGTH = 100
 """Maximum number of characters that are quoted from a message of a server."""

@@ -21,7 +21,7 @@ from executive.perception.detectors.roboflow.complaints import (
 )
 from executive.perception.detectors.roboflow.helper import InferenceProcess, NoAnswer
 from executive.perception.detectors.roboflow.key import ApiKey
-from executive.perception.detectors.roboflow.options import (
+from executive.perception.detectors.roboflow.server_options import (
     WORKFLOW_OPTIONS,
     RoboflowOptions,
     find_wrong_roboflow_options,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from executive.testing.conformance.check import Verdict
+from executive.testing.conformance.conformance_check import Verdict
 
 
 def format_verdicts(verdicts: Sequence[Verdict]) -> Iterator[str]:

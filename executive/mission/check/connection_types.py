@@ -10,8 +10,8 @@ from executive.mission.check.context import CheckContext
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, list_choices, make_error
 from executive.mission.model.conversion import find_input_problem
+from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node
-from executive.mission.model.paths import get_type_name
 from executive.mission.model.port_types import describe_type, find_element_type, is_assignable
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import Wire, find_control_node_outputs

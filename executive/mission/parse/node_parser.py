@@ -27,7 +27,7 @@ from executive.mission.text.yaml_text import (
     describe_node,
 )
 from executive.skill import Skill
-from executive.tree.registry import ControlNodes
+from executive.tree.node_registry import ControlNodes
 
 Skills = Mapping[str, type[Skill]]
 """Installed skills by name."""

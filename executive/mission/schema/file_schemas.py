@@ -24,7 +24,7 @@ from executive.mission.schema.types import (
 from executive.skill import Skill
 from executive.tree.keys import Key, Kind
 from executive.tree.node import ControlNode
-from executive.tree.registry import ControlNodes
+from executive.tree.node_registry import ControlNodes
 
 Skills: TypeAlias = Mapping[str, type[Skill]]
 

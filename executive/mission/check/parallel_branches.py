@@ -8,8 +8,8 @@ from itertools import combinations, permutations
 from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
+from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
-from executive.mission.model.paths import get_type_name
 from executive.mission.model.wiring import find_control_node_inputs, find_control_node_outputs
 from executive.mission.source import Mark
 from executive.skill import Direction
