@@ -44,7 +44,7 @@ from executive.training.samples import Samples
 MAX_OBJECT_COUNT = 20
 """Maximum number of objects in a rendered scene; fewer if the table has no room for them."""
 OpenProgressBar = Callable[[str], AbstractContextManager[Callable[[int, int], None]]]
-"""Function that opens a progress bar with a name; its context is the function `update(done, total)`."""
+"""Function that opens a progress bar with a name; the context manager yields `update(done, total)`."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class SceneSettings:
         image_count: Number of images per cell.
         seed: Random seed.
         is_varied: True: scenes vary as in training. False: initial scenes of runs with at most
-            `MAX_OBJECT_COUNT` objects, searched as in a run.
+            `MAX_OBJECT_COUNT` objects; the detector searches the same region as in a run.
         view: Region of the frame that is searched: `table`, or `full` for the whole frame.
         workers: Number of processes that render.
         scene: Scene file that changes the initial scenes of runs; None: no change.
@@ -107,15 +107,15 @@ def list_detectors(
     Raises:
         InputError: A cell has no detector of this name.
     """
-    model: dict[str, DetectorConfig] = {}
+    model_configs: dict[str, DetectorConfig] = {}
     if weights is not None:
-        model = {MODEL_NAME: make_model_config(weights, labels or find_label_file(weights))}
+        model_configs = {MODEL_NAME: make_model_config(weights, labels or find_label_file(weights))}
     elif not cells:
-        model = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
+        model_configs = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
     if not cells:
-        yield DetectorUnderTest(None, model, next(iter(model)), Path())
+        yield DetectorUnderTest(None, model_configs, next(iter(model_configs)), Path())
     for file, config in cells.items():
-        configs = model or dict(config.detectors)
+        configs = model_configs or dict(config.detectors)
         name = detector or next(iter(configs))
         if name not in configs:
             hint = list_choices(name, configs, "Its detectors")
@@ -150,7 +150,7 @@ def measure_detector(
     worst_mistakes: WorstMistakes,
     progress: OpenProgressBar,
 ) -> Evaluation:
-    """Evaluate a detector on `dataset`, or on rendered scenes of its cell, and return its errors."""
+    """Evaluate a detector on `dataset` or on rendered scenes of its cell; add to `worst_mistakes`."""
     config = detector.cell
     run_config = None if dataset is not None or scenes.is_varied else config
     with _open_images(detector, dataset, scenes, progress) as samples:
@@ -164,7 +164,7 @@ def measure_detector(
         )
         with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
             return evaluate(
-                cell_detector, _report_progress(samples, update), threshold=threshold, worst=worst_mistakes,
+                cell_detector, _show_progress(samples, update), threshold=threshold, worst=worst_mistakes,
                 localizer=_build_localizer(run_config) if run_config else None,
                 table=run_config.table if run_config else None,
             )  # fmt: skip
@@ -198,10 +198,10 @@ def _open_images(
         yield frames
 
 
-def _report_progress(
+def _show_progress(
     samples: Samples | list[LabelledImage], update_progress: Callable[[int, int], None]
 ) -> Iterator[LabelledImage]:
-    """Yield the images, and update the progress bar after each image."""
+    """Yield the images; update the progress bar after each image."""
     for done, sample in enumerate(samples, 1):
         yield sample
         update_progress(done, len(samples))
@@ -230,15 +230,15 @@ def store_evaluation(
         seconds: Duration of the evaluation [s].
 
     Raises:
-        InputError: The detector answered for no image, or the file cannot be read or written.
+        InputError: The detector gave no usable answer to any image, or the file cannot be read or written.
     """
     assert detector.cell is not None
     path = out or detector.base / f"{detector.cell.cell}{SUFFIX}"
     if evaluation.reliability is None:
         raise InputError(
-            f"detector {detector.name} answered for no image: {evaluation.why}; nothing was measured"
+            f"detector {detector.name} gave no usable answer: {evaluation.why}; nothing was measured"
         )
-    table = evaluation.confusion
+    confusion_matrix = evaluation.confusion
     measurement = Measurement(
         detector=detector.name,
         fingerprint=dict(compute_fingerprint(detector.cell, detector.name, detector.base)),
@@ -251,9 +251,9 @@ def store_evaluation(
                 objects=sum(row.values()),
                 missed=row.get(NO_OBJECT, 0),
                 confused=sum(row.values()) - row.get(NO_OBJECT, 0) - row.get(label, 0),
-                false_detections=table.get(NO_OBJECT, {}).get(label, 0),
+                false_detections=confusion_matrix.get(NO_OBJECT, {}).get(label, 0),
             )
-            for label, row in table.items()
+            for label, row in confusion_matrix.items()
             if label != NO_OBJECT
         },
         counts={

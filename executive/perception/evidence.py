@@ -39,7 +39,7 @@ SIZE_TOLERANCE = 0.15
 SIZE_MARGIN = 2.0
 """Absolute tolerance that is added to `SIZE_TOLERANCE` [pixel]."""
 MIN_BORDER_DISTANCE = 2.0
-"""Minimum distance to the border of the searched region of a box that is not truncated [pixel]."""
+"""Boxes nearer to the border of the searched region may be truncated [pixel]."""
 
 
 def describe_unknown(counts: Mapping[str, int]) -> str:
@@ -79,7 +79,12 @@ def find_classes_distinct_by_touch(config: CellConfig) -> frozenset[str]:
 def may_miss_top(label: str, height: float, classes: Mapping[str, ObjectClass]) -> bool:
     """Return True if a touch is too low for a class and at the height of no other class.
 
-    The touch may have missed the top of the object. For the arguments, see `describe_wrong_height`.
+    The touch may have missed the top of the object.
+
+    Args:
+        label: Assumed class of the object.
+        height: Height of the touch above the table [m].
+        classes: Classes of the cell by label.
     """
     errors = {other: _compute_height_error(other, height, classes) for other in classes}
     return errors[label] < 0 and all(abs(error) > OTHER_CLASS_TOLERANCE for error in errors.values())
@@ -135,7 +140,8 @@ def describe_wrong_size(
     """Return a sentence if the size of a box contradicts a class, otherwise "".
 
     A cylinder with the radius and height of the class encloses the object. The longer side of the box is at
-    most the longer side of the image of the cylinder, and at least the side of the square in its base.
+    most the longer side of the image of the cylinder, and at least the side of the square inscribed in its
+    base.
 
     Args:
         detection: The box and its class.

@@ -136,7 +136,7 @@ def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
             raise InputError(f"{key}.image_id: there is no image {image_id}")
         if category not in names:
             known_ids = ", ".join(map(str, names))[:MAX_QUOTATION_LENGTH] or "none"
-            raise InputError(f"{key}.category_id: there is no category {category}; there are {known_ids}")
+            raise InputError(f"{key}.category_id: no category has the id {category}; ids: {known_ids}")
         left, top, width, height = entry.bbox
         box = left, top, left + width, top + height
         objects[image_id].add(names[category], box, f"{key}.image_id: image {image_id} has")
@@ -176,7 +176,7 @@ def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
             numbers = [float(value) for value in values]
             name = names[int(label)]
         except KeyError:
-            raise InputError(f"{file}:{number}: there is no class {label}; there are {len(names)}") from None
+            raise InputError(f"{file}:{number}: {label} is not one of {len(names)} classes") from None
         except ValueError:
             raise InputError(
                 f'{file}:{number}: must be a class number and normalized coordinates, not "{line}"'

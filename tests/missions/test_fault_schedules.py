@@ -11,7 +11,7 @@ from executive.cell.detection import Answer, Detection
 from executive.cells.fake.cell import FakeCell
 from executive.plugins import load_cell_kind
 from executive.testing.faults import ScheduledFault, after, during, object_bumped, with_probability
-from executive.testing.faults.detector_faults import faulty_detector
+from executive.testing.faults.detector_faults import make_detector_effect
 from executive.testing.faults.effect import Effect, Occurrence
 from executive.testing.run_mission import MissionResult, run_mission
 
@@ -61,7 +61,7 @@ def detector_adds_false_box(seed: int) -> Effect:
     def add(answer: Answer) -> Answer:
         return replace(answer, found=(*answer.found, Detection("cube", 0.9, box)))
 
-    return faulty_detector("detector_adds_false_box", add)
+    return make_detector_effect("detector_adds_false_box", add)
 
 
 def detector_swaps_classes() -> Effect:
@@ -70,7 +70,7 @@ def detector_swaps_classes() -> Effect:
     def swap(answer: Answer) -> Answer:
         return replace(answer, found=tuple(replace(one, label=SWAPPED[one.label]) for one in answer.found))
 
-    return faulty_detector("detector_swaps_classes", swap)
+    return make_detector_effect("detector_swaps_classes", swap)
 
 
 def schedule(kind: str, seed: int) -> list[ScheduledFault]:

@@ -77,7 +77,7 @@ BOX = ("annotations", 0, "bbox")
         (changed("annotations", 0, "image_id"), "annotations[0].image_id: Field required"),
         (changed("annotations", 0, "image_id", value=9), "annotations[0].image_id: there is no image 9"),
         (changed("annotations", 0, "category_id", value=9),
-         "annotations[0].category_id: there is no category 9; there are 3"),
+         "annotations[0].category_id: no category has the id 9; ids: 3"),
         (changed(*BOX), "annotations[0].bbox: Field required"),
         (changed(*BOX, value=[1, 2, 3]), "annotations[0].bbox[3]: Field required"),
         (changed(*BOX, value=[1, 2, 3, 4, 5]), "annotations[0].bbox: Tuple should have at most 4 items"),
@@ -138,8 +138,8 @@ def test_boxes_and_polygons_of_yolo_are_read(yolo: Callable[..., Path]) -> None:
 @pytest.mark.parametrize(
     ("labels", "data", "error"),
     [
-        ("2 0.5 0.5 0.2 0.4\n", "names: [duck, cube]\n", "labels/a.txt:1: there is no class 2; there are 2"),
-        ("\n-1 0.5 0.5 0.2 0.4\n", "names: [duck]\n", "labels/a.txt:2: there is no class -1; there are 1"),
+        ("2 0.5 0.5 0.2 0.4\n", "names: [duck, cube]\n", "labels/a.txt:1: 2 is not one of 2 classes"),
+        ("\n-1 0.5 0.5 0.2 0.4\n", "names: [duck]\n", "labels/a.txt:2: -1 is not one of 1 classes"),
         (
             "duck 0.5 0.5 0.2 0.4\n",
             "names: [duck]\n",

@@ -41,7 +41,7 @@ def _remove_detections(answer: Answer) -> Answer:
     return replace(answer, found=(), doubtful=(), unknown=())
 
 
-def faulty_detector(
+def make_detector_effect(
     name: str, change: AnswerChange | None = None, delay: float = 0.0, hang_end: float = 0.0
 ) -> Effect:
     """Return an effect: the detector answers late, with changed answers, or not at all.
@@ -50,25 +50,25 @@ def faulty_detector(
         name: Name of the effect in the journal.
         change: Changes the answer of the detector; None: no change.
         delay: Delay of each answer [s].
-        hang_end: Time on the run's clock before which no request is answered while the effect lasts [s].
+        hang_end: While the effect lasts, no request is answered before this time on the run's clock [s].
     """
     return Effect(name, interceptors={"request": _make_faulty_request}, arguments=(change, delay, hang_end))
 
 
 def detector_dead() -> Effect:
     """Return an effect: requests fail at their usual time, and `Detect` fails with `unavailable`."""
-    return faulty_detector("detector_dead", _raise_unavailable)
+    return make_detector_effect("detector_dead", _raise_unavailable)
 
 
 def detector_hangs(hang_end: float = math.inf) -> Effect:
     """Return an effect: requests are answered only after the fault.
 
-    If the fault lasts while a node runs that waits for the answer, the request is never answered.
+    If the fault ends only when a node that waits for the answer ends, the request is never answered.
 
     Args:
         hang_end: Time on the run's clock at which requests are answered in any case [s].
     """
-    return faulty_detector("detector_hangs", hang_end=hang_end)
+    return make_detector_effect("detector_hangs", hang_end=hang_end)
 
 
 def detector_times_out(delay: float) -> Effect:
@@ -77,7 +77,7 @@ def detector_times_out(delay: float) -> Effect:
     Args:
         delay: Time from the usual answer to the failure [s].
     """
-    return faulty_detector("detector_hangs", _raise_unavailable, delay=delay)
+    return make_detector_effect("detector_hangs", _raise_unavailable, delay=delay)
 
 
 def detector_slow(delay: float) -> Effect:
@@ -91,17 +91,17 @@ def detector_slow(delay: float) -> Effect:
     """
     if delay < 0:
         raise InputError(f"the delay of a detector must be at least 0 s, not {delay:g} s")
-    return faulty_detector("detector_slow", delay=delay)
+    return make_detector_effect("detector_slow", delay=delay)
 
 
 def detector_unsure() -> Effect:
     """Return an effect: all confidences are below the threshold, and `Detect` fails with `unsure`."""
-    return faulty_detector("detector_unsure", _reduce_confidence)
+    return make_detector_effect("detector_unsure", _reduce_confidence)
 
 
 def detector_blind() -> Effect:
     """Return an effect: nothing is detected, and `Detect` succeeds with an empty list."""
-    return faulty_detector("detector_blind", _remove_detections)
+    return make_detector_effect("detector_blind", _remove_detections)
 
 
 @dataclass

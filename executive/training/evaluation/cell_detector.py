@@ -18,7 +18,7 @@ LOOK_INTERVAL = 1.0
 """Simulated time between two requests [s]; similar to the time between two looks in a run."""
 ANSWER_TIMEOUT = 60.0
 """Maximum simulated time from a request to its answer [s]."""
-WHOLE_IMAGE = CameraConfig(
+WHOLE_IMAGE_CAMERA = CameraConfig(
     mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
     table_view=(0, 0, 64, 64), scan_poses=("none",),
 ).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
@@ -57,7 +57,7 @@ class CellDetector:
         self._now = 0.0
         clock = StepClock(lambda: self._now)
         self._detectors = build_detectors(
-            configs, camera=camera or WHOLE_IMAGE, clock=clock, base=base, seed=0
+            configs, camera=camera or WHOLE_IMAGE_CAMERA, clock=clock, base=base, seed=0
         )
 
     def detect(self, frame: Frame) -> tuple[Answer, float]:

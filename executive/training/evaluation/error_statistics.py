@@ -14,7 +14,7 @@ from executive.cell.protocols import Localizer
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.camera_model import intersect_plane
-from executive.training.evaluation.matching import MIN_IOU, BoxMatch, compute_ious, is_covered
+from executive.training.evaluation.matching import MIN_IOU, BoxMatch, compute_ious, is_occluded
 from executive.training.evaluation.measured_rates import CountedRate, MeasuredErrorRates
 from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics
 from executive.training.labelled_image import LabelledImage
@@ -49,16 +49,16 @@ class ErrorStatistics:
         """Count the matches of one image, and measure the position errors of its correct detections."""
         self._image_count += 1
         counts = self.counts_by_object_count[len(sample.labels)]
-        match_by_object = {one.object_index: one for one in matches if one.object_index is not None}
+        match_by_object = {match.object_index: match for match in matches if match.object_index is not None}
         for index, label in enumerate(sample.labels):
-            one = match_by_object.get(index)
-            self.confusion[label, one.detection.label if one else NO_OBJECT] += 1
-            if sample.is_fully_visible(index) and (one or not is_covered(index, matches, sample)):
-                is_confused = one is not None and not one.is_correct
-                counts.update(objects=1, missed=one is None, confused=is_confused)
-            if one is not None and one.is_correct:
-                self._measure_errors(one, index, sample, frame)
-        false_detections = [one.detection.label for one in matches if one.object_index is None]
+            match = match_by_object.get(index)
+            self.confusion[label, match.detection.label if match else NO_OBJECT] += 1
+            if sample.is_fully_visible(index) and (match or not is_occluded(index, matches, sample)):
+                is_confused = match is not None and not match.is_correct
+                counts.update(objects=1, missed=match is None, confused=is_confused)
+            if match is not None and match.is_correct:
+                self._measure_errors(match, index, sample, frame)
+        false_detections = [match.detection.label for match in matches if match.object_index is None]
         self.confusion.update((NO_OBJECT, label) for label in false_detections)
         counts.update(false_detections=len(false_detections))
 
@@ -158,22 +158,22 @@ class RepeatedErrors:
         self, first: Sequence[BoxMatch], second: Sequence[BoxMatch], sample: LabelledImage, frame: Frame
     ) -> None:
         """Count the errors in the first image of a scene, and those that occur also in the second image."""
-        first_by_object = {one.object_index: one for one in first if one.object_index is not None}
-        second_by_object = {one.object_index: one for one in second if one.object_index is not None}
+        first_by_object = {match.object_index: match for match in first if match.object_index is not None}
+        second_by_object = {match.object_index: match for match in second if match.object_index is not None}
         for index, label in enumerate(sample.labels):
             if not sample.is_fully_visible(index):
                 continue
             first_match, second_match = first_by_object.get(index), second_by_object.get(index)
-            if first_match is None and is_covered(index, first, sample):
+            if first_match is None and is_occluded(index, first, sample):
                 continue
             first_label, second_label = (one and one.detection.label for one in (first_match, second_match))
             self.error_count += first_label != label
             self.repeated_count += first_label != label and first_label == second_label
             if first_match and second_match and first_match.is_correct and second_match.is_correct:
                 self._compare(first_match, second_match, sample, frame)
-        false_detections = [one.detection for one in second if one.object_index is None]
-        for false in (one.detection for one in first if one.object_index is None):
-            boxes = [one.box for one in false_detections if one.label == false.label]
+        false_detections = [match.detection for match in second if match.object_index is None]
+        for false in (match.detection for match in first if match.object_index is None):
+            boxes = [other.box for other in false_detections if other.label == false.label]
             self.error_count += 1
             self.repeated_count += bool(compute_ious([false.box], boxes).max(initial=0.0) >= MIN_IOU)
 

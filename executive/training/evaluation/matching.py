@@ -13,8 +13,8 @@ from executive.cell.frame import Box
 from executive.geometry import Array
 from executive.training.labelled_image import LabelledImage
 
-MIN_COVERING_IOU = 0.2
-"""Minimum intersection over union (IoU) of a box that covers a part of another object."""
+MIN_OCCLUDING_IOU = 0.2
+"""Minimum intersection over union (IoU) of two boxes of which one occludes a part of the other object."""
 MIN_IOU = 0.5
 """Minimum intersection over union (IoU) of two boxes that belong to the same object."""
 
@@ -43,14 +43,15 @@ class BoxMatch:
 
 
 def match_detections(detections: Sequence[Detection], sample: LabelledImage) -> list[BoxMatch]:
-    """Return the match of each detection, sorted by falling confidence.
+    """Return the match of each detection, in descending order of confidence.
 
     Greedy assignment: each detection gets the free object of its own class with the highest IoU. Then each
     unassigned detection gets the free object of any class with the highest IoU.
     """
     ranked = sorted(detections, key=lambda detection: -detection.confidence)
-    ious = compute_ious([one.box for one in ranked], sample.boxes)
-    same_class = np.array([[one.label == label for label in sample.labels] for one in ranked], dtype=bool)
+    ious = compute_ious([detection.box for detection in ranked], sample.boxes)
+    rows = [[detection.label == label for label in sample.labels] for detection in ranked]
+    same_class = np.array(rows, dtype=bool)
     index_by_rank: dict[int, int] = {}
     for is_allowed in (same_class.reshape(ious.shape), np.ones_like(ious)):
         for rank in range(len(ranked)):
@@ -59,17 +60,18 @@ def match_detections(detections: Sequence[Detection], sample: LabelledImage) -> 
                 index_by_rank[rank] = int(object_ious.argmax())
                 ious[:, index_by_rank[rank]] = 0.0
     matches = []
-    for rank, one in enumerate(ranked):
+    for rank, detection in enumerate(ranked):
         index = index_by_rank.get(rank)
-        is_correct = index is not None and sample.labels[index] == one.label
-        matches.append(BoxMatch(one, index, is_correct, one.box if index is None else sample.boxes[index]))
+        is_correct = index is not None and sample.labels[index] == detection.label
+        box = detection.box if index is None else sample.boxes[index]
+        matches.append(BoxMatch(detection, index, is_correct, box))
     return matches
 
 
-def is_covered(index: int, matches: Sequence[BoxMatch], sample: LabelledImage) -> bool:
-    """Return True if another detected object covers the object: it does not count as missed."""
-    others = [one.detection.box for one in matches if one.object_index not in (None, index)]
-    return bool(compute_ious([sample.boxes[index]], others).max(initial=0.0) >= MIN_COVERING_IOU)
+def is_occluded(index: int, matches: Sequence[BoxMatch], sample: LabelledImage) -> bool:
+    """Return True if another detected object occludes the object, which then does not count as missed."""
+    others = [match.detection.box for match in matches if match.object_index not in (None, index)]
+    return bool(compute_ious([sample.boxes[index]], others).max(initial=0.0) >= MIN_OCCLUDING_IOU)
 
 
 def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
@@ -80,7 +82,7 @@ def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
 
 def compute_ious(boxes: Sequence[Box], others: Sequence[Box]) -> NDArray[np.float32]:
     """Return the intersection over union of each box and each box of `others`, `(N, M)`."""
-    # The import takes half a second, so only an evaluation makes it.
+    # The import takes half a second; only an evaluation needs the package.
     from supervision import box_iou_batch
 
     return np.asarray(box_iou_batch(np.array(boxes).reshape(-1, 4), np.array(others).reshape(-1, 4)))

@@ -81,8 +81,8 @@ class WorstMistakes:
 
 def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Mistake]:
     """Yield the mistakes in one image, and every correct detection with the position error of its box."""
-    found = tuple(one.detection for one in matches)
-    detected_objects = {one.object_index for one in matches}
+    found = tuple(match.detection for match in matches)
+    detected_objects = {match.object_index for match in matches}
     for index, label in enumerate(sample.labels):
         if index not in detected_objects:
             fraction = sample.get_visible_fraction(index)
@@ -90,18 +90,18 @@ def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterato
             visibility = "" if fraction >= 0.995 else f", {fraction:.0%} visible"
             text = f"{label} missed{visibility}{truncation}"
             yield Mistake(fraction / (2 if truncation else 1), text, sample.boxes[index], sample, found)
-    for one in matches:
-        box, severity = one.detection.box, one.detection.confidence
-        text = f"{one.detection.label} {severity:.2f}"
-        if one.is_correct:
-            offset = float(np.hypot(*one.offset))
-            size = max(one.box[2] - one.box[0], one.box[3] - one.box[1], 1.0)
-            severity, text = min(offset / size, 1.0), f"{one.detection.label} off by {offset:.1f} px"
-        elif one.object_index is None:
+    for match in matches:
+        box, severity = match.detection.box, match.detection.confidence
+        text = f"{match.detection.label} {severity:.2f}"
+        if match.is_correct:
+            offset = float(np.hypot(*match.offset))
+            size = max(match.box[2] - match.box[0], match.box[3] - match.box[1], 1.0)
+            severity, text = min(offset / size, 1.0), f"{match.detection.label} off by {offset:.1f} px"
+        elif match.object_index is None:
             text = f"false detection: {text}"
         else:
-            text = f"{sample.labels[one.object_index]} detected as {text}"
-        left, top, right, bottom = one.box
+            text = f"{sample.labels[match.object_index]} detected as {text}"
+        left, top, right, bottom = match.box
         enclosing_box = min(box[0], left), min(box[1], top), max(box[2], right), max(box[3], bottom)
         yield Mistake(severity, text, enclosing_box, sample, found)
 

@@ -16,7 +16,7 @@ def say(**message: object) -> None:
 
 how = json.loads(sys.argv[1])["how"]
 if how == "unusable":
-    say(unusable="ImportError: no inference_sdk")
+    say(setup_error="ImportError: no inference_sdk")
     sys.exit()
 if how == "never ready":
     threading.Event().wait()

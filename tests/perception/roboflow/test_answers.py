@@ -149,11 +149,11 @@ def test_somebody_elses_words_become_one_short_line():
 
 
 def test_a_sentence_says_what_where_and_what_to_look_at():
-    refused = {"failure": "status", "status": 404, "said": "no such\nmodel"}
+    refused = {"failure": "status", "status": 404, "detail": "no such\nmodel"}
     assert describe_failure(refused, OPTIONS) == (
         f"{HOST} has no model shapes/1 (404: no such model); check model_id and url"
     )
-    unknown = {"failure": "status", "status": 599, "said": ""}
+    unknown = {"failure": "status", "status": 599, "detail": ""}
     assert describe_failure(unknown, OPTIONS) == f"{HOST} gave no answer (599); look at its log"
 
 
@@ -161,16 +161,16 @@ def test_a_sentence_says_what_where_and_what_to_look_at():
     ("failure", "sentence"),
     [
         (
-            {"failure": "status", "status": 404, "said": "no such workflow"},
+            {"failure": "status", "status": 404, "detail": "no such workflow"},
             "has no workflow acme/sorting (404: no such workflow); check workspace and workflow_id and url",
         ),
         (
-            {"failure": "status", "status": 400, "said": ""},
+            {"failure": "status", "status": 400, "detail": ""},
             "could not use the request (400); check workspace and workflow_id and api",
         ),
         (
-            {"failure": "no output", "said": "it has: picture, top"},
-            'ran workflow acme/sorting, which has no output "boxes" (it has: picture, top); '
+            {"failure": "no output", "detail": "its outputs: picture, top"},
+            'ran workflow acme/sorting, which has no output "boxes" (its outputs: picture, top); '
             "check workflow_output",
         ),
     ],

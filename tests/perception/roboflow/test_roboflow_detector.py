@@ -160,7 +160,7 @@ def test_an_output_that_a_workflow_lacks_is_named_with_those_that_it_has(make, s
     assert_unavailable(
         detector,
         f'^{server.url} ran workflow acme/sorting, which has no output "circles" '
-        r"\(it has: picture, boxes\); check workflow_output$",
+        r"\(its outputs: picture, boxes\); check workflow_output$",
     )
 
 

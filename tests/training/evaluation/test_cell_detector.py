@@ -12,7 +12,7 @@ from executive.cell.detection import Answer, Detection
 from executive.errors import Unavailable
 from executive.perception.detectors.views import list_regions
 from executive.training.evaluation import cell_detector
-from executive.training.evaluation.cell_detector import WHOLE_IMAGE, CellDetector
+from executive.training.evaluation.cell_detector import WHOLE_IMAGE_CAMERA, CellDetector
 
 CONFIGS = {"eye": DetectorConfig(kind="embedded", threshold=0.6)}
 FOUND = tuple(Detection(label, 0.9, (1.0, 2.0, 3.0, 4.0)) for label in ("cube", "boat"))
@@ -91,7 +91,7 @@ def test_an_unavailable_detector_says_why_and_one_that_never_answers_is_given_up
 
 
 def test_frames_of_a_camera_are_searched_as_in_a_run_and_other_images_as_a_whole(build, frame):
-    camera = WHOLE_IMAGE.model_copy(update={"table_view": (0, 0, 256, 256)})
+    camera = WHOLE_IMAGE_CAMERA.model_copy(update={"table_view": (0, 0, 256, 256)})
     detector, eye = build(camera=camera, view="table")
     detector.detect(frame)
     assert (eye.camera, eye.views) == (camera, ["table"])

@@ -44,7 +44,7 @@ def main() -> None:
     try:
         infer = _make_inference_function(json.loads(sys.argv[1]))
     except Exception as error:
-        write(unusable=f"{type(error).__name__}: {error}")
+        write(setup_error=f"{type(error).__name__}: {error}")
         # The reading thread holds the lock of the input, which makes a normal exit abort the interpreter.
         os._exit(0)
     logging.getLogger("backoff").addHandler(_RetryHandler(write))
@@ -103,7 +103,7 @@ def _run_workflow(client: InferenceHTTPClient, settings: dict[str, Any], image: 
     images = {settings["workflow_input"]: image}
     (outputs,) = client.run_workflow(settings["workspace"], settings["workflow_id"], images=images)
     if settings["workflow_output"] not in outputs:
-        raise MissingOutput(f"it has: {', '.join(outputs)}")
+        raise MissingOutput(f"its outputs: {', '.join(outputs)}")
     return outputs[settings["workflow_output"]]
 
 
@@ -118,7 +118,7 @@ def _write_answer(infer: Callable[[NDArray[np.uint8]], Any], image: NDArray[np.u
         write(**_describe_error(error))
         return
     if len(text) > MAX_ANSWER_LENGTH:
-        write(failure="garbled", said=f"an answer of {len(text)} characters")
+        write(failure="invalid", detail=f"an answer of {len(text)} characters")
     else:
         write(answer=answer)
 
@@ -132,9 +132,9 @@ def _describe_error(error: Exception) -> dict[str, Any]:
     from inference_sdk.http import errors as sdk
 
     if isinstance(error, sdk.HTTPCallErrorError):
-        return {"failure": "status", "status": error.status_code, "said": str(error.api_message or "")}
+        return {"failure": "status", "status": error.status_code, "detail": str(error.api_message or "")}
     if isinstance(error, MissingOutput):
-        return {"failure": "no output", "said": str(error)}
+        return {"failure": "no output", "detail": str(error)}
     kinds: tuple[tuple[str, tuple[type[BaseException], ...]], ...] = (
         ("no key", (sdk.APIKeyNotProvided,)),
         ("no model", (sdk.InvalidModelIdentifier, sdk.ModelNotInitializedError)),
@@ -142,14 +142,14 @@ def _describe_error(error: Exception) -> dict[str, Any]:
         ("refused", (ConnectionRefusedError,)),
         ("unknown host", (socket.gaierror,)),
         ("tls", (ssl.SSLError,)),
-        ("garbled", (ValueError, LookupError, AttributeError, TypeError, RecursionError)),
+        ("invalid", (ValueError, LookupError, AttributeError, TypeError, RecursionError)),
         ("lost", (OSError, requests.RequestException, sdk.HTTPClientError)),
     )
     for kind, types in kinds:
         found = next((cause for cause in _iterate_causes(error) if isinstance(cause, types)), None)
         if found is not None:
-            return {"failure": kind, "said": f"{type(found).__name__}: {found}"}
-    return {"failure": "other", "said": f"{type(error).__name__}: {error}"}
+            return {"failure": kind, "detail": f"{type(found).__name__}: {found}"}
+    return {"failure": "other", "detail": f"{type(error).__name__}: {error}"}
 
 
 def _iterate_causes(error: BaseException | None) -> Iterator[BaseException]:
@@ -169,9 +169,9 @@ class _RetryHandler(logging.Handler):
         self._write = write
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write the HTTP status that caused a retry: the last argument of `record`; None: no connection."""
+        """Write the HTTP status that caused a retry, the last argument of `record`; None: no connection."""
         last = record.args[-1] if isinstance(record.args, tuple) else None
-        self._write(again=getattr(last, "status_code", None))
+        self._write(retry_status=getattr(last, "status_code", None))
 
 
 if __name__ == "__main__":

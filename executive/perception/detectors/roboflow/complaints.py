@@ -34,21 +34,21 @@ _TEMPLATE_BY_KIND: Mapping[str, tuple[str, str]] = {
     "unknown host": ("is not known by this name", "check url and the network"),
     "tls": ("cannot be trusted (TLS)", "check url, its certificate and the clock"),
     "lost": ("broke off", "look at its log and the network"),
-    "garbled": ("answered with something that inference-sdk cannot read", "is it an inference server?"),
+    "invalid": ("answered with something that inference-sdk cannot read", "is it an inference server?"),
     "other": ("could not be asked", "look at what inference-sdk says"),
 }
 
 
 def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> str:
     """Return the message about a failure that the helper process reports."""
-    said = shorten_to_line(str(failure.get("said", "")))
+    detail = shorten_to_line(str(failure.get("detail", "")))
     status = failure.get("status")
     if status is None:
         event, advice = _fill_in(_TEMPLATE_BY_KIND[failure["failure"]], options)
     else:
         event, advice = _fill_in(_TEMPLATE_BY_STATUS.get(status, _UNKNOWN_STATUS), options)
-        said = f"{status}: {said}" if said else str(status)
-    return f"{options.host} {event}{f' ({said})' if said else ''}; {advice}"
+        detail = f"{status}: {detail}" if detail else str(status)
+    return f"{options.host} {event}{f' ({detail})' if detail else ''}; {advice}"
 
 
 def describe_delay(retry_causes: Sequence[int | None], options: RoboflowOptions) -> str:

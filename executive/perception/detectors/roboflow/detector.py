@@ -31,7 +31,7 @@ from executive.perception.detectors.views import Region, remove_duplicates, sear
 
 
 class RoboflowDetector(ThreadedDetector):
-    """Searches frames with a hosted or self-hosted server; implements `executive.cell.protocols.Detector`.
+    """Sends frames to a hosted or self-hosted inference server; implements the protocol `Detector`.
 
     Args:
         config: Section of the detector in the cell file.

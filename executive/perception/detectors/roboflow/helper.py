@@ -84,15 +84,15 @@ class InferenceProcess:
             message = self._exchange(b"", self._startup_deadline)
         except TimeoutError:
             raise Unavailable(f"its helper process was not ready within {STARTUP_TIMEOUT:.0f} s") from None
-        if "unusable" in message:
+        if "setup_error" in message:
             self._end()
             raise Unavailable(
-                f"inference-sdk cannot be used: {message['unusable']}; `executive doctor` checks packages"
+                f"inference-sdk cannot be used: {message['setup_error']}; `executive doctor` checks packages"
             )
         self._is_ready = True
 
     def request(self, image: NDArray[np.uint8], deadline: float) -> Mapping[str, Any]:
-        """Send an image to the ready process; return its `answer`, or `failure` with the message `said`.
+        """Send an image to the ready process; return its `answer`, or `failure` with the message `detail`.
 
         Args:
             image: `(H, W, 3)` RGB.
@@ -111,9 +111,9 @@ class InferenceProcess:
                 message = self._exchange(data, deadline)
             except TimeoutError:
                 raise NoAnswer(retry_causes) from None
-            if "again" not in message:
+            if "retry_status" not in message:
                 return message
-            retry_causes.append(message["again"])
+            retry_causes.append(message["retry_status"])
             data = b""
 
     def stop(self) -> None:
@@ -159,7 +159,7 @@ class InferenceProcess:
             message: Mapping[str, Any] = json.loads(self._key.redact(line.decode()))
         except RecursionError:
             # The process could parse this answer, because its call stack was shallower.
-            return {"failure": "garbled", "said": "it is nested too deeply"}
+            return {"failure": "invalid", "detail": "it is nested too deeply"}
         return message
 
     def _raise_exit(self, process: subprocess.Popen[bytes]) -> None:
