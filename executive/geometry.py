@@ -36,7 +36,7 @@ class Pose:
 
     @staticmethod
     def of(position: ArrayLike, quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Pose:
-        """Return the pose with a position `(3,)` [m] and a quaternion `(x, y, z, w)`, which is normalized."""
+        """Return the pose with a position `(3,)` [m] and the normalized quaternion `(x, y, z, w)`."""
         return Pose(rotation_from_quaternion(quaternion), np.asarray(position, dtype=float))
 
     def __matmul__(self, other: Pose) -> Pose:
@@ -69,7 +69,7 @@ class Pose:
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Return the rotation matrix `(3, 3)` of a quaternion `(x, y, z, w)`, which is normalized."""
+    """Normalize a quaternion `(x, y, z, w)`, and return its rotation matrix `(3, 3)`."""
     x, y, z, w = np.asarray(quaternion, dtype=float) / np.linalg.norm(np.asarray(quaternion, dtype=float))
     return np.array(
         [

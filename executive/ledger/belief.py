@@ -13,21 +13,21 @@ from dataclasses import dataclass, field
 from executive.cell.detection import Detections
 from executive.cell.error_rates import ErrorRates
 
-VIEWPOINT_PITCH = 0.02
-"""Pitch of the grid to which camera positions are rounded [m]; equal rounded positions are one viewpoint."""
+VIEWPOINT_GRID_SPACING = 0.02
+"""Spacing of the grid to which camera positions are rounded [m]; equal grid points are one viewpoint."""
 ITEM_AREA_FRACTION = 0.02
 """Probability that a false detection is assigned to a given item: its area as a fraction of the image."""
 MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM = math.log(0.1)
-"""Maximum log odds of existence of a new item whose detection may show a known item with a position error."""
+"""Maximum log odds of existence of a new item that may be a known item, detected at a wrong position."""
 LOG_ODDS_OF_PROOF = math.log(1e4)
-"""Log odds of existence from which an item certainly exists: two looks of a good detector agree."""
+"""Minimum log odds of existence of a proved item; two agreeing looks of a good detector reach them."""
 MIN_LOG_ODDS = -100.0
-"""Minimum of log odds before their conversion to a probability, which would overflow."""
+"""Lower log odds are raised to this value before their conversion to a probability, which would overflow."""
 
 
 def make_viewpoint_key(look: Detections) -> str:
-    """Return a text for detector and camera position of a look; looks with equal texts may repeat errors."""
-    x, y, z = (round(float(value) / VIEWPOINT_PITCH) for value in look.frame.X_WC.position)
+    """Return a key of the detector and camera position of a look; looks with equal keys may repeat errors."""
+    x, y, z = (round(float(value) / VIEWPOINT_GRID_SPACING) for value in look.frame.X_WC.position)
     return f"{look.detector} {x} {y} {z}"
 
 
@@ -51,7 +51,7 @@ class Belief:
         is_proved: True if the item certainly exists: enough looks agree, or the tool has touched the item.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
         uncertain_look_count: Number of looks with a low-confidence detection since the last confident one.
-        last_label_by_viewpoint: Last detected class from each viewpoint, since the last possible move.
+        last_label_by_viewpoint: Last detected class by viewpoint, since the item may last have been moved.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, up to a common constant.
         label_counts: Number of looks by detected class.

@@ -109,7 +109,7 @@ def discard_rejected_items(records: Iterable[Record]) -> list[Record]:
 
 
 def count_states(records: Iterable[Record]) -> dict[str, int]:
-    """Return the counts `seen` (no phantoms), `placed`, `rejected`, `skipped`, `lost` and `phantom`."""
+    """Return item counts: `seen` (no phantoms), `placed`, `rejected`, `skipped`, `lost` and `phantom`."""
     counts = Counter(record.state for record in records)
     return {
         "seen": sum(counts.values()) - counts[State.PHANTOM],

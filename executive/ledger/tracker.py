@@ -49,7 +49,7 @@ class Tracker:
 
     Attributes:
         unknown: Largest number of boxes in one look for each label that is not in the cell file.
-        doubts: Reasons why error rates of detectors are assumed and not measured, one text for each kind.
+        doubts: Reasons why error rates of detectors are assumed and not measured, one for each kind.
     """
 
     def __init__(
@@ -83,10 +83,10 @@ class Tracker:
         return self._staleness.change_count
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
-        """Update all items with one search of a frame, and return the targets."""
+        """Update all items with the detections in one frame, and return the targets."""
         frame = detections.frame
         self.unknown |= Counter(detection.label for detection in detections.unknown)
-        # The numbers after the colon of a doubt differ between frames, so only one text per kind is kept.
+        # The numbers after the colon of a message differ between frames, so one message per kind is kept.
         kind = detections.error_rates.doubt.partition(":")[0]
         if kind and not any(doubt.startswith(kind) for doubt in self.doubts):
             self.doubts.append(detections.error_rates.doubt)
@@ -130,7 +130,7 @@ class Tracker:
         return next((record.item for record in self.records if record.state is State.HELD), None)
 
     def is_current(self, frame: Frame) -> bool:
-        """Return True if no change after the capture of a frame may have moved all objects."""
+        """Return True if no change after the capture of a frame may have moved objects on the whole table."""
         return self._staleness.is_table_unchanged(frame.epoch)
 
     def is_fresh(self, target: Target) -> bool:
@@ -175,7 +175,7 @@ class Tracker:
         """Record a touch, which proves that an item exists; return False if the touch contradicts its class.
 
         After a touch at the height of the class, no other height contradicts the class, because the item may
-        have fallen over.
+        have fallen over. If `may_miss_top` is True, the tool may have touched the item below its top.
         """
         record = self._records.find(item)
         record.belief.is_proved, record.had_contact, record.empty_probe_count = True, True, 0
@@ -191,7 +191,10 @@ class Tracker:
         return True
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
-        """Record a failed attempt to pick an item, which may have moved any object."""
+        """Record a failed attempt to pick an item, which may have moved any object.
+
+        `found_table` is True if the tool descended almost to the table at the item without a contact.
+        """
         record = self._records.find(item)
         record.attempt_count += 1
         record.empty_probe_count += found_table
@@ -296,7 +299,7 @@ class Tracker:
             self._records.emit_item(record)
 
     def count_states(self) -> dict[str, int]:
-        """Return the counts `seen` (no phantoms), `placed`, `rejected`, `skipped`, `lost` and `phantom`."""
+        """Return item counts: `seen` (no phantoms), `placed`, `rejected`, `skipped`, `lost` and `phantom`."""
         return count_states(self.records)
 
     def summaries(self) -> Sequence[ItemChanged]:
@@ -306,11 +309,9 @@ class Tracker:
     def _update(self, detections: Detections, observations: Sequence[Observation]) -> None:
         """Update the items on the table and the dropped items with the observations of a look."""
         bias_std = detections.error_rates.bias
-        bin_by_observation = {
-            seen: self._bins.find_bin(seen, bias_std, self.records) for seen in observations
-        }
+        bin_by_observation = {key: self._bins.find_bin(key, bias_std, self.records) for key in observations}
         update = LookUpdate(self._config, self._records, self._coverage, self._staleness, detections)
-        for record in update.apply([seen for seen, bin in bin_by_observation.items() if bin is None]):
+        for record in update.apply([key for key, bin in bin_by_observation.items() if bin is None]):
             self._certainty.reject_if_uncertain(record, is_settled=self._staleness.is_settled(record))
             self._records.emit_item(record)
         if detections.view == "full" and self._recovery is not None:

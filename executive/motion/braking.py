@@ -60,10 +60,10 @@ def plan_braking(trajectory: Trajectory, s: float, limits: JointLimits, period: 
 def _list_profiles(trajectory: Trajectory, s: float, period: float) -> Iterator[_BrakingProfile]:
     """Yield braking profiles from path time `s` [s], the shortest first."""
     remaining = max(0.0, trajectory.duration - s)
-    continues_to_end = remaining <= MAX_BRAKING_TIME
+    is_completion_pending = remaining <= MAX_BRAKING_TIME
     for duration in _BRAKING_TIMES:
-        if continues_to_end and remaining <= duration:
-            continues_to_end = False
+        if is_completion_pending and remaining <= duration:
+            is_completion_pending = False
             count = max(1, math.ceil(remaining / period - 1e-9))
             times = np.minimum(s + period * np.arange(1, count + 1), s + remaining)
             yield _BrakingProfile(times, np.ones(count), np.zeros(count))

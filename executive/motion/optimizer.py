@@ -1,8 +1,8 @@
 """Trajectory optimization: the fastest motion between two states that avoids all obstacles.
 
 Sequential quadratic programming: each step linearizes the distances of the current motion from the obstacles,
-and solves for the fastest motion nearby. The initial motion approximates a slow motion without collision that
-stops at corners above the obstacles, and determines on which side the result passes each obstacle.
+and solves for the fastest motion nearby. The initial motion approximates a slow collision-free motion that
+stops at corners above the obstacles. It determines on which side the result passes each obstacle.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ INITIAL_DURATION_FRACTION = 0.8
 """Duration of the initial motion as a fraction of the duration of the motion that stops at corners."""
 LIMIT_MARGIN = 0.01
 """Minimum distance from the position limits of the joints [rad]."""
-_JOINT_DIFFERENCE = 1e-4  # [rad]
+_FINITE_DIFFERENCE_STEP = 1e-4  # [rad]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class OptimizationProblem:
         connector: Connects states within the joint limits.
         kinematics: Kinematics of the arm.
         clearance: Distances from the obstacles.
-        discs: Tool and load.
+        discs: Discs that enclose the tool and the load.
         payload: Acceleration limit due to the load, or None.
     """
 
@@ -65,22 +65,22 @@ class OptimizationProblem:
     def compute_slack(self, qs: Array) -> Array:
         """Return the slack `(N,)` of joint positions `(N, n)` [rad]; it is negative if a limit is violated.
 
-        The slack is the minimum of the distances beyond the required distances [m] and of the distances of
-        the joints from their range limits [rad].
+        The slack is the smallest of these margins: each clearance minus the required clearance [m], and the
+        distance of each joint from its range limits [rad].
         """
         tips, axes = self.kinematics.compute_tips_and_axes(qs)
         distance_slack = self.clearance.compute_slack(tips, axes, self.discs)
         return np.minimum(distance_slack, self._compute_range_slack(qs).min(axis=1))
 
     def compute_gradients(self, qs: Array, slack: Array) -> Array:
-        """Return the derivatives `(N, n)` [m/rad] of the slack `(N,)` by joint positions `(N, n)` [rad]."""
+        """Return the gradients `(N, n)` [m/rad] of the slack `(N,)` at joint positions `(N, n)` [rad]."""
         tips, axes = self.kinematics.compute_tips_and_axes(qs)
         count = qs.shape[1]
-        displaced_qs = (qs[:, None] + _JOINT_DIFFERENCE * np.eye(count)).reshape(-1, count)
+        displaced_qs = (qs[:, None] + _FINITE_DIFFERENCE_STEP * np.eye(count)).reshape(-1, count)
         displaced = self.kinematics.compute_tips_and_axes(displaced_qs)
         new_tips, new_axes = (values.reshape(-1, count, 3) for values in displaced)
         changes = self.clearance.compute_slack_changes(tips, axes, self.discs, (new_tips, new_axes))
-        gradients = changes / _JOINT_DIFFERENCE
+        gradients = changes / _FINITE_DIFFERENCE_STEP
         range_slack = self._compute_range_slack(qs)
         row, joint = np.arange(len(qs)), np.argmin(range_slack, axis=1)
         is_range_nearer = range_slack[row, joint] <= slack
@@ -118,7 +118,7 @@ class Optimizer:
             raise NoProfile("no motion inside the joint limits approximates the motion that stops at corners")
         self._best, self.cost, self._trust_radius = motion, np.inf, INITIAL_TRUST_RADIUS
         self._payload_constraints: list[LinearizedConstraints] = []
-        self._evaluate(motion)
+        self._set_last_motion(motion)
 
     def improve(self, max_step_count: int) -> None:
         """Take up to `max_step_count` optimization steps."""
@@ -132,9 +132,9 @@ class Optimizer:
             if motion is None:
                 return
             self._trust_radius *= TRUST_RADIUS_FACTOR
-            self._evaluate(motion)
+            self._set_last_motion(motion)
 
-    def _evaluate(self, motion: DiscreteMotion) -> None:
+    def _set_last_motion(self, motion: DiscreteMotion) -> None:
         """Make `motion` the last motion, and also the best motion if its cost is the lowest."""
         self._last, self._slack = motion, self._problem.compute_slack(motion.qs)
         violations = [-float(self._slack.min())]
@@ -151,8 +151,8 @@ class Optimizer:
         """Return the best motion as point-to-point motions between its states.
 
         Args:
-            is_exact: True to connect the states at all half steps in the times of the best motion; False to
-                connect the states at all steps as fast as possible, on a slightly different path.
+            is_exact: True: connect the states at all half steps, with the timing of the best motion. False:
+                connect the states at all steps in minimum time; the path differs slightly.
 
         Raises:
             NoProfile: No motion connects two of the states.
@@ -166,7 +166,7 @@ class Optimizer:
 
 
 def _limit_velocity(state: JointState, limits: JointLimits) -> JointState:
-    """Return the state with a velocity that lets a motion pass the state within the velocity limits.
+    """Return the state with its velocity clipped, so that a motion can pass it within the velocity limits.
 
     While an acceleration `a` falls to 0 with the maximum jerk `j`, it changes the velocity by `a² / 2 j`.
     """

@@ -20,7 +20,7 @@ DISTANCE_PER_ACCELERATION = 0.02
 SAMPLE_STRIDE = 4
 """Interval between the samples at which the constraints are evaluated; a divisor of `SAMPLES_PER_STEP`."""
 _SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])
-_JOINT_DIFFERENCE = 1e-4  # [rad]
+_FINITE_DIFFERENCE_STEP = 1e-4  # [rad]
 MIN_LIFT_ACCELERATION = 0.5
 """Lower limit of the maximum acceleration of a lift, even if the seal withstands less [m/s²]."""
 MIN_ACCELERATION_FRACTION = 0.2
@@ -81,10 +81,10 @@ class PayloadLimit:
         slack = DISTANCE_PER_ACCELERATION * (self._max_pull - magnitude)
         chosen = np.nonzero(slack < max_slack)[0]
         rows, direction = rows[chosen], pull[chosen] / magnitude[chosen, None]
-        displaced_qs = qs[rows][:, :, None] + _JOINT_DIFFERENCE * np.eye(qs.shape[1])
+        displaced_qs = qs[rows][:, :, None] + _FINITE_DIFFERENCE_STEP * np.eye(qs.shape[1])
         displaced_centres = self._locate_load(displaced_qs.reshape(-1, qs.shape[1]))
         displaced_centres = displaced_centres.reshape(*displaced_qs.shape[:3], 3)
-        jacobian = (displaced_centres - centres[rows][:, :, None]) / _JOINT_DIFFERENCE
+        jacobian = (displaced_centres - centres[rows][:, :, None]) / _FINITE_DIFFERENCE_STEP
         projected = np.einsum("k,rkjx,rx->rkj", _SECOND_DIFFERENCE, jacobian, direction)
         gradients = -DISTANCE_PER_ACCELERATION / sample_time**2 * projected
         # If the same positions take more time, accelerations fall with the square of the time.
