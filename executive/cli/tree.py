@@ -47,7 +47,7 @@ def command(
     with keep_stdout_clean():
         from pydantic_core import to_json
 
-        from executive.view.tree.dot import draw_dot
+        from executive.view.tree.dot import format_dot
         from executive.view.tree.svg import draw_svg
         from executive.view.tree.tree_text import draw_outline, fold_subtrees
 
@@ -56,7 +56,7 @@ def command(
         if as_svg:
             shown = draw_svg(nodes, name)
         elif as_dot:
-            shown = draw_dot(nodes, name)
+            shown = format_dot(nodes, name)
         elif as_json:
             shown = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
         else:

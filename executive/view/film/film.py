@@ -13,7 +13,7 @@ from executive.cells.sim.pictures import PictureSource, count_steps, render_pict
 from executive.cells.sim.viewpoint import compute_viewpoint
 from executive.view.film.film_source import FilmSource
 from executive.view.film.formats import FilmFormat
-from executive.view.film.page import SCENE_SIZE, draw_page, draw_result
+from executive.view.film.page import SCENE_SIZE, draw_frame, draw_result
 from executive.view.film.run_state import FilmRunState
 
 CELL_BOX = (24, 76, 776, 644)
@@ -42,13 +42,13 @@ def write_film(
     steps = select_steps(count_steps(source.directory.world_log), steps_per_frame)
     end_frame_count = round(END_DURATION * format.frame_rate)
 
-    def report_frames() -> Generator[Image.Image, None, None]:
+    def iterate_with_progress() -> Generator[Image.Image, None, None]:
         for done, frame in enumerate(frames, start=1):
             progress(done, len(steps) + end_frame_count)
             yield frame
 
     with closing(_draw_frames(source, steps, end_frame_count, speed, workers)) as frames:
-        format.write(file, report_frames(), format.frame_rate)
+        format.write(file, iterate_with_progress(), format.frame_rate)
     return len(steps) + end_frame_count
 
 
@@ -72,9 +72,8 @@ def _draw_frames(
     with closing(render_pictures(picture_source, steps, workers)) as pictures:
         for step, picture in zip(steps, pictures, strict=True):
             state.advance_to(step, step * start.step)
-            yield draw_page(source, picture, state, subtitle, duration)
+            yield draw_frame(source, picture, state, subtitle, duration)
     last_frame = draw_result(
-        draw_page(source, picture, state, subtitle, duration, has_caption=False), source.result
+        draw_frame(source, picture, state, subtitle, duration, has_caption=False), source.result
     )
-    for _ in range(end_frame_count):
-        yield last_frame
+    yield from [last_frame] * end_frame_count

@@ -35,7 +35,7 @@ _STATUS_SIZE, _RESULT_SIZE, _RESULT_LINE, _RESULT_PADDING = 40, 18, 26, 24
 _STATUS_COLOURS = {"SUCCESS": SUCCESS, "INCOMPLETE": FAILURE, "FAILURE": FAILURE, "FAULT": FAILURE}
 
 
-def draw_page(
+def draw_frame(
     source: FilmSource, picture: NDArray[np.uint8], state: FilmRunState, subtitle: str, duration: float,
     *, has_caption: bool = True,
 ) -> Image.Image:  # fmt: skip

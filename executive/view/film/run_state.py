@@ -19,9 +19,9 @@ class FilmRunState:
     """State of a run at a control step, computed from the events up to that step.
 
     Args:
-        events: Events of the run in order, without those that a later resumption voided.
+        events: Events of the run in order, without those that were discarded when the run was resumed.
         nodes: Nodes of the tree.
-        pictures: Files of the images on which decisions are based; their names start with the control step.
+        image_files: Image files on which decisions are based; their names start with the control step.
 
     Attributes:
         timeline: Timeline of the events up to the control step.
@@ -30,19 +30,19 @@ class FilmRunState:
     """
 
     def __init__(
-        self, events: Sequence[TimedEvent], nodes: Sequence[OutlineNode], pictures: Sequence[Path]
+        self, events: Sequence[TimedEvent], nodes: Sequence[OutlineNode], image_files: Sequence[Path]
     ) -> None:
         self.timeline = Timeline(keeps_history=False)
         self.picture_file: Path | None = None
         self.time = 0.0
         self._events = list(events)[::-1]
-        self._pictures = sorted(pictures, reverse=True)
+        self._image_files = sorted(image_files, reverse=True)
         self._skill_names_by_path = find_skill_names(nodes)
         self._failure: tuple[float, str] = (-FAILURE_DISPLAY_TIME, "")
 
     @property
     def active_paths(self) -> frozenset[str]:
-        """Paths of the running nodes; after the end of the tree, of the nodes with its end and status."""
+        """Paths of the running nodes; after its end, paths of the nodes that ended with the tree."""
         timeline = self.timeline
         if running := timeline.find_running():
             return frozenset(activation.node for activation in running)
@@ -73,12 +73,12 @@ class FilmRunState:
         """Add the events up to a control step, which began at `time` on the clock of the run [s]."""
         self.time = time
         while self._events and self._events[-1].tick <= step:
-            timed = self._events.pop()
-            self.timeline(timed)
-            if failure := _describe_failure(timed):
-                self._failure = (timed.clock, failure)
-        while self._pictures and int(self._pictures[-1].stem.partition("_")[0]) <= step:
-            self.picture_file = self._pictures.pop()
+            timed_event = self._events.pop()
+            self.timeline(timed_event)
+            if failure := _describe_failure(timed_event):
+                self._failure = (timed_event.clock, failure)
+        while self._image_files and int(self._image_files[-1].stem.partition("_")[0]) <= step:
+            self.picture_file = self._image_files.pop()
 
 
 def _get_end(activation: Activation | None) -> tuple[int, str]:
@@ -86,9 +86,9 @@ def _get_end(activation: Activation | None) -> tuple[int, str]:
     return (0, "") if activation is None else (activation.end_tick, activation.status)
 
 
-def _describe_failure(timed: TimedEvent) -> str:
+def _describe_failure(timed_event: TimedEvent) -> str:
     """Return a text about the failure of a skill with an item, a halt, a fault or a resumption; else ""."""
-    match timed.event:
+    match timed_event.event:
         case NodeEnded(status="FAILURE", skill=skill, item=item) as ended if skill and item:
             return f"{to_skill_name(ended.node)}.{ended.reason}: {ended.message}"
         case RunHalted():

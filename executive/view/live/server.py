@@ -34,7 +34,7 @@ SECURITY_HEADERS = {
 SHUTDOWN_TIMEOUT = 0.5
 """Maximum time to wait until the browsers have received the last message [s]."""
 COMMANDS = ("pause", "resume", "step", "stop", "render_on_cpu")
-"""Commands of a browser without a text."""
+"""Commands of a browser that contain no text."""
 MAX_MESSAGE_SIZE = 4096
 """Maximum size of a message of a browser [bytes]."""
 _FILES = {
@@ -48,12 +48,12 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Serves requests that contain the token and do not come from other pages.
+    """Serves same-origin requests that contain the token.
 
     Args:
         page_state: State of the page.
         scene_proxy: Proxy to the server of the scene.
-        send_command: Callback that receives the commands of watchers, and the number of watchers.
+        send_command: Callback that receives the commands of clients, and the number of clients.
         token: First part of the path of every request.
         port: Port of the server.
     """
@@ -67,10 +67,10 @@ class Server:
         self._token = token
         # The name `localhost` could lead to another server, at [::1].
         self._host = f"127.0.0.1:{port}"
-        # Socket of each watcher, with True if the browser renders on the CPU.
-        self._watchers: dict[web.WebSocketResponse, bool] = {}
+        # Socket of each client, with True if the browser renders on the CPU.
+        self._clients: dict[web.WebSocketResponse, bool] = {}
         self.app = web.Application(middlewares=[self._check_access])
-        self.app.router.add_get("/{token}/live", self._serve_watcher)
+        self.app.router.add_get("/{token}/live", self._serve_client)
         self.app.router.add_get("/{token}/scene", scene_proxy.forward_messages)
         self.app.router.add_get("/{token}/scene/{file:.*}", scene_proxy.forward_file)
         self.app.router.add_get("/{token}/{file:.*}", self._serve_file)
@@ -78,7 +78,7 @@ class Server:
     @web.middleware
     async def _check_access(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Refuse a request without the token or from another page; called before every handler."""
-        if problem := find_refusal(request, self._token, self._host):
+        if problem := find_access_error(request, self._token, self._host):
             raise web.HTTPForbidden(text=f"{problem}\n", headers=SECURITY_HEADERS)
         response = await handler(request)
         if not response.prepared:
@@ -87,13 +87,13 @@ class Server:
         return response
 
     async def send_changes(self) -> None:
-        """Send the changes of the page since the last call to all watchers."""
+        """Send the changes of the page since the last call to all clients."""
         changes = self._page_state.take_changes()
-        if changes and self._watchers:
+        if changes and self._clients:
             text = json.dumps(changes)
-            for watcher in list(self._watchers):
+            for client in list(self._clients):
                 with contextlib.suppress(ConnectionError):
-                    await watcher.send_str(text)
+                    await client.send_str(text)
 
     async def send_periodically(self) -> None:
         """Send the changes of the page once per `MESSAGE_PERIOD`, until the task is cancelled."""
@@ -104,7 +104,7 @@ class Server:
     async def end(self) -> None:
         """Send the last changes, and close all connections."""
         await self.send_changes()
-        closing = [asyncio.create_task(watcher.close()) for watcher in self._watchers]
+        closing = [asyncio.create_task(client.close()) for client in self._clients]
         if closing:
             await asyncio.wait(closing, timeout=SHUTDOWN_TIMEOUT)
 
@@ -117,35 +117,35 @@ class Server:
         headers = {"Content-Security-Policy": CONTENT_POLICY}
         return web.Response(text=text, content_type=content_type, headers=headers)
 
-    async def _serve_watcher(self, request: web.Request) -> web.WebSocketResponse:
-        """Send the state of the page to a watcher, register it for changes, and receive its commands."""
+    async def _serve_client(self, request: web.Request) -> web.WebSocketResponse:
+        """Send the state of the page to a client, register it for changes, and receive its commands."""
         socket = web.WebSocketResponse(max_msg_size=MAX_MESSAGE_SIZE, heartbeat=10)
         await socket.prepare(request)
         await socket.send_str(json.dumps(self._page_state.values))
-        self._watchers[socket] = False
-        self._report_watchers()
+        self._clients[socket] = False
+        self._report_clients()
         try:
             async for message in socket:
                 command = parse_command(message.data) if message.type is WSMsgType.TEXT else None
                 if command is not None and command.name == "render_on_cpu":
-                    self._watchers[socket] = True
-                    self._report_watchers()
+                    self._clients[socket] = True
+                    self._report_clients()
                 elif command is not None:
                     self._send_command(command)
         finally:
-            del self._watchers[socket]
-            self._report_watchers()
+            del self._clients[socket]
+            self._report_clients()
         return socket
 
-    def _report_watchers(self) -> None:
-        """Report the number of watchers to the run, and whether a browser renders on the CPU."""
-        is_cpu_rendering = any(self._watchers.values())
-        self._send_command(PageCommand("watchers", "", len(self._watchers), is_cpu_rendering))
+    def _report_clients(self) -> None:
+        """Report the number of clients to the run, and whether a browser renders on the CPU."""
+        is_cpu_rendering = any(self._clients.values())
+        self._send_command(PageCommand("watchers", "", len(self._clients), is_cpu_rendering))
 
 
-def find_refusal(request: web.Request, token: str, host: str) -> str:
+def find_access_error(request: web.Request, token: str, host: str) -> str:
     """Return an error message for a request without this token and host, or from another page; else ""."""
-    # Another site may point its own host name to this machine, so host names are not accepted.
+    # Host names are refused, to prevent DNS rebinding.
     if request.headers.get("Host") != host:
         return "the page must be opened by the address of this machine"
     given_token, _, _ = request.path.removeprefix("/").partition("/")

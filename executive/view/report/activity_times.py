@@ -1,4 +1,4 @@
-"""Time of a run by object and activity: every instant belongs to one object and one activity."""
+"""Time of a run by item and activity: every instant belongs to one item or none, and to one activity."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 
 LOOK = "look"
-"""Activity: search for the next object with an empty tool."""
+"""Activity: search for the next item with an empty tool."""
 RETRY = "retry"
 """Activity: failed attempts, and the looks before the next attempt."""
 WAITING = "waiting"
@@ -23,16 +23,16 @@ Interval = tuple[float, float, list[Activation]]
 """Start and end of an interval [s], and the skills that run in it, in the order of their starts."""
 
 NO_OBJECT = ""
-"""Name under which time is counted that belongs to no object, such as the last look at an empty table."""
+"""Key of the time that belongs to no item, such as the time of the last look at an empty table."""
 
 
 @dataclass(frozen=True)
 class ActivityTimes:
-    """Time of a run by object and activity [s].
+    """Time of a run by item and activity [s].
 
     Attributes:
         activities: Activities that took time: look, skills in the order of their first use, retry, waiting.
-        times_by_item: Time by object, then by activity; `NO_OBJECT` is last. The sum of all times is the
+        times_by_item: Time by item, then by activity; `NO_OBJECT` is last. The sum of all times is the
             duration of the run.
     """
 
@@ -41,9 +41,9 @@ class ActivityTimes:
 
 
 def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> ActivityTimes:
-    """Return the time by object and activity, from the start of a run to the last event of its timeline.
+    """Return the time by item and activity, from the start of a run to the last event of its timeline.
 
-    Time of concurrent skills belongs to the skill with an object that started first.
+    If several skills run, the time belongs to the first started skill among those with an item.
 
     Args:
         timeline: Timeline of the run, with its history.
@@ -51,16 +51,16 @@ def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> 
     """
     skills = {node.path: node for node in nodes if node.kind == "skill"}
     activations = [activation for activation in timeline.activations if activation.node in skills]
-    decisions = timeline.selections
+    selections = timeline.selections
     times: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     skill_activities: dict[str, None] = {}
-    retries = _find_retries(activations, skills, decisions)
+    retries = _find_retries(activations, skills, selections)
     for start, end, running in _split_time(activations, timeline.clock):
         main = next((activation for activation in running if activation.item), None)
         if main is not None:
             item, activity = main.item, skills[main.node].skill.lower()
         else:
-            item, activity = _find_next_item(decisions, end), _classify_pause(running, skills)
+            item, activity = _find_next_item(selections, end), _classify_pause(running, skills)
         retry_start, retry_end = retries.get(item, (0.0, 0.0))
         if retry_start <= start and end <= retry_end:
             activity = RETRY
@@ -89,23 +89,23 @@ def _split_time(activations: Sequence[Activation], end_time: float) -> Iterator[
 
 
 def _classify_pause(running: Sequence[Activation], skills: Mapping[str, OutlineNode]) -> str:
-    """Return the activity, LOOK or WAITING, of an interval whose running skills have no object."""
+    """Return the activity, LOOK or WAITING, of an interval whose running skills have no item."""
     nodes = [skills[activation.node] for activation in running]
     return LOOK if any(node.senses or "arm" in node.uses for node in nodes) else WAITING
 
 
-def _find_next_item(decisions: Sequence[tuple[float, str]], time: float) -> str:
-    """Return the object of the first decision at or after a time [s], or `NO_OBJECT`."""
-    index = bisect_left(decisions, (time, ""))
-    return decisions[index][1] if index < len(decisions) else NO_OBJECT
+def _find_next_item(selections: Sequence[tuple[float, str]], time: float) -> str:
+    """Return the item of the first selection at or after a time [s], or `NO_OBJECT`."""
+    index = bisect_left(selections, (time, ""))
+    return selections[index][1] if index < len(selections) else NO_OBJECT
 
 
 def _find_retries(
     activations: Sequence[Activation],
     skills: Mapping[str, OutlineNode],
-    decisions: Sequence[tuple[float, str]],
+    selections: Sequence[tuple[float, str]],
 ) -> dict[str, tuple[float, float]]:
-    """Return, for each object with a failed attempt, the start and the end of its failed attempts [s]."""
+    """Return, for each item with a failed attempt, the start and the end of its failed attempts [s]."""
     last_failures = {
         activation.item: activation.end
         for activation in activations
@@ -114,8 +114,8 @@ def _find_retries(
     }
     retries = {}
     for item, last_failure in last_failures.items():
-        decision_times = [time for time, name in decisions if name == item]
-        start = min(decision_times, default=min(each.start for each in activations if each.item == item))
+        selection_times = [time for time, name in selections if name == item]
+        start = min(selection_times, default=min(each.start for each in activations if each.item == item))
         # Looks before the next attempt count as part of the failed attempt.
-        retries[item] = start, next((time for time in decision_times if time > last_failure), last_failure)
+        retries[item] = start, next((time for time in selection_times if time > last_failure), last_failure)
     return retries

@@ -35,7 +35,7 @@ class ReportFacts:
         nodes: Nodes of the tree.
         timeline: Timeline of the run.
         objects: Last change of each item that is not a phantom.
-        activity_times: Time of the run by object and activity.
+        activity_times: Time of the run by item and activity.
         pictures: Pictures of decisions and failures.
         requests: Requests of the operator, in order.
         repeat_command: Command that repeats the run.

@@ -76,7 +76,7 @@ def render_report(facts: ReportFacts) -> str:
         unknown=describe_unknown({} if result is None else result.unknown),
         story=story,
         story_facts=[] if story is None else list(diagnosis_text.list_facts(story)),
-        last_picture=next((one for one in facts.pictures if story and one.file == story.picture), None),
+        last_picture=next((each for each in facts.pictures if story and each.file == story.picture), None),
         titles={node.path: node.title for node in facts.nodes},
         describe_place=describe_place_on_table,
         colours=_choose_colours(facts.activity_times.activities),
@@ -84,7 +84,7 @@ def render_report(facts: ReportFacts) -> str:
         tree=Markup(draw_svg(facts.nodes, facts.start.mission, _make_notes(facts))),
         lanes=Markup(draw_lanes(timeline, facts.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
-        other_pictures=[one for one in facts.pictures if one.reason and one.item not in item_names],
+        other_pictures=[each for each in facts.pictures if each.reason and each.item not in item_names],
     )
 
 

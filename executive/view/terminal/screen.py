@@ -85,8 +85,8 @@ class TerminalView:
         with self._lock:
             page = Table.grid(padding=(0, 4))
             page.add_row(self._render_tree(), self._render_items())
-            started = self.timeline.started
-            title = "" if started is None else f"{started.mission}  seed {started.seed}"
+            start_event = self.timeline.started
+            title = "" if start_event is None else f"{start_event.mission}  seed {start_event.seed}"
             header = Text(f"{title}  {self.timeline.clock:.1f} s", style="bold")
             if self._key_reader is not None:
                 paused = self._control is not None and self._control.is_paused

@@ -39,7 +39,7 @@ def format_repeat_command(
 
 
 def describe_end(status: str, reason: str, node: str, message: str) -> str:
-    """Return the end of a run in one line: status, reason, path of the node, and message; "" for none."""
+    """Return status, reason, path of the node, and message in one line; empty arguments are omitted."""
     # The reason of a fault or a halt is not written, because it repeats the status.
     reason_text = f" {reason}" if reason and reason.upper() != status else ""
     node_text = f" at {node}" if node else ""
@@ -60,18 +60,18 @@ def format_summary(
         repeat_command: The command that repeats the run.
         report: File of the report, or "".
     """
-    robot_time, wall_time = result.robot_time_s, result.wall_time_s
-    times = f"{robot_time:.1f} s on the robot's clock, {wall_time:.1f} s by the wall clock"
-    ends = [f"  {end}: {', '.join(names)}" for end, names in sorted(group_items_by_end(items).items())]
+    times = f"{result.robot_time_s:.1f} s on the robot's clock, {result.wall_time_s:.1f} s by the wall clock"
+    groups = sorted(group_items_by_outcome(items).items())
+    outcomes = [f"  {outcome}: {', '.join(names)}" for outcome, names in groups]
     if unknown := describe_unknown(result.unknown):
-        ends.append(f"  {unknown}")
-    ends += [f"  assumed error rates: {doubt}" for doubt in result.doubts]
+        outcomes.append(f"  {unknown}")
+    outcomes += [f"  assumed error rates: {doubt}" for doubt in result.doubts]
     warning = wrap_lines(describe_disagreement(result), "", "  ", max_lines=3)
     if result.story is not None:
-        lines = [times, *ends, "", *format_diagnosis(result.story, result.run, repeat_command, report)]
+        lines = [times, *outcomes, "", *format_diagnosis(result.story, result.run, repeat_command, report)]
     else:
         end = describe_end(result.status, result.reason, result.node, result.message)
-        lines = [end, times, f"{result.run}  (repeat: {repeat_command})", *ends]
+        lines = [end, times, f"{result.run}  (repeat: {repeat_command})", *outcomes]
         lines += [f"report: {report}"] if report else []
         if result.status == "INCOMPLETE":
             lines.append(f"after you have moved the remaining objects: {make_resume_command(result.run)}")
@@ -84,21 +84,21 @@ def describe_place_on_table(item: ItemChanged) -> str:
     return "x {:.2f} m, y {:.2f} m".format(*item.position) if is_left else ""
 
 
-def group_items_by_end(items: Iterable[ItemChanged]) -> dict[str, list[str]]:
+def group_items_by_outcome(items: Iterable[ItemChanged]) -> dict[str, list[str]]:
     """Return the placed items by bin, and texts about the other items (with position and reason) by state.
 
     Phantoms, which are detections without an object, are only counted.
     """
-    ends: dict[str, list[str]] = defaultdict(list)
+    outcomes: dict[str, list[str]] = defaultdict(list)
     phantom_count = 0
     for item in items:
         if item.state == "phantom":
             phantom_count += 1
         elif item.state == "placed":
-            ends[item.bin].append(item.item)
+            outcomes[item.bin].append(item.item)
         else:
             details = ": ".join(filter(None, (describe_place_on_table(item), item.why)))
-            ends[item.state].append(f"{item.item} ({details})" if details else item.item)
+            outcomes[item.state].append(f"{item.item} ({details})" if details else item.item)
     if phantom_count:
-        ends["phantom"].append(f"{phantom_count} seen by mistake")
-    return dict(ends)
+        outcomes["phantom"].append(f"{phantom_count} seen by mistake")
+    return dict(outcomes)

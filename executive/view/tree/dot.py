@@ -10,7 +10,7 @@ from executive.view.text import replace_invalid_characters
 from executive.view.tree.card import make_card
 
 
-def draw_dot(nodes: Sequence[OutlineNode], name: str) -> str:
+def format_dot(nodes: Sequence[OutlineNode], name: str) -> str:
     """Return a tree as the text of a Graphviz digraph with the name `name`; each subtree is a cluster."""
     child_lists = list_child_indices(nodes)
     lines = [

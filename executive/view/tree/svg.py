@@ -81,8 +81,8 @@ def _compute_size(node: OutlineNode, card: Card, lines: Sequence[tuple[str, str]
         _TITLE_HEIGHT + _LINE_HEIGHT * len(lines),
     )
     label_width = measure_text(node.slot, EDGE_LABEL_SIZE) + _EDGE_LABEL_GAP if node.slot else 0.0
-    name_width = measure_text(node.subtree, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING
-    return NodeSize(width, height, label_width, name_width if node.subtrees else 0.0)
+    subtree_name_width = measure_text(node.subtree, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING
+    return NodeSize(width, height, label_width, subtree_name_width if node.subtrees else 0.0)
 
 
 def _compute_indent(card: Card) -> float:
@@ -94,11 +94,11 @@ def _draw_edge(layout: Layout, parent: int | None, child: int, depth: int) -> st
     """Return the SVG path of the line between the nodes `parent` and `child`; "" for no parent."""
     if parent is None:
         return ""
-    source, target, trunk = layout.boxes[parent], layout.boxes[child], layout.trunks[depth]
+    source, target, edge_x = layout.boxes[parent], layout.boxes[child], layout.edge_xs[depth]
     path = f"M{source.right:.0f} {source.middle:.0f}"
     height = target.middle - source.middle
     if height >= 1:
         radius = min(_CORNER_RADIUS, height / 2)
-        path += f"H{trunk - radius:.0f}q{radius:.0f} 0 {radius:.0f} {radius:.0f}"
+        path += f"H{edge_x - radius:.0f}q{radius:.0f} 0 {radius:.0f} {radius:.0f}"
         path += f"V{target.middle - radius:.0f}q0 {radius:.0f} {radius:.0f} {radius:.0f}"
     return f"{path}H{target.x:.0f}"

@@ -14,7 +14,7 @@ MARGIN = 16.0
 """Margin of the picture [pixel]."""
 NODE_GAP = 10.0
 """Vertical distance between the boxes of nodes [pixel]."""
-EDGE_STEM = 16.0
+EDGE_SEGMENT_LENGTH = 16.0
 """Length of each horizontal part of the line between a node and its child [pixel]."""
 FRAME_PADDING = 9.0
 """Distance between a frame and the boxes in it [pixel]."""
@@ -32,13 +32,13 @@ class NodeSize:
     Attributes:
         width, height: Size of the box.
         label_width: Width of the label of the line to the node; 0 for no label.
-        name_width: Width of the name of the subtree whose first node this is; 0 for other nodes.
+        subtree_name_width: Width of the name of the subtree whose first node this is; 0 for other nodes.
     """
 
     width: float
     height: float
     label_width: float = 0.0
-    name_width: float = 0.0
+    subtree_name_width: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -67,27 +67,27 @@ class Layout:
 
     Attributes:
         boxes: Box of each node.
-        trunks: The x of the vertical parts of the lines to the nodes of each depth.
+        edge_xs: The x of the vertical parts of the lines to the nodes of each depth.
         frames: Frame of each subtree, by the index of the first node of the subtree.
         width, height: Size of the picture with margins.
     """
 
     boxes: tuple[Rectangle, ...]
-    trunks: tuple[float, ...]
+    edge_xs: tuple[float, ...]
     frames: dict[int, Rectangle]
     width: float
     height: float
 
 
 def compute_layout(depths: Sequence[int], children: ChildLists, sizes: Sequence[NodeSize]) -> Layout:
-    """Return the layout of the nodes of a tree, in an order in which parents precede their children.
+    """Return the layout of a tree; its nodes are listed with parents before their children.
 
     Args:
         depths: Depth of each node; 0 for the root.
         children: Indices of the children of each node.
         sizes: Sizes of the parts of each node.
     """
-    columns, trunks = _place_columns(depths, sizes)
+    columns, edge_xs = _place_columns(depths, sizes)
     bands, middles = _compute_bands(children, sizes)
     tops = _place_bands(children, bands, middles)
     boxes = tuple(
@@ -97,26 +97,27 @@ def compute_layout(depths: Sequence[int], children: ChildLists, sizes: Sequence[
     right_ends = _find_right_ends(children, sizes, boxes)
     frames = {}
     for index, box in enumerate(boxes):
-        if sizes[index].name_width:
+        if sizes[index].subtree_name_width:
             x, y = box.x - FRAME_PADDING, tops[index] + NODE_GAP / 2
             width = right_ends[index] - box.x + FRAME_PADDING
             frames[index] = Rectangle(x, y, width, bands[index] - NODE_GAP)
-    return Layout(boxes, trunks, frames, max(right_ends) + MARGIN, tops[0] + bands[0] + MARGIN - NODE_GAP / 2)
+    height = tops[0] + bands[0] + MARGIN - NODE_GAP / 2
+    return Layout(boxes, edge_xs, frames, max(right_ends) + MARGIN, height)
 
 
 def _place_columns(depths: Sequence[int], sizes: Sequence[NodeSize]) -> tuple[list[float], tuple[float, ...]]:
     """Return the x of the boxes of each depth, and the x of the vertical parts of the lines to them."""
     columns: list[float] = []
-    trunks: list[float] = []
+    edge_xs: list[float] = []
     right = 0.0
     for depth in range(max(depths) + 1):
         column = [size for size, node_depth in zip(sizes, depths, strict=True) if node_depth == depth]
-        frame = FRAME_PADDING if any(size.name_width for size in column) else 0.0
-        trunks.append(right + EDGE_STEM if depth else MARGIN)
-        edge_length = EDGE_STEM + max(size.label_width for size in column) if depth else 0.0
-        columns.append(trunks[-1] + edge_length + frame)
+        frame = FRAME_PADDING if any(size.subtree_name_width for size in column) else 0.0
+        edge_xs.append(right + EDGE_SEGMENT_LENGTH if depth else MARGIN)
+        edge_length = EDGE_SEGMENT_LENGTH + max(size.label_width for size in column) if depth else 0.0
+        columns.append(edge_xs[-1] + edge_length + frame)
         right = columns[-1] + max(size.width for size in column)
-    return columns, tuple(trunks)
+    return columns, tuple(edge_xs)
 
 
 def _compute_bands(children: ChildLists, sizes: Sequence[NodeSize]) -> tuple[list[float], list[float]]:
@@ -124,7 +125,7 @@ def _compute_bands(children: ChildLists, sizes: Sequence[NodeSize]) -> tuple[lis
     bands, middles = [0.0] * len(sizes), [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
         size, node_children = sizes[index], children[index]
-        header, footer = (FRAME_HEADER, FRAME_PADDING) if size.name_width else (0.0, 0.0)
+        header, footer = (FRAME_HEADER, FRAME_PADDING) if size.subtree_name_width else (0.0, 0.0)
         half_height = (size.height + NODE_GAP) / 2
         first_middle = middles[node_children[0]] if node_children else 0.0
         middles[index] = header + max(half_height, first_middle)
@@ -150,7 +151,7 @@ def _find_right_ends(
     """Return the x of the right end of each node including its descendants and their frames."""
     right_ends = [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
-        size, box = sizes[index], boxes[index]
+        box, name_width = boxes[index], sizes[index].subtree_name_width
         right = max([box.right, *(right_ends[child] for child in children[index])])
-        right_ends[index] = max(right + FRAME_PADDING, box.x + size.name_width) if size.name_width else right
+        right_ends[index] = max(right + FRAME_PADDING, box.x + name_width) if name_width else right
     return right_ends

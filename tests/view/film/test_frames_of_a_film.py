@@ -13,7 +13,7 @@ from small_tree import NODES, ended, node, started
 
 from executive.record.result import ItemCounts, Result
 from executive.view.film.film import select_steps
-from executive.view.film.page import describe_result, draw_page, draw_result
+from executive.view.film.page import describe_result, draw_frame, draw_result
 from executive.view.film.panel import (
     MAX_ITEM_ROWS,
     compute_height,
@@ -162,7 +162,7 @@ def test_a_page_shows_picture_camera_caption_and_how_far_the_run_is(tmp_path) ->
     state.advance_to(240, 1.0)
     source = SimpleNamespace(start=run_started(mission="sort"), item_count=0, bin_colours={}, nodes=NODES)
     picture = np.full((720, 800, 3), 128, np.uint8)
-    page = np.asarray(draw_page(source, picture, state, "seed 5", 4.0))
+    page = np.asarray(draw_frame(source, picture, state, "seed 5", 4.0))
     for part, ends in ((np.s_[:360, :800], (20, 20, 205, 251)), (np.s_[360:, :800], (303, 20, 340, 155))):
         changed = np.argwhere((page[part] != 128).any(axis=2))
         assert (*changed.min(axis=0), *changed.max(axis=0)) == ends

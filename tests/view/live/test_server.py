@@ -21,7 +21,13 @@ from executive.view.live import live_scene
 from executive.view.live.messages import PageChange, PageCommand
 from executive.view.live.page_state import PageState
 from executive.view.live.scene_proxy import SceneProxy
-from executive.view.live.server import CONTENT_POLICY, SECURITY_HEADERS, Server, find_refusal, parse_command
+from executive.view.live.server import (
+    CONTENT_POLICY,
+    SECURITY_HEADERS,
+    Server,
+    find_access_error,
+    parse_command,
+)
 
 TOKEN = "a-token"
 HOST = "127.0.0.1:8123"
@@ -57,7 +63,7 @@ NAMES = ("evil.example", "localhost:8123", "127.0.0.1", f"{HOST}.evil")
 )
 def test_only_the_page_itself_is_let_in_and_only_with_the_token(path: str, headers: dict, said: str) -> None:
     request = make_mocked_request("GET", path, headers={"Host": HOST} | headers)
-    assert find_refusal(request, TOKEN, HOST) == said
+    assert find_access_error(request, TOKEN, HOST) == said
 
 
 @dataclass

@@ -62,9 +62,9 @@ def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_fir
         middles = [plan.boxes[child].middle for child in among]
         assert middles == sorted(middles)
         for child in among:
-            trunk = plan.trunks[depths[child]]
+            trunk = plan.edge_xs[depths[child]]
             assert plan.boxes[parent].right < trunk < plan.boxes[child].x - nodes[child].label_width
-        if among and not nodes[parent].name_width:
+        if among and not nodes[parent].subtree_name_width:
             assert abs(plan.boxes[parent].middle - middles[0]) < 1e-6
     whole = Rectangle(0, 0, plan.width, plan.height)
     assert all(contains(whole, part) for part in (*plan.boxes, *plan.frames.values()))
@@ -73,10 +73,10 @@ def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_fir
 def test_a_frame_holds_its_subtree_and_nothing_else(tree):
     depths, nodes = tree
     plan = compute_layout(depths, below(depths), nodes)
-    assert set(plan.frames) == {index for index, size in enumerate(nodes) if size.name_width}
+    assert set(plan.frames) == {index for index, size in enumerate(nodes) if size.subtree_name_width}
     for index, frame in plan.frames.items():
         within = inside(index, depths)
-        assert frame.width >= nodes[index].name_width
+        assert frame.width >= nodes[index].subtree_name_width
         for other, box in enumerate(plan.boxes):
             assert contains(frame, box) if other in within else not overlap(frame, box)
         for other, another in plan.frames.items():
@@ -87,7 +87,7 @@ def test_a_small_tree_stands_exactly_there():
     sizes = [
         NodeSize(60, 28),
         NodeSize(50, 28, label_width=20),
-        NodeSize(40, 42, name_width=90),
+        NodeSize(40, 42, subtree_name_width=90),
         NodeSize(30, 28),
     ]
     plan = compute_layout([0, 1, 1, 2], [[1, 2], [], [3], []], sizes)
@@ -95,6 +95,6 @@ def test_a_small_tree_stands_exactly_there():
         Rectangle(16, 16, 60, 28), Rectangle(137, 16, 50, 28), Rectangle(137, 74, 40, 42),
         Rectangle(219, 81, 30, 28),
     )  # fmt: skip
-    assert plan.trunks == (16, 92, 203)
+    assert plan.edge_xs == (16, 92, 203)
     assert plan.frames == {2: Rectangle(128, 54, 130, 71)}
     assert (plan.width, plan.height) == (274, 141)

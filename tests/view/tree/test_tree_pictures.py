@@ -12,7 +12,7 @@ from executive.tree.node import ControlNode
 from executive.tree.node_registry import load_control_nodes
 from executive.view.text import replace_invalid_characters
 from executive.view.tree.card import make_card
-from executive.view.tree.dot import draw_dot
+from executive.view.tree.dot import format_dot
 from executive.view.tree.svg import NodeNote, draw_svg, make_group_id
 
 NASTY = """<b onload="x">&amp; 'quoted' "twice" \\ ]]> --> größer ≥ 日本 \x00\x1b \ud800"""
@@ -114,7 +114,7 @@ def test_a_word_that_nobody_knows_is_drawn_like_any_other():
     node = control("tree/dance", 0, "dance")
     (group,) = groups(parsed([node])).values()
     assert (texts(group, "symbol"), texts(group, "title")) == ([ControlNode.symbol], ["dance"])
-    assert "shape=ellipse" in draw_dot([node], "x")
+    assert "shape=ellipse" in format_dot([node], "x")
 
 
 def test_the_picture_needs_nothing_else_and_its_colours_come_from_the_style_sheet_alone():
@@ -139,7 +139,9 @@ def test_text_from_a_mission_cannot_leave_its_place_in_the_svg():
 
 
 def test_text_from_a_mission_cannot_leave_its_place_in_the_dot():
-    text = draw_dot([skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, subtrees=(NASTY,))], NASTY)
+    text = format_dot(
+        [skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, subtrees=(NASTY,))], NASTY
+    )
     text.encode()
     outside = re.sub(r'"(?:[^"\\]|\\.)*"', "_", text).splitlines()
     assert (outside[0], outside[3:]) == (
@@ -151,7 +153,7 @@ def test_text_from_a_mission_cannot_leave_its_place_in_the_dot():
 
 
 def test_the_dot_has_every_node_and_every_line():
-    assert [re.sub(r", tooltip=.*", "", line.strip()) for line in draw_dot(NODES, "sort").splitlines()] == [
+    assert [re.sub(r", tooltip=.*", "", line.strip()) for line in format_dot(NODES, "sort").splitlines()] == [
         'digraph "sort" {',
         'ordering=out; nodesep=0.15; fontname="sans-serif"; fontsize=11;',
         'node [fontname="sans-serif", fontsize=11]; edge [fontname="sans-serif", fontsize=9];',
