@@ -115,14 +115,18 @@ class OutlineFitter:
 
     def search(self) -> Iterator[PoseFit]:
         """Yield fits that start at the poses of the search grid with the strongest image edges."""
-        small = cv2.resize(
+        small_image = cv2.resize(
             self._image, None, fx=1 / DOWNSCALING, fy=1 / DOWNSCALING, interpolation=cv2.INTER_AREA
         )
-        small = cv2.GaussianBlur(small, (0, 0), SMOOTHING_STD).astype(np.float32)
+        small_image = cv2.GaussianBlur(small_image, (0, 0), SMOOTHING_STD).astype(np.float32)
         gradients = np.stack(
-            [cv2.Sobel(small, cv2.CV_32F, 1, 0), cv2.Sobel(small, cv2.CV_32F, 0, 1)], axis=-1
+            [cv2.Sobel(small_image, cv2.CV_32F, 1, 0), cv2.Sobel(small_image, cv2.CV_32F, 0, 1)], axis=-1
         )
-        matrix, X_CW, last = self._frame.matrix, self._frame.X_WC.inverse(), np.array(small.shape[1::-1]) - 1
+        matrix, X_CW, last = (
+            self._frame.matrix,
+            self._frame.X_WC.inverse(),
+            np.array(small_image.shape[1::-1]) - 1,
+        )
         if (
             not _is_sufficient(self._find_visible_samples(np.zeros(6)))
             or np.abs(gradients).max() < MIN_CONTRAST

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from executive.cell.detection import Detection
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
-from executive.perception.detectors.roboflow.complaints import (
+from executive.perception.detectors.roboflow.failure_messages import (
     describe_delay,
     describe_failure,
     describe_invalid_answer,

@@ -208,7 +208,7 @@ def asked_for(sentence, api):
 
 
 QUICK = ("401", "404", "html", "deep", "nan")
-"""Faults of every kind; the others are slow tests, and units in test_answers.py and test_complaints.py."""
+"""Faults of every kind; the others are slow tests, and unit tests in test_answers.py."""
 
 
 @pytest.mark.parametrize("fault", QUICK)

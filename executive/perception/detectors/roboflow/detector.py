@@ -14,7 +14,7 @@ from executive.cell.detection import Detection
 from executive.errors import DeadlinePassed, InputError, Unavailable
 from executive.perception.detectors.requests import ThreadedDetector
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
-from executive.perception.detectors.roboflow.complaints import (
+from executive.perception.detectors.roboflow.failure_messages import (
     describe_delay,
     describe_failure,
     describe_invalid_answer,
