@@ -63,7 +63,7 @@ class ReplayResult:
         text = f"recorded: {_describe_decision(self.recorded)}; replayed: {_describe_decision(self.replayed)}"
         if not self.unanswered:
             return text
-        return f"{text}: {self.unanswered}; only a run can show the consequences"
+        return f"{text}: {self.unanswered}; only a new run can show the consequences of this difference"
 
     def as_json(self) -> dict[str, JsonValue]:
         """Return the attributes as JSON; a decision has its tick, clock, kind and non-empty fields."""
@@ -116,7 +116,7 @@ def compare_replay(
     comparison.compare_end()
     return ReplayResult(
         comparison.equal_count, run.tick, *comparison.difference, edited,
-        comparison.unanswered, comparison.is_complete,
+        comparison.missing_input_message, comparison.is_complete,
     )  # fmt: skip
 
 
@@ -125,9 +125,12 @@ class _Comparison:
 
     Attributes:
         equal_count: Number of equal decisions.
-        difference: First recorded decision and first replayed decision that differ; None where none differs.
-        unanswered: Message about an input without a recorded value before the first difference, or "".
-        is_complete: True if the replay made the recorded decisions, and no others in these control steps.
+        difference: First recorded decision and first replayed decision that differ; None for
+            a side without a further decision, (None, None) without a difference.
+        missing_input_message: Message about an input without a recorded value before the first difference,
+            or "".
+        is_complete: False if the first other decision of the replay is in a recorded control step, or if the
+            replay ended before the last recorded decision.
         run: Run of the replay, which is stopped at the first difference.
     """
 
@@ -142,7 +145,7 @@ class _Comparison:
         self._is_finished = False
         self.equal_count = 0
         self.difference: tuple[TimedEvent | None, TimedEvent | None] = (None, None)
-        self.unanswered = ""
+        self.missing_input_message = ""
         self.is_complete = True
 
     def __call__(self, timed: TimedEvent) -> None:
@@ -155,10 +158,10 @@ class _Comparison:
         if recorded == decision:
             self.equal_count += 1
             return
-        self._is_finished, self.unanswered = True, self.run.replayed_cell.missing_input_message
+        self._is_finished, self.missing_input_message = True, self.run.replayed_cell.missing_input_message
         # After the last recorded control step, the replay only halts.
         self.is_complete = decision.tick > self._log.last_tick
-        if self._has_ended or any(map(self._is_complete, filter(None, (recorded, decision)))):
+        if self._has_ended or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):
             self.difference = (recorded, decision)
         self.run.control.stop()
 
@@ -168,11 +171,11 @@ class _Comparison:
             return
         self.is_complete = False
         next_decision = self._recorded[self.equal_count]
-        if self._is_complete(next_decision):
+        if self._is_in_complete_step(next_decision):
             self.difference = (next_decision, None)
-            self.unanswered = self.run.replayed_cell.missing_input_message
+            self.missing_input_message = self.run.replayed_cell.missing_input_message
 
-    def _is_complete(self, decision: TimedEvent) -> bool:
+    def _is_in_complete_step(self, decision: TimedEvent) -> bool:
         """Return True if the record contains all events of the control step of a decision."""
         return decision.tick < self._log.last_tick
 

@@ -30,7 +30,7 @@ class InputReplayer:
         self._inputs = {name: deque(inputs) for name, inputs in log.inputs.items()}
         self._tick = 0
         self._read_counts: Counter[str] = Counter()
-        # A killed run can be resumed even if its journal lacks the clock, which is 0 at the start of a run.
+        # A journal of a killed run may contain no clock value; the clock is then 0, as at the start.
         self._last_values: dict[str, Any] = {"clock": 0.0}
         self.missing_input_message = ""
 

@@ -93,8 +93,8 @@ _COMMAND_FORMAT = InputFormat("command", NOTHING_CODEC)
 
 
 _PATTERN_CODECS = [
-    (re.compile(re.sub(r"\\{.*?\\}", ".+", re.escape(each.name))), each.codec)
-    for each in sorted(INPUT_FORMATS.values(), key=lambda each: -len(each.name))
+    (re.compile(re.sub(r"\\{.*?\\}", ".+", re.escape(input_format.name))), input_format.codec)
+    for input_format in sorted(INPUT_FORMATS.values(), key=lambda input_format: -len(input_format.name))
 ]
 """Pattern of the input names and codec of each format, by descending length of the name.
 
@@ -113,7 +113,7 @@ def check_input(name: str, value: JsonValue) -> None:
         codec.decode(value)
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, zlib.error) as error:
         problem = f"{type(error).__name__}: {error}"
-        raise ValueError(f'"value" is no value of the input "{name}" ({problem})') from error
+        raise ValueError(f'"value" does not have the format of the input "{name}" ({problem})') from error
 
 
 def make_recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:

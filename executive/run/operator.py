@@ -14,7 +14,7 @@ from executive.run.run_control import RunControl
 RESCAN = "rescan"
 """Request for a new scan of the table."""
 KEYBOARD_POLL_PERIOD = 0.1
-"""Period of the checks for a stop of the run while the run waits for a request [s]."""
+"""Period at which an operator that waits for a request checks whether the run was stopped [s]."""
 
 
 class ScriptedOperator:

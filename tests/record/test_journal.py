@@ -154,10 +154,14 @@ def test_a_journal_that_another_program_replaced_or_truncated_is_reported(path):
 
 def test_an_answer_that_cannot_be_replayed_is_refused(path):
     write(path, at(0, run_started()), at(0, read("camera.frame", {"size": [1, 2]})))
-    with pytest.raises(InputError, match=r'journal.jsonl:2: .*"value" is no value of the input "camera.fra'):
+    with pytest.raises(
+        InputError, match=r'journal.jsonl:2: .*"value" does not have the format of the input "camera.fra'
+    ):
         read_journal(path)
     write(path.with_name("other.jsonl"), at(0, run_started()), at(0, read("arm.tool_pose", [1.0])))
-    with pytest.raises(InputError, match=r'other.jsonl:2: .* no value of the input "arm.tool_pose"'):
+    with pytest.raises(
+        InputError, match=r'other.jsonl:2: .* does not have the format of the input "arm.tool_pose"'
+    ):
         read_journal(path.with_name("other.jsonl"))
 
 

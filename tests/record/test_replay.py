@@ -98,7 +98,7 @@ def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Pat
     assert (done.replayed.event.node, done.replayed.event.status) == ("MoveToScan", "INVALID")
     assert done.difference.endswith(
         "reason fault: the journal contains no earlier value of the input plan.ready, which is read here; "
-        "only a run can show the consequences"
+        "only a new run can show the consequences of this difference"
     )
 
 

@@ -52,7 +52,7 @@ def give_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[
         yield remedy
     elif changes := list(_list_changes(run)):
         yield f"to let the mission continue after {run.end.reason}: {', or '.join(changes)}"
-    for name, item in run.lost.items():
+    for name, item in run.lost_items.items():
         yield f"look for {name} by hand, {_describe_position(item)}"
 
 

@@ -64,7 +64,7 @@ def diagnose(
     journal = RunDirectory(run_folder).journal
     has_begun = journal.exists() and journal.stat().st_size > 0
     unfinished = timeline.items.find_in_states("seen", "dropped", "held")
-    left = {name: item for name, item in unfinished.items() if name not in run.lost}
+    left = {name: item for name, item in unfinished.items() if name not in run.lost_items}
     return Diagnosis(
         status=end.status,
         reason=end.reason,
@@ -80,8 +80,8 @@ def diagnose(
         ],
         reads=reads,
         look=_find_last_look(run),
-        lost=[_make_lost_item(name, item) for name, item in run.lost.items()],
-        running=[run.name_skill(path) for path in run.halted_skills],
+        lost=[_make_lost_item(name, item) for name, item in run.lost_items.items()],
+        running=[run.format_skill_name(path) for path in run.halted_skills],
         left=[name for name, item in left.items() if item.last_change.label in loaded.routes],
         arm=arm,
         holds=end.holds,
@@ -108,7 +108,7 @@ def _make_deciding_node(run: FailedRun) -> DecidingNode | None:
     node = run.deciding_node
     if node is None:
         return None
-    name = run.name_skill(node.path) if isinstance(node, SkillNode) else get_path_name(node)
+    name = run.format_skill_name(node.path) if isinstance(node, SkillNode) else get_path_name(node)
     return DecidingNode(node.path, name, _format_place(node))
 
 
@@ -134,7 +134,7 @@ def _find_picture_file(run: FailedRun, run_folder: Path) -> str:
     """Return the path of the picture of the failure, or else of the last selection of the item, or ""."""
     reason = run.end.reason.rpartition(".")[2] if run.end.status == "FAILURE" else ""
     item = run.timeline.items.by_name.get(run.item)
-    if run.lost and item is not None and item.failure is not None:
+    if run.lost_items and item is not None and item.failure is not None:
         reason = item.failure.reason
     for picture_reason in dict.fromkeys([reason, ""]):
         file = find_picture(run_folder / "frames", run.item, picture_reason)

@@ -18,7 +18,7 @@ MAX_SHOWN_NODES = 5
 """Maximum number of control nodes in the text; the nodes nearest to the root are omitted."""
 
 _MAX_READINGS = 3
-_MAX_LOST = 3
+_MAX_LOST_ITEMS = 3
 _LABEL_WIDTH = 12
 _SPACE_BEFORE_UNIT = re.compile(r"(?<=[0-9)]) (?=(?:s|m)\b)")
 _NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
@@ -41,7 +41,7 @@ def format_diagnosis(diagnosis: Diagnosis, run: str, repeat: str, report: str = 
     lines = wrap_lines(
         f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}", "", "  ", max_lines=3
     )
-    lines += _format_passed_nodes(diagnosis)
+    lines += _format_failure_path(diagnosis)
     for label, text in list_facts(diagnosis):
         lines += wrap_lines(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, max_lines=3)
     commands = {"record": run, "report": report, "repeat": repeat}
@@ -51,7 +51,7 @@ def format_diagnosis(diagnosis: Diagnosis, run: str, repeat: str, report: str = 
 
 
 def list_facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
-    """Yield label and sentence of each fact, except the verdict and the nodes that the failure passed."""
+    """Yield label and sentence of each fact, except the verdict and the failure path."""
     node = diagnosis.node
     if node is not None and not any(passed.why for passed in diagnosis.chain):
         yield "where", f"{node.path} ({node.place})"
@@ -61,7 +61,7 @@ def list_facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     if diagnosis.reads:
         reads = diagnosis.reads[:_MAX_READINGS]
         yield "the cell", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in reads)
-    for lost in diagnosis.lost[:_MAX_LOST]:
+    for lost in diagnosis.lost[:_MAX_LOST_ITEMS]:
         yield "lost", _format_lost_item(lost)
     # The sentence about a lost item contains its last look.
     if not diagnosis.lost:
@@ -77,10 +77,10 @@ def list_facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "next", sentence
 
 
-def _format_passed_nodes(diagnosis: Diagnosis) -> list[str]:
+def _format_failure_path(diagnosis: Diagnosis) -> list[str]:
     """Return a line for each node that did not handle the failure, and for the origin of the failure."""
     mission_prefix = f"{diagnosis.mission}:"
-    passed = [(each.name, each.why, each.place) for each in diagnosis.chain if each.why]
+    passed = [(entry.name, entry.why, entry.place) for entry in diagnosis.chain if entry.why]
     node = diagnosis.node
     if not passed or node is None:
         return []
@@ -141,5 +141,5 @@ def _format_position(position: Sequence[float] | None) -> str:
     return "" if position is None else " at ({:.3f}, {:.3f}, {:.3f}) m".format(*position)
 
 
-def _format_count(count: int, one: str, many: str = "") -> str:
-    return f"{count} {one if count == 1 else many or one + 's'}"
+def _format_count(count: int, singular: str, plural: str = "") -> str:
+    return f"{count} {singular if count == 1 else plural or singular + 's'}"

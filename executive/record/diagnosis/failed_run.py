@@ -28,7 +28,7 @@ class FailedRun:
 
     Attributes:
         failure_path: Nodes that the failure passed, from the root to its origin; empty without a failure.
-        lost: History of the items whose loss made the run fail, by name of the item.
+        lost_items: History of the items whose loss made the run fail, by name of the item.
         deciding_activation: Last activation of the node that determined the status, or None.
         deciding_node: Node of the mission that determined the status, or None.
         halted_skills: Paths of the skills that the end of the run or `deciding_node` halted.
@@ -40,7 +40,7 @@ class FailedRun:
         self.loaded, self.timeline, self.end = loaded, timeline, end
         failed = end.status == "FAILURE"
         self.failure_path = trace_failure(loaded.tree, timeline, end.node, end.reason) if failed else ()
-        self.lost = {
+        self.lost_items = {
             name: item
             for name, item in timeline.items.by_name.items()
             if failed and not end.node and item.last_change.state == "lost"
@@ -53,35 +53,35 @@ class FailedRun:
             self.halted_skills = deciding.halted if deciding is not None else ()
         activations = [deciding, *map(timeline.activation_by_path.get, self.halted_skills)]
         items = [activation.item for activation in activations if activation is not None and activation.item]
-        self.item = next(iter([*items, *self.lost]), "")
+        self.item = next(iter([*items, *self.lost_items]), "")
         self.is_unrecorded = f".{RecordLost.__name__}: " in timeline.traceback
 
-    def name_skill(self, path: str) -> str:
+    def format_skill_name(self, path: str) -> str:
         """Return the name of a skill with the item of its last activation: `Grasp of cube-1`."""
         last = self.timeline.activation_by_path.get(path)
         return to_skill_name(path) + (f" of {last.item}" if last is not None and last.item else "")
 
     def format_place(self, node: Node) -> str:
-        """Return the line of a node in its file, with the file if this is not the mission file."""
+        """Return the line of a node in its file, with the file name if it is not the mission file."""
         return node.mark.describe_place(self.loaded.tree.mark.source)
 
 
 def describe_cause(run: FailedRun) -> str:
     """Return the cause of the end of a run in one sentence: skill, item, number of attempts and message."""
     end = run.end
-    skills = " and ".join(map(run.name_skill, run.halted_skills))
+    skills = " and ".join(map(run.format_skill_name, run.halted_skills))
     during = f" during {skills}" if skills else ""
     if end.status == "HALTED":
         return end.message + (" while the operator was asked" if run.timeline.question else during)
-    if run.lost:
-        were = "object was" if len(run.lost) == 1 else "objects were"
-        more = f" and {len(run.lost) - MAX_NAMED_ITEMS} more" if len(run.lost) > MAX_NAMED_ITEMS else ""
-        return f"{len(run.lost)} {were} lost: {', '.join(list(run.lost)[:MAX_NAMED_ITEMS])}{more}"
+    if names := list(run.lost_items):
+        subject = "object was" if len(names) == 1 else "objects were"
+        more = f" and {len(names) - MAX_NAMED_ITEMS} more" if len(names) > MAX_NAMED_ITEMS else ""
+        return f"{len(names)} {subject} lost: {', '.join(names[:MAX_NAMED_ITEMS])}{more}"
     if not run.failure_path:
         return end.message
     if isinstance(run.deciding_node, SkillNode):
         reason = end.reason.rpartition(".")[2]
-        return f"{run.name_skill(end.node)} failed ({reason}){_describe_attempt(run)}: {end.message}"
+        return f"{run.format_skill_name(end.node)} failed ({reason}){_describe_attempt(run)}: {end.message}"
     return f"{run.failure_path[-1].name}{_describe_attempt(run)}: {end.message}{during}"
 
 

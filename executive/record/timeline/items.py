@@ -34,7 +34,8 @@ class Sighting:
     """Look in which an item was detected.
 
     Attributes:
-        frame, camera, detector, clock: As in `Look`.
+        frame, camera, detector, clock: Number of the frame, name of the camera, name of the detector, and
+            time of the look [s].
         item: Name of the item.
         attempts: Number of failed attempts to pick the item.
         looks: Number of looks in which the item was detected.
@@ -61,7 +62,7 @@ class ItemTimeline:
     Attributes:
         last_change: Last event of a change of the item.
         last_change_number: Number of the last state change of the item, among all state changes in the run.
-        final_state: State of the item at the end of the tree, before the ledger set the final states.
+        state_at_tree_end: State of the item at the end of the tree, before the ledger set the final states.
         sighting: Last look in which the item was detected, or None.
         unseen_look_count: Number of looks after `sighting`.
         pick_time, drop_time: Last times at which the tool picked and dropped the item [s], or None.
@@ -70,7 +71,7 @@ class ItemTimeline:
 
     last_change: ItemChanged
     last_change_number: int = 0
-    final_state: str = ""
+    state_at_tree_end: str = ""
     sighting: Sighting | None = None
     unseen_look_count: int = 0
     pick_time: float | None = None
@@ -94,8 +95,8 @@ class ItemsTimeline:
     _change_count: int = 0
     _newly_seen: list[str] = field(default_factory=list)
 
-    def add_change(self, event: ItemChanged, clock: float, *, is_final: bool) -> None:
-        """Add a change of an item at the time `clock` [s]; `is_final` is True after the end of the tree."""
+    def add_change(self, event: ItemChanged, clock: float, *, is_after_tree_end: bool) -> None:
+        """Add a change of an item at the time `clock` [s], during the tree or after its end."""
         item = self.by_name.get(event.item)
         last_state, look_count = (item.last_change.state, item.last_change.looks) if item else ("", 0)
         item = self.by_name.setdefault(event.item, ItemTimeline(event))
@@ -109,11 +110,11 @@ class ItemsTimeline:
             elif event.state == "dropped":
                 item.drop_time = clock
         item.last_change = event
-        if not is_final:
-            item.final_state = event.state
+        if not is_after_tree_end:
+            item.state_at_tree_end = event.state
 
     def add_look(self, event: FrameSearched, clock: float) -> None:
-        """Add a look at the time `clock` [s]; changes of the items in the look were added before."""
+        """Add a look at the time `clock` [s], after `add_change` has added the changes of its items."""
         self.look = Look(event.frame, event.camera, event.detector, clock, len(event.found))
         # The classes of a look are sorted, so that most runs of a mission have the same order of classes.
         self.classes |= dict.fromkeys(sorted(found.label for found in event.found))
@@ -133,7 +134,7 @@ class ItemsTimeline:
         return {
             name: item
             for name, item in self.by_name.items()
-            if item.final_state in states and item.last_change.state not in ("placed", "phantom")
+            if item.state_at_tree_end in states and item.last_change.state not in ("placed", "phantom")
         }
 
     def list_items(self) -> list[ItemChanged]:

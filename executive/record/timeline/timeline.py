@@ -96,7 +96,7 @@ class Timeline:
             case events.BranchChosen():
                 self._add_choice(event)
             case events.ItemChanged():
-                self.items.add_change(event, self.clock, is_final=self._has_tree_ended())
+                self.items.add_change(event, self.clock, is_after_tree_end=self._has_tree_ended())
             case events.FrameSearched():
                 self.items.add_look(event, self.clock)
             case events.TargetSelected():
