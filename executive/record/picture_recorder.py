@@ -11,7 +11,7 @@ from pathlib import Path
 from executive.cell.detection import Detection
 from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
-from executive.record.pictures.drawer import PictureDrawer
+from executive.record.pictures.drawing_thread import PictureDrawer
 from executive.record.pictures.picture_scene import PictureScene
 from executive.record.timeline.activation import to_skill_name
 from executive.record.timeline.timeline import Timeline

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from executive.cli.main import main
 from executive.events import TargetSelected
 from executive.record.journal import read_journal
-from executive.record.pictures.drawer import PictureDrawer
+from executive.record.pictures.drawing_thread import PictureDrawer
 from executive.record.recorder import Recorder
 
 RECORD = ("write", "fsync", "replace", "rename")

@@ -14,7 +14,7 @@ from executive.events import DetectedObject, NodeEnded, TargetSelected, TimedEve
 from executive.geometry import Pose
 from executive.record import picture_recorder as module
 from executive.record.picture_recorder import MAX_LOOKS, PictureRecorder, find_picture
-from executive.record.pictures.drawer import PictureDrawer
+from executive.record.pictures.drawing_thread import PictureDrawer
 
 CUBE = detected("cube")
 NEAR = detected("cube", box=[90, 40, 120, 70], position=[0.5, -0.1, 0.02])

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 
 from executive.cell.detection import Detection
-from executive.record.pictures import drawer as module
-from executive.record.pictures.drawer import MAX_QUEUED_PICTURES, PictureDrawer
+from executive.record.pictures import drawing_thread as module
+from executive.record.pictures.drawing_thread import MAX_QUEUED_PICTURES, PictureDrawer
 from executive.record.pictures.picture_scene import PictureScene
 
 SCENE = PictureScene(
