@@ -45,7 +45,8 @@ def audit_objects(
     A held object counts as `left`, even above a bin. An object that was dropped into a wrong bin counts as
     `elsewhere` and as `fell_in_wrong_bin`. An object is unseen if no item of the ledger was first seen near
     it. A removed object counts only if it was seen: as `right` or `wrong_bin` if it was placed in a bin,
-    otherwise as `elsewhere`. An unseen object without a class counts only in a bin, and never as `unseen`.
+    otherwise as `elsewhere`. An unseen object of unknown class is counted only if it is in a wrong bin, and
+    never as `unseen`.
 
     Args:
         objects: The objects of the world, including removed objects.

@@ -28,7 +28,7 @@ PARKING_POSITION = (0.0, 0.0, 50.0)
 
 
 class ClosestApproach(NamedTuple):
-    """Distance between a part of the robot and a body, negative for a penetration, and its minimum [m]."""
+    """Distance of a robot part and a body, negative for a penetration, and the required minimum [m]."""
 
     part: str
     body: str

@@ -30,7 +30,7 @@ from executive.perception.camera_model import (
 
 
 def make_true_config(config: CellConfig, scene: SceneConfig) -> CellConfig:
-    """Return a cell file with the objects, the table and the camera of a scene."""
+    """Return the cell configuration with the objects, the table and the camera of a scene."""
     settings = {key: getattr(scene.table, key) for key in ("objects", "gap", "stacked")}
     table = {key: value for key, value in settings.items() if value is not None}
     name, camera = next(iter(config.cameras.items()))

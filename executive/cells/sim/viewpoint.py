@@ -51,8 +51,8 @@ def compute_viewpoint(config: CellConfig, size: tuple[int, int], region: Box) ->
     ]
     R_WC = compute_look_at_pose(direction, [0, 0, 0], [0, 0, 1]).rotation
     points = _list_hull_points(config) @ R_WC
-    # In camera axes, a camera at p shows a point q in the region if, with the slopes low and high of the rays
-    # through the borders of the region, low (q_z - p_z) <= q_x - p_x <= high (q_z - p_z), and likewise for y.
+    # In camera axes, low and high are the slopes of the rays through the borders of the region. A camera at p
+    # shows the point q in the region if low (q_z - p_z) <= q_x - p_x <= high (q_z - p_z), and likewise for y.
     # The largest possible p_z is chosen, then the mean of the possible p_x and p_y.
     corners = np.linalg.solve(matrix, np.array([[*region[:2], 1.0], [*region[2:], 1.0]]).T).T
     bounds = [
