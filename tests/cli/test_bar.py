@@ -118,7 +118,7 @@ def test_train_shows_batches_and_a_line_per_epoch(
     ("words", "what"),
     [
         (("sweep", "sort_overhead", *FAKE, "--seeds", "0-1", "--runs", "runs"), "sort_overhead"),
-        (("faults", "sort_overhead", *FAKE, "--pairs", "2"), "tried"),
+        (("faults", "sort_overhead", *FAKE, "--pairs", "2"), "faults"),
     ],
 )
 def test_many_runs_show_how_many_are_done_at_a_terminal_alone(
