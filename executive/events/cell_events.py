@@ -38,7 +38,7 @@ class ToolCommanded(Event):
 
 @dataclass(frozen=True)
 class InputRead(Event):
-    """A value was read from the cell that differs from the previous value of the same input.
+    """An input of the cell was read, and its value differs from the previous reading.
 
     Attributes:
         name: Name of the input, for instance `tool.holding`.

@@ -50,7 +50,7 @@ class BinContents:
         """Return the name of the bin in which an observed object lies, or None.
 
         Bins that contain items are enlarged by the measurement error; `bias_std` is the standard deviation of
-        its systematic part along each axis [m].
+        the systematic measurement error along each axis [m].
         """
         error = MAX_STANDARD_DEVIATIONS * math.hypot(observation.std, bias_std)
         for name, bin in self.bins.items():
@@ -74,9 +74,9 @@ class BinContents:
         bin_by_observation: Mapping[Observation, str | None],
         records: Collection[Record],
     ) -> list[Record]:
-        """Set dropped items that a look shows in a permitted bin to PLACED, and return these items.
+        """Set the state of dropped items that a look shows in a permitted bin to PLACED; return these items.
 
-        If a look shows more objects of a class in a bin than the known items, the others have fallen in.
+        If a look shows more objects of a class in a bin than known items, the rest are dropped items.
 
         Args:
             look: Detections in a whole image.

@@ -22,8 +22,8 @@ from executive.manipulation.obstacles import (
 )
 
 DROP_HEIGHT = 0.01
-"""Default height, at the release in a bin, of an item's underside above the floor or the next lower layer of
-objects [m]."""
+"""Default height from which an item is dropped into a bin: distance from its underside to the floor or to the
+layer of objects below [m]."""
 OVERTRAVEL = 0.015
 """Default depth below the expected surface down to which an approach searches for contact [m]."""
 PROBE_CLEARANCE = 0.005
@@ -101,7 +101,7 @@ def make_object_goal(
 
 
 def compute_lowest_contact(kind: ObjectClass, centre_height: float, overtravel: float) -> float:
-    """Return the smallest height at which a contact may be with the top of an object [m].
+    """Return the lowest contact height that counts as a contact with the top of an object [m].
 
     Args:
         kind: Class of the object.
@@ -171,7 +171,7 @@ def make_put_down_goal(cell: Cell, kind: ObjectClass, drop_height: float, item: 
 
 
 def _is_free(cell: Cell, position: Array, radius: float, excluded: Item | None) -> bool:
-    """Return True if only `excluded` may be within `radius` [m] of a position `(2,)` [m] on the table."""
+    """Return True if no bin, and no item but `excluded`, is within `radius` [m] of a position `(2,)` [m]."""
     if any(bin.contains(position, radius + BIN_THICKNESS) for bin in cell.bins.values()):
         return False
     return all(

@@ -136,7 +136,7 @@ def thin_out_path(qs: Array, spacing: float) -> Array:
 
 
 def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
-    """Return the states of consecutive pieces at increasing `times` `(N,)` [s], each of shape `(N, n)`."""
+    """Return positions, velocities and accelerations, each `(N, n)`, at increasing `times` `(N,)` [s]."""
     end_times = [*accumulate(piece.duration for piece in pieces[:-1]), math.inf]
     states, start_time = [JointState(*np.empty((3, 0, len(pieces[0].state_at(0.0).q))))], 0.0
     for piece, end_time in zip(pieces, end_times, strict=True):

@@ -1,4 +1,4 @@
-"""Evidence about the class of an object other than the confidence: measured heights, and box size."""
+"""Tests of a detected class by other evidence than the confidence: measured heights, and box size."""
 
 from __future__ import annotations
 
@@ -140,8 +140,8 @@ def describe_wrong_size(
     """Return a sentence if the size of a box contradicts a class, otherwise "".
 
     A cylinder with the radius and height of the class encloses the object. The longer side of the box is at
-    most the longer side of the image of the cylinder, and at least the side of the square inscribed in its
-    base.
+    most the longer side of the image of the cylinder, and at least the side of the square inscribed in the
+    base of the cylinder.
 
     Args:
         detection: The box and its class.

@@ -40,7 +40,7 @@ class View(Protocol):
     """Display of a run for a person: an observer that is opened before the run and closed after the run."""
 
     def open(self, run: Run) -> None:
-        """Begin to show a run; the view may stop, pause and step the run by its `control`."""
+        """Begin to show a run; the view may stop, pause and step the run through `run.control`."""
 
     def __call__(self, timed: TimedEvent) -> None:
         """Accept an event and return at once."""
@@ -137,7 +137,7 @@ class Recording:
         directory: The run directory.
         recorder: Recorder of the run.
         views: Views of the run.
-        earlier_events: Events that the observers get before the run.
+        earlier_events: Events of the run before its resumption, which the observers receive first.
         start_message: Message that the views show at the start of the run, or "".
     """
 

@@ -25,7 +25,7 @@ def list_versions() -> Mapping[str, str]:
 
 
 def list_requirements(extra: str = "") -> tuple[str, ...]:
-    """Return the packages that this project requires on this Python, or only those of its extra `extra`.
+    """Return the packages that this project requires on this Python; with `extra`, only those of that extra.
 
     The tuple is empty if the project is not installed.
     """

@@ -74,8 +74,8 @@ def make_raising(
 ) -> type[Skill]:
     """Return a skill that raises `error` after `delay_steps` control steps, if it has not ended before.
 
-    Before the error the skill runs as the original; its `finally` blocks are executed. This happens in the
-    first `start_count` starts; None: in all starts.
+    Before the error the skill runs as the original; its `finally` blocks are executed. The error is
+    raised in the first `start_count` starts, or in all starts if None.
     """
 
     def run(self: Skill, cell: Cell) -> Steps:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import torch
 
 SYMMETRY_COUNT = 8
-"""Number of symmetries: number 2 k rotates by k quarter turns; number 2 k + 1 mirrors left to right first."""
+"""Number of symmetries: number 2 k rotates by k quarter turns; number 2 k + 1 mirrors left to right and then
+rotates by k quarter turns."""
 
 
 def transform_image(image: torch.Tensor, symmetry: int) -> torch.Tensor:

@@ -24,7 +24,7 @@ _BOLD_FACTOR = 1.12
 
 
 def measure_text(text: str, size: float, *, bold: bool = False) -> float:
-    """Return an upper bound of the width [pixel] of a text in a sans-serif font of a size [pixel]."""
+    """Return an upper bound of the width [pixel] of a text in a sans-serif font; `size` is in pixels."""
     advances = sum(
         1.05 if unicodedata.east_asian_width(character) in "WF" else _ADVANCE.get(character, _DEFAULT_ADVANCE)
         for character in text

@@ -47,7 +47,7 @@ class SimArm:
         clock: Clock of the run.
         get_held_body: Returns the body that the tool holds, or None; its contacts count as those of the arm.
         emit: Receives the events of the arm.
-        interrupted: Motion in a rebuilt world, along which the arm brakes; None: the arm is at rest.
+        interrupted: Interrupted motion along which the arm brakes; None: the arm is at rest.
 
     Attributes:
         planner: Motion planner of the arm.
@@ -142,7 +142,7 @@ class SimArm:
             self._plans.plan_ahead(self._end_positions, goal, task)
 
     def start(self, motion: Motion) -> None:
-        """Begin to follow a motion, at whose start the arm must be at rest.
+        """Begin to follow a motion. The arm must be at rest at the start of the motion.
 
         Raises:
             Fault: The arm is moving, is not at the start, or did not plan the motion.
@@ -199,7 +199,7 @@ class SimArm:
 
     @property
     def _end_positions(self) -> Array:
-        """Joint positions `(n,)` [rad] at the end of the running motion, or of the command at rest."""
+        """Joint positions `(n,)` [rad] at the end of the running motion; the command if none runs."""
         return self._command if self._motion is None else self._motion.end
 
     def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:
@@ -210,7 +210,7 @@ class SimArm:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
     def _check_distance(self, q: Array, tolerance: float, text: str) -> None:
-        """Store a fault to be raised if a joint position differs from `q` by more than `tolerance` [rad]."""
+        """Store a fault for the next call if a joint position is over `tolerance` [rad] away from `q`."""
         errors = np.abs(self.q - q)
         joint = int(np.argmax(errors))
         if errors[joint] > tolerance:

@@ -25,7 +25,7 @@ def audit_bodies(
     held: int | None = None,
     dropped: Collection[int] = (),
 ) -> dict[str, int]:
-    """Return the counts of `executive.cells.audit.audit_objects` for the bodies of a simulated world.
+    """Return the number of bodies of a simulated world by outcome, as `audit_objects` defines them.
 
     Args:
         world: The simulated world at the end of the run.
@@ -47,7 +47,7 @@ def audit_bodies(
             else:
                 label, position = world.bodies[body], world.get_object_pose(body).position
             bin = _find_bin(position, bins)
-            # If a resumed run first detects an item in a bin, its first position is the bin's centre.
+            # An item that a resumed run detects in a bin has the bin's centre as its first position.
             positions = [*positions, bins[bin].position] if bin else positions
             yield FinalObject(label, bin, positions, body in dropped, body == held, is_removed)
 

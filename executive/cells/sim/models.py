@@ -28,7 +28,7 @@ ROLLING_FRICTION = 0.0005
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh in the frame O of an upright object, which `compute_upright_pose` defines; z points up.
+    """A triangle mesh in the upright frame O of its object (see `compute_upright_pose`); z points up.
 
     Attributes:
         vertices: Positions of the vertices `(N, 3)` [m].
@@ -75,7 +75,7 @@ class Mesh:
 
 
 def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
-    """Add an object with the frame O of the upright object at `X_WO`, and return the body.
+    """Add an object and return its body; `X_WO` is the pose of its upright frame O in the world.
 
     Raises:
         InputError: The model is missing or invalid.
@@ -95,7 +95,7 @@ def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
 
 
 def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
-    """Add a mesh of uniform density and return its body; groups collide as convex hulls, enlarged by 1 mm."""
+    """Add a mesh of uniform density and return its body; each group collides as its convex hull + 1 mm."""
     shape = {"fileName": str(find_model(config.mesh)), "meshScale": [config.scale] * 3}
     centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
     return int(
@@ -124,7 +124,7 @@ def object_class_with_mass(label: str, config: ObjectConfig) -> ObjectClass:
 
 
 def find_missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each model of a cell file that is missing, invalid, or of another size."""
+    """Yield key and message for each model of a cell file that is missing, invalid, or of a wrong size."""
     for label, section in config.objects.items():
         key: KeyPath = ("objects", label)
         try:
@@ -162,8 +162,8 @@ def _find_wrong_sizes(label: str, section: ObjectConfig) -> Iterator[tuple[str, 
 def compute_upright_pose(config: ObjectConfig) -> Pose:
     """Return `X_OL`, the pose of the frame L of the model file in the frame O of the upright object.
 
-    The origin of O is that of a URDF. For a mesh, whose origin is arbitrary, it is the centre of the bounding
-    box.
+    For a URDF, O has the origin of the file. For a mesh, whose origin is arbitrary, the origin of O is the
+    centre of the bounding box.
     """
     X_OL = Pose(_make_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
     if not config.mesh:

@@ -50,7 +50,7 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
 
 
 def find_unusable_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each pose of the cell file without clearance or view.
+    """Yield key and message for each named pose, scan pose and bin that violates clearance or view.
 
     In each named pose, arm and tool must keep the margin to table, bins and the arm itself, because otherwise
     no motion can end in the pose. From each scan pose the camera must see the whole workspace.

@@ -14,7 +14,7 @@ from executive.cell.config import ToolConfig
 from executive.geometry import Array, Pose
 
 RIM_RAY_COUNT = 16
-"""Number of rays on the rim of the cup; a ring at half the radius has half as many, and the centre one."""
+"""Number of rays on the rim of the cup; a ring at half the radius has half as many; the centre has one."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def measure_contact(
 
     Rays along the tool axis hit the collision shapes of `bodies` and pass through all other bodies. They
     start at the distance `reach` behind the lip, because a cup in contact penetrates the surface a little.
-    They end `reach` plus the diameter of the cup in front of the lip; no lip seals on a steeper surface.
+    They end `reach` plus the diameter of the cup in front of the lip; no lip seals on slopes over 45 deg.
 
     Args:
         client: The pybullet client of the bodies.

@@ -29,7 +29,7 @@ class CheckContext:
         skills: Installed skills by name.
         node_classes: Installed control nodes by keyword.
         cell: Content of the cell file, or None if the file has errors.
-        classes_by_detector: Classes that each detector of the cell can detect; None for unknown classes.
+        classes_by_detector: Classes that each detector of the cell can detect; None if unknown.
         min_times: Lower bounds of the times of actions in the cell, or None if unknown.
     """
 
@@ -81,7 +81,7 @@ class CheckContext:
 
     @cached_property
     def library_uses_by_path(self) -> Mapping[str, UseNode]:
-        """The `use` in the mission file that contains each node of a library, by the path of the node."""
+        """For the path of each node of a library, the `use` in the mission file that includes the node."""
         uses: dict[str, UseNode] = {}
 
         def walk(node: Node, use: UseNode | None) -> None:

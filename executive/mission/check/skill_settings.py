@@ -69,7 +69,7 @@ def _check_value(
 def _find_unknown_names(
     context: CheckContext, node: SkillNode, declared: Param | Port, value: Literal
 ) -> Iterator[Finding]:
-    """Yield an error for every name of a bin, class, pose or detector in a constant that the cell lacks."""
+    """Yield an error for each constant that names a bin, class, pose or detector that the cell lacks."""
     if declared.refers not in context.cell_names_by_kind or value.value == declared.default:
         return
     choices = declared.choices if isinstance(declared, Param) else None
@@ -85,7 +85,7 @@ def _find_unknown_names(
 
 
 def find_param_problem(param: Param, value: object) -> tuple[str, str]:
-    """Return the code of the error and its message after the name of the param; two texts "" if valid."""
+    """Return the error code, and the message without the name of the param; ("", "") if valid."""
     try:
         converted = convert_value(value, param.type)
     except WrongType as problem:
@@ -96,7 +96,7 @@ def find_param_problem(param: Param, value: object) -> tuple[str, str]:
         return "out-of-range", f"must be at least {param.ge:g}{unit}, not {describe_value(value)}"
     if number is not None and param.le is not None and number > param.le:
         return "out-of-range", f"must be at most {param.le:g}{unit}, not {describe_value(value)}"
-    # The choices of a param for names in the cell are additional values, which _find_unknown_names checks.
+    # If a param refers to names of the cell, `choices` allows more values; `_find_unknown_names` checks both.
     if param.choices is not None and not param.refers and converted not in param.choices:
         allowed = " or ".join(
             f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in param.choices

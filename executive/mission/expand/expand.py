@@ -25,7 +25,7 @@ _MAX_DEPTH = 40
 _MAX_NODE_COUNT = 5000
 """Maximum number of expanded nodes."""
 _CALLER_PREFIX = "^"
-"""Prefix of the variables of a caller in arguments, while the local variables of the subtree are renamed."""
+"""Temporary prefix that protects variables of the caller while local variables of the subtree are renamed."""
 
 ValuesByName = Mapping[str, Value]
 """Values of params and arguments by name."""
@@ -83,7 +83,7 @@ class _Expander:
         self.params: ValuesByName = {name: param.value for name, param in mission.params.items()}
         self.findings: list[Finding] = []
         self.used_names: set[str] = set()
-        # Subtree, or "" for the mission, and name of each referenced param or argument.
+        # Referenced params and arguments as (subtree, name); the subtree is "" for a param of the mission.
         self._referenced: set[tuple[str, str]] = set()
         self._node_count = 0
         self._outermost_mark: Mark | None = None
@@ -197,7 +197,7 @@ class _Expander:
         return replace(use, body=body, returned_variables=tuple(returns.values()))
 
     def _rename_variables(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
-        """Return the body with unique names of local and the caller's names of returned variables."""
+        """Return the body: local variables get unique names, returned variables the names of the caller."""
         number = self._use_counts[use.name]
         prefix = f"{use.name}." if number == 1 else f"{use.name}-{number}."
         written = find_written_variables(body, self.skills)

@@ -48,7 +48,7 @@ def _assign_path(node: Node, parent: str, slot: str, name: str | None = None) ->
     """Return the node with its path and the paths of its descendants.
 
     `parent` is the path of the parent, and `slot` the key of the parent that contains the node, or "". By
-    default, `name` is the name of the node, and a bare list has no name.
+    default, `name` is the name of the node; a list without a keyword has no name.
     """
     path = _join(parent, slot)
     if name is not None or not _is_list(node):
@@ -72,7 +72,7 @@ def _assign_value_paths(
     """
     values: dict[str, KeyValue] = {}
     for key, value in iterate_keys(owner):
-        # The child of a section under `do` has the slot of the section.
+        # The key `do` of a section adds nothing to the path of its child.
         slot = section_slot if section_slot and key.name == "do" else _join(section_slot, key.name)
         if isinstance(value, Node):
             value = _assign_path(value, path, slot if key.is_in_path or _is_list(value) else "")

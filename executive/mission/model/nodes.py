@@ -18,7 +18,7 @@ class Node:
     """Base class of the nodes.
 
     Attributes:
-        mark: Position of the skill, keyword or subtree name of the node; for a bare list, of the list.
+        mark: Position of the skill, keyword or subtree name of the node; for a plain list, of the list.
         label: Value of `as:`, or "".
         label_mark: Position of the label, or None.
         path: Unique path from the root of the expanded tree; "" before expansion.
@@ -48,7 +48,7 @@ class SkillNode(Node):
     Attributes:
         skill: Name of the skill.
         settings: Values of params and ports in the mission, by name.
-        variables_by_port: Variables of ports without setting; by default a port has a variable of its name.
+        variables_by_port: Variables of the ports that the mission does not set; by default the port's name.
     """
 
     skill: str
@@ -114,7 +114,7 @@ class UseNode(Node):
     Attributes:
         name: Name of the subtree.
         arguments: Values of the arguments, by name.
-        returns: Variables of the caller for returned variables, by the name in the subtree.
+        returns: Variables of the caller that receive returned variables, by their names in the subtree.
         returned_variables: Variables of the caller that the subtree returns; () before expansion.
         body: Expanded subtree; None before expansion.
     """

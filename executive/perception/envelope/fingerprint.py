@@ -12,7 +12,7 @@ from executive.perception.camera_model import compute_calibration
 from executive.perception.detectors.detector_registry import find_detector_kinds
 
 Fingerprint = Mapping[str, str]
-"""Value of each property as text, by name; a measurement applies to a detector if all values are equal."""
+"""Value of each property as text, by name; a measurement applies to detectors with an equal fingerprint."""
 
 
 def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerprint:

@@ -27,7 +27,7 @@ TIME_TOLERANCE = 1e-9
 ObjectChoice = int | Literal["node", "nearest"]
 """Choice of an object: its number, from 1; `nearest`: nearest to the tool; `node`: the object of the node.
 
-The object of a node is the true object of its item in the ledger; without an item, the nearest object.
+For `node`: the true object of the node's item in the ledger, or the nearest object if the node has no item.
 """
 
 
@@ -42,7 +42,7 @@ class FaultScene:
     Attributes:
         cell: The cell, as skills would see it without faults.
         emit: Emits events of the run.
-        motion: Start time [s] of the last motion, and the motion; None if there is none, or it was stopped.
+        motion: Start time [s] of the last motion, and the motion; None if none began, or it was stopped.
     """
 
     def __init__(self, workcell: Workcell, open_world: Callable[[Workcell], WorldAccess], emit: Emit) -> None:

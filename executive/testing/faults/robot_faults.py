@@ -1,6 +1,6 @@
 """Faults of arm, tool, camera, localizer, table and operator.
 
-An effect lasts as long as its fault, unless it happens once.
+Some effects occur once; every other effect lasts until its fault ends.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from executive.testing.faults.effect import Effect, Occurrence, validate_fractio
 
 
 def seal_fails() -> Effect:
-    """Return an effect: the suction cup cannot seal, and `Grasp` fails with `missed`; held objects stay."""
+    """Return an effect: the cup cannot seal, and `Grasp` fails with `missed`; held objects stay held."""
     return Effect("seal_fails", interceptors={"close": _return_constant}, arguments=(None,))
 
 

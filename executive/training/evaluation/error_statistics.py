@@ -24,17 +24,17 @@ class ErrorStatistics:
     """Counts of correct and wrong detections, and distances between detected and true positions.
 
     Args:
-        localizer: Computes the positions of detections; None: they are not compared with the true positions.
+        localizer: Computes the positions of detections; None: positions are not evaluated.
 
     Attributes:
         counts_by_object_count: Number of fully visible `objects`, of `missed` and `confused` ones, and of
             `false_detections`, by the number of objects in the image.
         confusion: Number of objects by true and detected class, each also `nothing`.
         centre_errors: Distances of the centres of correct detections from the true centres [pixel].
-        position_errors: Distances between these centres in the world, at the height of the object [mm]; only
-            of objects that lie completely in the searched region.
-        localization_errors: Distances from the true centres of these objects to the positions of the
-            localizer [mm].
+        position_errors: Distances between found and true centres in the world, at the object's height [mm];
+            only of objects that lie completely in the searched region.
+        localization_errors: Distances between true centres and positions of the localizer [mm], of the same
+            objects as `position_errors`.
     """
 
     def __init__(self, localizer: Localizer | None = None) -> None:

@@ -43,7 +43,7 @@ class LiveScene:
         self._server.initial_camera.position = CAMERA_POSITION
         self._server.initial_camera.look_at = CAMERA_TARGET
         self._server.gui.configure_theme(control_width="small", show_logo=False, show_share_button=False)
-        # The panel of viser is not used: the buttons are on the page.
+        # The control panel of viser is hidden: the page itself has the buttons.
         self._server.gui.main_panel.minimize()
         for number, shape in enumerate(shapes):
             if shape.body and shape.body not in self._bodies:
@@ -80,7 +80,7 @@ class LiveScene:
 
 @contextlib.contextmanager
 def _serve_on_unix_socket(path: Path) -> Iterator[None]:
-    """Make viser servers listen on a Unix socket if they are created in this context; viser has no option."""
+    """Make viser servers created in this context listen on a Unix socket; viser has no option for this."""
     serve = websockets.asyncio.server.serve
 
     def serve_on_socket(handler: Any, host: Any, port: Any, **options: Any) -> Any:
