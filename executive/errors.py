@@ -1,10 +1,12 @@
-"""Errors with exit codes, and functions that make text from users and servers safe for messages."""
+"""Error classes, and functions that make text from users and servers safe for messages."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+from executive.exit_codes import ExitCode
 
 MAX_QUOTATION_LENGTH = 200
 """Maximum length of a quotation or word in a message [characters]."""
@@ -24,7 +26,7 @@ class ExecutiveError(Exception):
         message: Description of the error; long quotations are shortened.
     """
 
-    exit_code = 3
+    exit_code = ExitCode.FAULT
     """Exit code of a command that ends with the error."""
 
     def __init__(self, message: str = "") -> None:
@@ -34,7 +36,7 @@ class ExecutiveError(Exception):
 class InputError(ExecutiveError):
     """An input of the user is invalid; the message states its position, the problem and a remedy."""
 
-    exit_code = 2
+    exit_code = ExitCode.INVALID_INPUT
 
 
 class Fault(ExecutiveError):

@@ -10,6 +10,7 @@ import click
 
 from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
+from executive.exit_codes import ExitCode
 
 
 def parse_fault_numbers(text: str) -> tuple[int, ...]:
@@ -80,6 +81,6 @@ def command(
             else:
                 results = campaign.run_fault_pairs(pairs) if pairs else campaign.run_single_faults()
                 value, text = results_to_json(results), format_results(results)
-                code = int(bool(results.failed_trials)) if results.complete else 130
+                code = int(bool(results.failed_trials)) if results.complete else ExitCode.HALTED
     print_json(value) if as_json else click.echo(text)
     ctx.exit(code)

@@ -17,6 +17,7 @@ import click
 
 from executive.cli.streams import use_tolerant_streams
 from executive.errors import ExecutiveError, shorten_quotations
+from executive.exit_codes import ExitCode
 from executive.run.signals import TERMINATION_SIGNALS, handle_signals
 
 PATH_ERROR_NUMBERS = (
@@ -24,8 +25,6 @@ PATH_ERROR_NUMBERS = (
     errno.EPERM, errno.EROFS,
 )  # fmt: skip
 """Error numbers of the operating system that are reported as an invalid path of the user."""
-INVALID_INPUT_CODE, FAULT_CODE, HALTED_CODE = 2, 3, 130
-"""Exit codes of a command that ends by an error or is halted."""
 
 COMMANDS = (
     "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep", "faults",
@@ -79,16 +78,16 @@ class CommandGroup(click.Group):
         sys.exit(code if isinstance(code, int) else 0)
 
 
-def _show_error(error: BaseException, *, debug: bool) -> int:
+def _show_error(error: BaseException, *, debug: bool) -> ExitCode:
     """Print the error that ended a command to stderr, and return the exit code."""
     if isinstance(error, click.ClickException):
         text = io.StringIO()
         error.show(text)
         click.echo(shorten_quotations(text.getvalue()), err=True, nl=False)
-        return INVALID_INPUT_CODE
+        return ExitCode.INVALID_INPUT
     if isinstance(error, (click.Abort, KeyboardInterrupt)):
         click.echo("halted", err=True)
-        return HALTED_CODE
+        return ExitCode.HALTED
     if debug:
         traceback.print_exception(error)
     if isinstance(error, ExecutiveError):
@@ -96,10 +95,10 @@ def _show_error(error: BaseException, *, debug: bool) -> int:
         return error.exit_code
     if isinstance(error, OSError) and error.filename and error.errno in PATH_ERROR_NUMBERS:
         click.echo(shorten_quotations(f"{error.filename}: {error.strerror}"), err=True)
-        return INVALID_INPUT_CODE
+        return ExitCode.INVALID_INPUT
     if not debug:
         click.echo(_save_traceback(error), err=True)
-    return FAULT_CODE
+    return ExitCode.FAULT
 
 
 def _save_traceback(error: BaseException) -> str:

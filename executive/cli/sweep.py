@@ -10,6 +10,7 @@ import click
 
 from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
+from executive.exit_codes import ExitCode
 
 
 def parse_seed_range(text: str) -> range:
@@ -72,7 +73,7 @@ def command(
         settings = {"mission": mission, "seeds": [seeds[0], seeds[-1]], "scene": scene and str(scene)}
         print_json({**settings, **summary, "results": to_json(results)})
     has_problem = summary["succeeded"] < summary["runs"] or bool(summary["disagreements"])
-    ctx.exit(130 if summary["cut_off"] else int(has_problem))
+    ctx.exit(ExitCode.HALTED if summary["cut_off"] else int(has_problem))
 
 
 def _describe_summary(summary: dict[str, Any]) -> str:

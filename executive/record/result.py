@@ -13,6 +13,7 @@ from executive.cell.json_values import to_json
 from executive.cell.workcell import PLACES
 from executive.errors import ExecutiveError, explain_os_errors
 from executive.events import RunResumed, TimedEvent
+from executive.exit_codes import ExitCode
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis import Diagnosis
 from executive.record.journal import find_end
@@ -31,9 +32,6 @@ MISTAKE_DESCRIPTIONS = {
     "unseen": "never seen",
 }
 """Description of each count of an audit that is a mistake, by its key in `PLACES`."""
-
-EXIT_CODE_BY_STATUS = {"SUCCESS": 0, "FAILURE": 1, "FAULT": 3, "INCOMPLETE": 4, "HALTED": 130}
-"""Exit code by the status of the run, if the audit agrees; see `find_exit_code`."""
 
 FINAL_STATUSES = ("SUCCESS", "FAILURE")
 """Statuses of a run that cannot be resumed: its tree has ended, and no item was rejected."""
@@ -140,7 +138,7 @@ def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result
         return result if (result.status, result.ticks) == (end.status, end.ticks) else None
     # If writing the end to the journal failed, only the result contains the end.
     is_resumed = any(isinstance(timed.event, RunResumed) for timed in events)
-    return result if result.status in EXIT_CODE_BY_STATUS and not is_resumed else None
+    return result if result.status in ExitCode.__members__ and not is_resumed else None
 
 
 def list_requests(timeline: Timeline) -> list[str]:
@@ -193,7 +191,8 @@ def describe_disagreement(result: Result) -> str:
     return "THE AUDIT DISAGREES: " + "; ".join(filter(None, (mistakes, comparison)))
 
 
-def find_exit_code(result: Result) -> int:
-    """Return the exit code of a run: code 1 replaces 0 and 4 if the audit disagrees with the ledger."""
-    code = EXIT_CODE_BY_STATUS[result.status]
-    return 1 if code in (0, 4) and describe_disagreement(result) else code
+def find_exit_code(result: Result) -> ExitCode:
+    """Return the exit code of a run: FAILURE replaces SUCCESS and INCOMPLETE if the audit disagrees."""
+    code = ExitCode[result.status]
+    has_unnoticed_error = code in (ExitCode.SUCCESS, ExitCode.INCOMPLETE) and describe_disagreement(result)
+    return ExitCode.FAILURE if has_unnoticed_error else code
