@@ -33,7 +33,7 @@ _CLASS_PATH = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
 _EXAMPLE_LINE = 'Wave = "my_package.wave:Wave"'
 
 
-def discover() -> dict[str, type[Skill]]:
+def load_skills() -> dict[str, type[Skill]]:
     """Return every skill of the entry-point group `executive.skills`, by name.
 
     Raises:

@@ -17,7 +17,7 @@ from executive.manipulation.tool_goals import (
     compute_lowest_contact,
     make_approach,
 )
-from executive.perception.evidence import describe_wrong_height, may_miss_top
+from executive.perception.evidence import describe_touch_contradiction, may_miss_top
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY_CONTACT_MARGIN = 0.001
@@ -78,7 +78,7 @@ class Approach(Skill):
             cell.ledger.invalidate_positions()
             collision = f"the tool touched something at {height * 1000:.0f} mm"
             raise self.failure("blocked", f"{collision} on its way to {item}, which was {expected}")
-        contradiction = describe_wrong_height(self.target.label, height, cell.classes)
+        contradiction = describe_touch_contradiction(self.target.label, height, cell.classes)
         is_near_top = height >= compute_lowest_contact(kind, middle, self.overtravel)
         may_have_missed = is_near_top and may_miss_top(self.target.label, height, cell.classes)
         if not cell.ledger.record_touch(item, contradiction, may_miss_top=may_have_missed):

@@ -8,7 +8,7 @@ from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
 from executive.manipulation.obstacles import count_used_slots
 from executive.manipulation.tool_goals import sort_pickable_targets
-from executive.perception.evidence import describe_unknown
+from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 
 
@@ -65,6 +65,6 @@ class SelectTarget(Skill):
         name = self.same or self.wanted or "object to sort"
         if self.same is None and cell.ledger.is_table_empty(self.wanted):
             empty = f"no {name} is left on the table, except rejected objects"
-            message = "; ".join(filter(None, (empty, describe_unknown(cell.ledger.unknown))))
+            message = "; ".join(filter(None, (empty, describe_unknown_labels(cell.ledger.unknown))))
             return self.failure("no_candidate", message)
         return self.failure("unseen", f"no {name} is in sight, but it is not certain that the table is empty")

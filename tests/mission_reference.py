@@ -24,7 +24,7 @@ from executive.mission.text.file_search import list_shipped_missions
 from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.rfdetr import RfdetrOptions
 from executive.perception.detectors.roboflow.server_options import RoboflowOptions
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.tree.keys import KeySection, Kind
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import load_control_nodes
@@ -64,7 +64,7 @@ def generate() -> str:
     chapters = {
         "Mission files": _mission_files(),
         "Control nodes": _control_nodes(),
-        "Skills": (part for name, skill in discover().items() for part in _skill(name, skill)),
+        "Skills": (part for name, skill in load_skills().items() for part in _skill(name, skill)),
         "Subtrees of library/sorting.yaml": _sorting_library(),
         "Shipped missions": _shipped_missions(),
         "Cell files": _model(CellConfig),

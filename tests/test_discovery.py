@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from executive.errors import InputError
-from executive.plugins import discover
+from executive.plugins import load_skills
 
 Install = Callable[..., None]
 
@@ -34,7 +34,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
 
 def test_it_is_found_by_its_name(install: Install) -> None:
     install("wave_one", HEAD + 'class Wave(Skill):\n    """Wave."""\n', Wave="Wave")
-    assert [(name, skill.__doc__) for name, skill in discover().items()] == [("Wave", "Wave.")]
+    assert [(name, skill.__doc__) for name, skill in load_skills().items()] == [("Wave", "Wave.")]
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def test_one_that_cannot_be_loaded_is_named_with_the_place(
 ) -> None:
     install(module, text, Wave="Wave")
     with pytest.raises(InputError) as caught:
-        discover()
+        load_skills()
     assert str(caught.value).startswith(f'the skill "Wave" ({module}:Wave) cannot be loaded: ')
     assert str(caught.value).endswith(f"; correct it, or uninstall the package {module}")
     caught.match(says)
@@ -61,4 +61,4 @@ def test_one_that_cannot_be_loaded_is_named_with_the_place(
 def test_what_is_no_skill_is_refused(install: Install) -> None:
     install("wave_seven", "Wave = 3\n", Wave="Wave")
     with pytest.raises(InputError, match=r'the entry point "Wave" \(wave_seven:Wave\) is not a Skill subcl'):
-        discover()
+        load_skills()

@@ -12,10 +12,10 @@ from executive.cell.frame import Box, Frame
 from executive.cell.objects import ObjectClass
 from executive.geometry import Array
 from executive.perception.evidence import (
-    describe_unknown,
-    describe_wrong_height,
-    describe_wrong_size,
-    describe_wrong_top,
+    describe_size_contradiction,
+    describe_top_contradiction,
+    describe_touch_contradiction,
+    describe_unknown_labels,
     may_miss_top,
 )
 from tests.camera_poses import looking_down
@@ -47,7 +47,7 @@ AREA: Box = (192.0, 100.0, 448.0, 356.0)
 def test_the_height_of_a_touch_has_to_be_that_of_the_class(
     label: str, height: float, contradiction: str
 ) -> None:
-    assert describe_wrong_height(label, height, CLASSES) == contradiction
+    assert describe_touch_contradiction(label, height, CLASSES) == contradiction
 
 
 @pytest.mark.parametrize(
@@ -71,12 +71,15 @@ def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(
 def test_the_size_of_a_box_has_to_be_that_of_the_class(side: float, contradiction: str) -> None:
     box = (319.5 - side / 2, 239.5 - side / 2, 319.5 + side / 2, 239.5 + side / 2)
     place = np.array([0.5, 0.0, 0.03])
-    assert describe_wrong_size(Detection("sphere", 0.9, box), place, FRAME, AREA, SPHERE) == contradiction
+    assert (
+        describe_size_contradiction(Detection("sphere", 0.9, box), place, FRAME, AREA, SPHERE)
+        == contradiction
+    )
 
 
 def test_a_box_at_the_border_of_the_searched_area_may_be_cut_off() -> None:
     cut = Detection("sphere", 0.9, (192.5, 230.0, 200.0, 240.0))
-    assert describe_wrong_size(cut, np.array([0.5, 0.3, 0.03]), FRAME, AREA, SPHERE) == ""
+    assert describe_size_contradiction(cut, np.array([0.5, 0.3, 0.03]), FRAME, AREA, SPHERE) == ""
 
 
 def test_a_box_that_the_arm_hides_in_part_is_not_compared() -> None:
@@ -85,7 +88,9 @@ def test_a_box_that_the_arm_hides_in_part_is_not_compared() -> None:
     box = (299.5, 219.5, 339.5, 259.5)
     seen = replace(FRAME, visible=behind)
     assert (
-        describe_wrong_size(Detection("sphere", 0.9, box), np.array([0.5, 0.0, 0.03]), seen, AREA, SPHERE)
+        describe_size_contradiction(
+            Detection("sphere", 0.9, box), np.array([0.5, 0.0, 0.03]), seen, AREA, SPHERE
+        )
         == ""
     )
 
@@ -102,7 +107,7 @@ def show_top(height: float, camera: float = 1.2) -> Frame:
 def describe_top(label: str, frame: Frame, box: Box = BOX) -> str:
     """Return how the top in a box contradicts the class of an object on the table."""
     place = np.array([0.5, 0.0, 0.025])
-    return describe_wrong_top(Detection(label, 0.9, box), place, frame, AREA, CLASSES)
+    return describe_top_contradiction(Detection(label, 0.9, box), place, frame, AREA, CLASSES)
 
 
 @pytest.mark.parametrize(
@@ -158,5 +163,5 @@ def test_the_tolerance_of_a_top_grows_with_the_square_of_the_distance() -> None:
 
 def test_unknown_labels_are_listed_with_their_counts() -> None:
     expected = "unknown: rubber-duck ×2, mug ×1"  # noqa: RUF001
-    assert describe_unknown({"rubber-duck": 2, "mug": 1}) == expected
-    assert describe_unknown({}) == ""
+    assert describe_unknown_labels({"rubber-duck": 2, "mug": 1}) == expected
+    assert describe_unknown_labels({}) == ""

@@ -29,7 +29,7 @@ from executive.mission.parse.cell_file import load_cell
 from executive.mission.schema.file_schemas import make_mission_schema
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml, to_python_value
-from executive.plugins import discover, load_cell_kind
+from executive.plugins import load_cell_kind, load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
 from executive.tree.node_registry import load_control_nodes
@@ -65,7 +65,7 @@ def assert_does_its_work(loaded: LoadedMission) -> None:
     # A detector behind a server cannot be measured here.
     assert [one for one in loaded.warnings if one.code != "not-measured"] == []
     options = RunOptions(0, [*loaded.routes], kind=FakeCell)
-    run = assemble(loaded, discover(), options, [in_time])
+    run = assemble(loaded, load_skills(), options, [in_time])
     try:
         outcome = run.execute()
         assert (outcome.status, outcome.message) == ("SUCCESS", "")
@@ -79,27 +79,27 @@ def assert_does_its_work(loaded: LoadedMission) -> None:
 
 @pytest.mark.parametrize("name", MISSIONS)
 def test_every_mission_of_the_mission_guides_does_its_work(name: str, folder: Path) -> None:
-    assert_does_its_work(load_mission(name, discover(), find_cell_kind=load_cell_kind))
+    assert_does_its_work(load_mission(name, load_skills(), find_cell_kind=load_cell_kind))
 
 
 def test_the_mission_on_the_front_page_does_its_work(tmp_path: Path) -> None:
     (block,) = (block for block in blocks("README.md") if block.language == "yaml")
     path = tmp_path / "shown.yaml"
     path.write_text(block.text, encoding="utf-8")
-    assert_does_its_work(load_mission(path, discover(), find_cell_kind=load_cell_kind))
+    assert_does_its_work(load_mission(path, load_skills(), find_cell_kind=load_cell_kind))
 
 
 @pytest.mark.parametrize("name", MISSIONS)
 def test_an_editor_marks_nothing_in_the_missions_of_the_mission_guides(name: str) -> None:
     root, _ = parse_yaml(Source(name, FILES[name].text))
     assert root is not None
-    jsonschema.validate(to_python_value(root), make_mission_schema(discover(), load_control_nodes()))
+    jsonschema.validate(to_python_value(root), make_mission_schema(load_skills(), load_control_nodes()))
 
 
 @pytest.mark.parametrize("name", MISTAKES)
 def test_every_mistake_of_the_mission_guides_is_found(name: str, folder: Path) -> None:
     with pytest.raises(MissionError):
-        load_mission(name, discover(), find_cell_kind=load_cell_kind)
+        load_mission(name, load_skills(), find_cell_kind=load_cell_kind)
 
 
 @pytest.mark.parametrize(("words", "printed"), TRANSCRIPTS)
@@ -186,7 +186,7 @@ def test_the_skill_to_copy_works(fake: FakeCell, tmp_path: Path) -> None:
 
 def test_the_skill_on_the_front_page_declares_what_the_shipped_one_does(tmp_path: Path) -> None:
     (text,) = (block.text for block in shown("python") if "class Grasp" in block.text)
-    shown_skill, shipped = module_of(text, tmp_path / "grasp.py").Grasp, discover()["Grasp"]
+    shown_skill, shipped = module_of(text, tmp_path / "grasp.py").Grasp, load_skills()["Grasp"]
     assert (shown_skill.params, shown_skill.reasons) == (shipped.params, shipped.reasons)
     assert list(shown_skill.ports) == list(shipped.ports)
 

@@ -10,7 +10,7 @@ import pytest
 
 from executive.errors import InputError
 from executive.perception.detectors.detector_registry import find_detector_kinds
-from executive.plugins import discover, list_entries, load_cell_kind
+from executive.plugins import list_entries, load_cell_kind, load_skills
 
 Write = Callable[..., Path]
 Install = Callable[[str, str], None]
@@ -57,7 +57,7 @@ def packages(
 
 def test_a_skill_of_the_project_is_found_beside_the_installed_ones(project: Write) -> None:
     project("hall_one", WAVE, skills='Wave = "hall_one.part:Wave"')
-    found = discover()
+    found = load_skills()
     assert found["Wave"].__doc__ == "Wave."
     assert "Grasp" in found
     assert list(found) == sorted(found)
@@ -84,7 +84,7 @@ def test_kinds_of_cells_and_detectors_are_found_likewise(project: Write) -> None
 @pytest.mark.parametrize(
     ("group", "kind", "ask"),
     [
-        ("skills", "skill", discover),
+        ("skills", "skill", load_skills),
         ("cells", "kind of cell", lambda: load_cell_kind("wave")),
         ("detectors", "kind of detector", lambda: find_detector_kinds()["wave"].load()),
     ],
@@ -106,7 +106,7 @@ def test_one_name_is_registered_once(project: Write, packages: Install) -> None:
     project("hall_six", WAVE, skills='Wave = "hall_six.part:Wave"')
     packages("other", "Wave = other:Wave")
     with pytest.raises(InputError) as caught:
-        discover()
+        load_skills()
     assert str(caught.value) == (
         'the skill "Wave" is registered twice, by hall_six.part:Wave and other:Wave; '
         "uninstall or rename one of them"
@@ -123,6 +123,6 @@ def test_of_a_project_that_is_installed_its_file_counts(project: Write, packages
 
 def test_this_repository_registers_nothing_twice(missions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(missions)
-    here = discover()
+    here = load_skills()
     monkeypatch.chdir("/")
-    assert here == discover()
+    assert here == load_skills()

@@ -16,10 +16,10 @@ from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import list_choices
-from executive.perception.detectors.detector_registry import find_problems
+from executive.perception.detectors.detector_registry import find_detector_problems
 from executive.perception.envelope.fingerprint import compute_fingerprint
 from executive.perception.envelope.measurement import (
-    SUFFIX,
+    MEASUREMENT_SUFFIX,
     ErrorCounts,
     Measurement,
     format_measurements,
@@ -137,7 +137,7 @@ def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: 
         )
     if renders_scenes and cell:
         load_scene(scene, cell)
-    for (_, name, *_), sentence in find_problems(detector.configs, detector.base):
+    for (_, name, *_), sentence in find_detector_problems(detector.configs, detector.base):
         raise InputError(f"detector {name}: {sentence}")
 
 
@@ -233,7 +233,7 @@ def store_evaluation(
         InputError: The detector gave no usable answer to any image, or the file cannot be read or written.
     """
     assert detector.cell is not None
-    path = out or detector.base / f"{detector.cell.cell}{SUFFIX}"
+    path = out or detector.base / f"{detector.cell.cell}{MEASUREMENT_SUFFIX}"
     if evaluation.reliability is None:
         raise InputError(
             f"detector {detector.name} gave no usable answer: {evaluation.why}; nothing was measured"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from executive.cell.workcell import Workcell
 from executive.errors import InputError
 from executive.mission.load import LoadedMission, load_mission
-from executive.plugins import discover, load_cell_kind
+from executive.plugins import load_cell_kind, load_skills
 from executive.skill import Skill
 
 
@@ -49,7 +49,7 @@ def load_mission_under_test(
     Raises:
         InputError: The mission does not exist or has errors, or the cell of an `oracle` is not simulated.
     """
-    skills = discover()
+    skills = load_skills()
     loaded = load_mission(mission, skills, overrides, load_cell_kind)
     kind = loaded.cell_config.kind
     if not oracle:

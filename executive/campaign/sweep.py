@@ -63,12 +63,12 @@ def run_sweep(
 def run_job(job: Job) -> Result:
     """Execute one run, write its record and its report, and return its result."""
     from executive.mission.load import load_mission
-    from executive.plugins import discover
+    from executive.plugins import load_skills
     from executive.record.recorded_run import RecordOptions, record_run
     from executive.run.assembly import RunOptions
     from executive.view.report.page import try_write_report
 
-    skills = discover()
+    skills = load_skills()
     loaded = load_mission(job.mission, skills, job.overrides)
     options = RunOptions(job.seed, scene=job.scene)
     result = record_run(loaded, skills, options, job.runs, RecordOptions(saves_pictures=job.saves_pictures))

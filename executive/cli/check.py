@@ -31,9 +31,9 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
         from executive.errors import InputError
         from executive.mission.findings import MAX_LISTED_FINDINGS, Finding
         from executive.mission.load import load_mission
-        from executive.plugins import discover, load_cell_kind
+        from executive.plugins import load_cell_kind, load_skills
 
-        skills = discover()
+        skills = load_skills()
         reports: list[dict[str, Any]] = []
         texts = []
         for mission in missions:

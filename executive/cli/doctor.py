@@ -133,9 +133,9 @@ def check_packages() -> Iterator[CheckResult]:
 def check_plugins() -> Iterator[CheckResult]:
     """Load all installed skills, kinds of cells and kinds of detectors."""
     from executive.perception.detectors import detector_registry
-    from executive.plugins import CELL_KIND_GROUP, discover, find_project, list_entries
+    from executive.plugins import CELL_KIND_GROUP, find_project, list_entries, load_skills
 
-    skills, project = discover(), find_project()
+    skills, project = load_skills(), find_project()
     kinds, detectors = list_entries(CELL_KIND_GROUP, "kind of cell"), detector_registry.find_detector_kinds()
     for entry in (*kinds.values(), *detectors.values()):
         entry.load()

@@ -27,13 +27,13 @@ def command(ctx: click.Context, run: str, mission_file: Path | None, runs: Path,
     differs; exit code 1 if there is one.
     """
     with keep_stdout_clean():
-        from executive.plugins import discover
+        from executive.plugins import load_skills
         from executive.record.journal import read_journal
         from executive.record.replayed_run import replay_run
         from executive.record.run_directory import find_run
 
         path = find_run(run, runs)
-        result = replay_run(path, read_journal(path / "journal.jsonl"), discover(), mission_file)
+        result = replay_run(path, read_journal(path / "journal.jsonl"), load_skills(), mission_file)
         end = ", all as recorded" if result.is_equal else f" as recorded, then {result.difference}"
         click.echo(f"{result.decisions} decisions{end} ({path})", err=True)
     if as_json:

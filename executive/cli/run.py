@@ -124,10 +124,10 @@ def _run_mission(
 ) -> Result:
     """Run a mission, record the run and return its result."""
     from executive.mission.load import load_mission
-    from executive.plugins import discover, load_cell_kind
+    from executive.plugins import load_cell_kind, load_skills
     from executive.record.recorded_run import record_run
 
-    skills = discover()
+    skills = load_skills()
     loaded = load_mission(mission, skills, overrides, load_cell_kind)
     for warning in loaded.warnings if record.views else ():
         click.echo(str(warning), err=True)
@@ -143,13 +143,13 @@ def _resume(
     name: str, run_options: RunOptions, runs: Path, record: RecordOptions
 ) -> tuple[Result, RunStarted]:
     """Resume an interrupted run; return its result and the event of its start."""
-    from executive.plugins import discover
+    from executive.plugins import load_skills
     from executive.record.journal import find_start, read_journal
     from executive.record.resumed_run import resume_run
     from executive.record.run_directory import find_run
 
     path = find_run(name, runs)
-    result = resume_run(path, discover(), run_options, record)
+    result = resume_run(path, load_skills(), run_options, record)
     return result, find_start(read_journal(path / "journal.jsonl"), path, "run the mission again")
 
 

@@ -23,7 +23,7 @@ def command(cell: bool, library: bool, journal: bool) -> None:
     with keep_stdout_clean():
         from executive.mission.schema.file_schemas import make_library_schema, make_mission_schema
         from executive.mission.schema.types import make_cell_schema
-        from executive.plugins import discover
+        from executive.plugins import load_skills
         from executive.record.journal_format import make_journal_schema
         from executive.tree.node_registry import load_control_nodes
 
@@ -31,6 +31,6 @@ def command(cell: bool, library: bool, journal: bool) -> None:
             schema = make_cell_schema() if cell else make_journal_schema()
         else:
             schema = (make_library_schema if library else make_mission_schema)(
-                discover(), load_control_nodes()
+                load_skills(), load_control_nodes()
             )
     print_json(schema)

@@ -42,9 +42,9 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
     with keep_stdout_clean():
         from executive.errors import InputError
         from executive.mission.findings import list_choices
-        from executive.plugins import discover
+        from executive.plugins import load_skills
 
-        skills = discover()
+        skills = load_skills()
         if name is not None and name not in skills:
             raise InputError(f'there is no skill "{name}". {list_choices(name, skills, "There are")}')
         if name is not None:

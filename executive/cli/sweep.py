@@ -54,11 +54,11 @@ def command(
         from executive.cell.json_values import to_json
         from executive.cli.progress import print_halt, show_progress
         from executive.mission.load import load_mission
-        from executive.plugins import discover, load_cell_kind
+        from executive.plugins import load_cell_kind, load_skills
         from executive.record.run_directory import check_runs_folder
 
         # The mission and the folder are checked here, so that an error is not reported for every seed.
-        loaded = load_mission(mission, discover(), overrides, load_cell_kind)
+        loaded = load_mission(mission, load_skills(), overrides, load_cell_kind)
         if scene is not None:
             from executive.cells.sim.scene_file import load_scene
 

@@ -70,10 +70,10 @@ def _load_outline(mission: str, overrides: dict[str, str]) -> tuple[str, Sequenc
     from executive.mission.build import build_tree
     from executive.mission.load import load_mission
     from executive.mission.outline import make_outline
-    from executive.plugins import discover
+    from executive.plugins import load_skills
     from executive.tree.blackboard import Blackboard
 
-    skills = discover()
+    skills = load_skills()
     loaded = load_mission(mission, skills, overrides)
     # The tree is not run, so that it needs only the clock of a cell.
     placeholder_cell = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))

@@ -15,7 +15,7 @@ from executive.cell.config import CameraConfig
 from executive.cell.frame import Box
 from executive.geometry import Array, Pose
 
-NEAR, FAR = 0.02, 5.0
+NEAR_PLANE, FAR_PLANE = 0.02, 5.0
 """Distances of the near and far clipping planes of rendered cameras [m]."""
 
 
@@ -131,7 +131,7 @@ def compute_view_matrix(X_WC: Pose) -> tuple[float, ...]:
 
 
 def compute_projection_matrix(
-    matrix: Array, region: Box, near: float = NEAR, far: float = FAR
+    matrix: Array, region: Box, near: float = NEAR_PLANE, far: float = FAR_PLANE
 ) -> tuple[float, ...]:
     """Return OpenGL's projection matrix for a region of an image: 16 numbers in column-major order.
 

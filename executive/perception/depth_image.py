@@ -27,7 +27,7 @@ MIN_VALID_FRACTION = 0.1
 """Minimum fraction of the evaluated pixels that must have a depth."""
 
 
-def measure_top(detection: Detection, frame: Frame) -> float:
+def measure_top_height(detection: Detection, frame: Frame) -> float:
     """Return the height above the table of the top of a detected object [m].
 
     Raises:

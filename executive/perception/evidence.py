@@ -14,7 +14,7 @@ from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.camera_model import project
-from executive.perception.depth_image import measure_top
+from executive.perception.depth_image import measure_top_height
 
 MAX_TOUCH_HEIGHT_ERROR = 0.003
 """Maximum difference between the height of a touch and the expected height of a class [m]; 52 touches of
@@ -42,13 +42,13 @@ MIN_BORDER_DISTANCE = 2.0
 """Boxes nearer to the border of the searched region may be truncated [pixel]."""
 
 
-def describe_unknown(counts: Mapping[str, int]) -> str:
+def describe_unknown_labels(counts: Mapping[str, int]) -> str:
     """Return the counts of boxes by unknown label as a text: `unknown: rubber-duck ×2`; "" if empty."""
     items = ", ".join(f"{label} ×{count}" for label, count in counts.items())  # noqa: RUF001
     return f"unknown: {items}" if items else ""
 
 
-def describe_wrong_height(label: str, height: float, classes: Mapping[str, ObjectClass]) -> str:
+def describe_touch_contradiction(label: str, height: float, classes: Mapping[str, ObjectClass]) -> str:
     """Return a sentence if the height of a touch contradicts a class, otherwise "".
 
     The object may stand on the table or on one object of any class.
@@ -95,7 +95,7 @@ def _compute_height_error(label: str, height: float, classes: Mapping[str, Objec
     return min((height - top for top in _list_tops(label, classes)), key=abs)
 
 
-def describe_wrong_top(
+def describe_top_contradiction(
     detection: Detection, position: Array, frame: Frame, area: Box, classes: Mapping[str, ObjectClass]
 ) -> str:
     """Return a sentence if the height of a top in the depth image contradicts a class, otherwise "".
@@ -113,7 +113,7 @@ def describe_wrong_top(
     if not _is_whole(detection, frame, area):
         return ""
     try:
-        top = measure_top(detection, frame)
+        top = measure_top_height(detection, frame)
     except NoDepth:
         return ""
     expected = _list_tops(detection.label, classes)
@@ -134,7 +134,7 @@ def _list_tops(label: str, classes: Mapping[str, ObjectClass]) -> list[float]:
     return sorted(classes[label].height + support for support in supports)
 
 
-def describe_wrong_size(
+def describe_size_contradiction(
     detection: Detection, position: Array, frame: Frame, area: Box, object_class: ObjectClass
 ) -> str:
     """Return a sentence if the size of a box contradicts a class, otherwise "".

@@ -14,8 +14,8 @@ from executive.cell.objects import ObjectClass
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.camera_model import compute_pixel_ray, intersect_plane
-from executive.perception.depth_image import measure_top
-from executive.perception.evidence import describe_wrong_size, describe_wrong_top
+from executive.perception.depth_image import measure_top_height
+from executive.perception.evidence import describe_size_contradiction, describe_top_contradiction
 
 HeightMethod = Callable[[Detection, Frame, ObjectClass], float]
 """Function that returns the height of the centre of a detected object [m], or raises NoDepth."""
@@ -88,9 +88,9 @@ class CellLocalizer:
         if any(bin.contains(position, BIN_THICKNESS) for bin in self.bins):
             return ""
         frame, area, kind = detections.frame, detections.area, self.classes[detection.label]
-        return describe_wrong_size(detection, position, frame, area, kind) or describe_wrong_top(
-            detection, position, frame, area, self.classes
-        )
+        return describe_size_contradiction(
+            detection, position, frame, area, kind
+        ) or describe_top_contradiction(detection, position, frame, area, self.classes)
 
 
 def build_localizer(
@@ -127,7 +127,7 @@ def _find_height_by_depth(detection: Detection, frame: Frame, kind: ObjectClass)
     Raises:
         NoDepth: The frame has no depth image, or too few depth values in the box.
     """
-    return measure_top(detection, frame) - kind.height / 2
+    return measure_top_height(detection, frame) - kind.height / 2
 
 
 def _find_height_by_ray(cast_ray: RayTest, detection: Detection, frame: Frame, kind: ObjectClass) -> float:

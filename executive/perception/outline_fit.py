@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.frame import Frame
 from executive.geometry import Array, Pose
-from executive.perception.camera_model import NEAR
+from executive.perception.camera_model import NEAR_PLANE
 
 MIN_SAMPLES = 60
 """Minimum number of visible samples for an estimate of the pose."""
@@ -32,7 +32,7 @@ SMOOTHING_STD = 1.0
 """Standard deviation of the Gaussian filter that smooths the image before the search for edges [pixel]."""
 MIN_CONTRAST = 4.0
 """Minimum difference between neighbouring pixels of the smoothed image at an edge [grey level]."""
-NEAR_RANGES, FAR_RANGES, SUPPORT_RANGE = (8, 4, 3), (16, 8, 4, 3), 2
+FIT_EDGE_DISTANCES, SEARCH_EDGE_DISTANCES, SUPPORT_EDGE_DISTANCE = (8, 4, 3), (16, 8, 4, 3), 2
 """Maximum distances between outline and edge [pixel]: in each iteration of a fit from the declared pose, in
 each iteration of a fit from a pose of the search grid, and for the support of a pose."""
 EDGE_STD = 2.0
@@ -41,7 +41,7 @@ MIN_OUTLIER_RESIDUAL = 0.5
 """Minimum residual of an edge that is treated as an outlier [pixel]."""
 PRIOR_STD = np.full(6, 0.1)
 """Prior standard deviations of the rotation vector [rad] and the translation [m]."""
-ROBUST_ITERATIONS = 8
+REWEIGHTING_ITERATIONS = 8
 """Number of iterations of the iteratively reweighted least squares."""
 TILTS_DEG, ROLLS_DEG = np.arange(-10.0, 11.0), np.arange(-8.0, 9.0, 4.0)
 """Rotations of the search grid about the axes x and y of the camera, and about the optical axis [degree]."""
@@ -49,7 +49,7 @@ AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
 """Translations of the search grid along the optical axis, as fractions of the mean distance of the bins."""
 MAX_REFINED_POSES = 6
 """Maximum number of poses of the search grid that are refined."""
-DOWNSCALING, SUBSAMPLING = 4, 4
+IMAGE_REDUCTION, SAMPLE_REDUCTION = 4, 4
 """Factors by which the image size and the number of samples are reduced for the search grid."""
 
 
@@ -77,7 +77,7 @@ class PoseFit(NamedTuple):
         offset: Rotation vector [rad] and translation [m] of the camera from its declared pose `(6,)`.
         covariance: Covariance of `offset` `(6, 6)`.
         samples: Samples of the outlines at this pose.
-        support: Fraction of the samples (0 to 1) with an edge within `SUPPORT_RANGE`.
+        support: Fraction of the samples (0 to 1) with an edge within `SUPPORT_EDGE_DISTANCE`.
     """
 
     offset: Array
@@ -93,7 +93,7 @@ class OutlineFitter:
         self._frame, self._bins = frame, bins
         self._image = cv2.GaussianBlur(frame.image, (0, 0), SMOOTHING_STD)
 
-    def refine(self, offset: Array, ranges: Sequence[int] = NEAR_RANGES) -> PoseFit | None:
+    def refine(self, offset: Array, ranges: Sequence[int] = FIT_EDGE_DISTANCES) -> PoseFit | None:
         """Return the fit that starts at an offset `(6,)`; None if too few samples or edges are visible."""
         covariance = np.diag(PRIOR_STD**2)
         for max_distance in ranges:
@@ -109,14 +109,14 @@ class OutlineFitter:
         return PoseFit(offset, covariance, samples, self.compute_support(offset))
 
     def compute_support(self, offset: Array) -> float:
-        """Return the fraction of the visible samples (0 to 1) with an edge within `SUPPORT_RANGE`."""
-        _, found = self._find_edges(self._find_visible_samples(offset), SUPPORT_RANGE)
+        """Return the fraction of the visible samples (0 to 1) with an edge within `SUPPORT_EDGE_DISTANCE`."""
+        _, found = self._find_edges(self._find_visible_samples(offset), SUPPORT_EDGE_DISTANCE)
         return float(found.mean()) if len(found) else 0.0
 
     def search(self) -> Iterator[PoseFit]:
         """Yield fits that start at the poses of the search grid with the strongest image edges."""
         small_image = cv2.resize(
-            self._image, None, fx=1 / DOWNSCALING, fy=1 / DOWNSCALING, interpolation=cv2.INTER_AREA
+            self._image, None, fx=1 / IMAGE_REDUCTION, fy=1 / IMAGE_REDUCTION, interpolation=cv2.INTER_AREA
         )
         small_image = cv2.GaussianBlur(small_image, (0, 0), SMOOTHING_STD).astype(np.float32)
         gradients = np.stack(
@@ -133,7 +133,10 @@ class OutlineFitter:
         ):
             return
         points, next_points, _ = _sample_outlines(self._bins, self._frame.X_WC, matrix)
-        points, next_points = X_CW.apply(points[::SUBSAMPLING]), X_CW.apply(next_points[::SUBSAMPLING])
+        points, next_points = (
+            X_CW.apply(points[::SAMPLE_REDUCTION]),
+            X_CW.apply(next_points[::SAMPLE_REDUCTION]),
+        )
         scored_offsets: list[tuple[float, Array]] = []
         for roll, axial_shift in itertools.product(ROLLS_DEG, AXIAL_SHIFTS):
             shift = np.array([0.0, 0.0, axial_shift * points[:, 2].mean()])
@@ -141,7 +144,7 @@ class OutlineFitter:
             rotations = np.stack([cv2.Rodrigues(vector)[0] for vector in rotation_vectors])
             pixels = _project((points - shift) @ rotations, matrix)
             normals = _compute_normals(_project((next_points - shift) @ rotations, matrix) - pixels)
-            small_pixels = np.floor(pixels / DOWNSCALING).astype(int)
+            small_pixels = np.floor(pixels / IMAGE_REDUCTION).astype(int)
             inside = ((small_pixels >= 0) & (small_pixels <= last)).all(axis=-1)
             columns, rows = np.moveaxis(small_pixels.clip(0, last), -1, 0)
             strength = np.abs((gradients[rows, columns] * normals[:, :, None]).sum(axis=-1)).sum(axis=-1)
@@ -150,7 +153,7 @@ class OutlineFitter:
             best = int(score.argmax())
             scored_offsets.append((float(score[best]), np.concatenate([rotation_vectors[best], shift])))
         for _, offset in sorted(scored_offsets, key=lambda pair: -pair[0])[:MAX_REFINED_POSES]:
-            fit = self.refine(offset, FAR_RANGES)
+            fit = self.refine(offset, SEARCH_EDGE_DISTANCES)
             if fit is not None:
                 yield fit
 
@@ -206,7 +209,7 @@ def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Ar
         box = np.array([[*sign, side] for side in (1, -1) for sign in signs])
         corners = bin.position + (0.0, 0.0, half[2]) + half * box
         in_camera = X_WC.inverse().apply(corners)
-        if np.any(in_camera[:, 2] < NEAR):
+        if np.any(in_camera[:, 2] < NEAR_PLANE):
             continue
         pixels = _project(in_camera, matrix)
         silhouette = cv2.convexHull(pixels.astype(np.float32), returnPoints=False)[:, 0].tolist()
@@ -224,7 +227,7 @@ def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Ar
 def _project(in_camera: Array, matrix: Array) -> Array:
     """Return the image positions `(..., 2)` [pixel] of points `(..., 3)` [m] in the camera frame."""
     p = in_camera @ matrix.T
-    return np.asarray(p[..., :2] / np.maximum(p[..., 2:], NEAR))
+    return np.asarray(p[..., :2] / np.maximum(p[..., 2:], NEAR_PLANE))
 
 
 def _compute_normals(directions: Array) -> Array:
@@ -255,7 +258,7 @@ def _solve_robustly(jacobian: Array, distances: Array, offset: Array, scale: flo
     Edges with residuals above `scale` [pixel], or above 1.5 times the median residual, get a low weight.
     """
     change, covariance = np.zeros(6), np.zeros((6, 6))
-    for _ in range(ROBUST_ITERATIONS):
+    for _ in range(REWEIGHTING_ITERATIONS):
         residuals = distances - jacobian @ change
         scale = max(MIN_OUTLIER_RESIDUAL, min(scale, 1.5 * float(np.median(np.abs(residuals)))))
         weighted = jacobian * ((1 + (residuals / scale) ** 2) ** -2)[:, None] / EDGE_STD**2

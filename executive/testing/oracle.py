@@ -27,7 +27,7 @@ from executive.cells.sim.models import load_mesh
 from executive.cells.sim.silhouette import compute_bounding_box
 from executive.cells.sim.world import World
 from executive.geometry import Array
-from executive.perception.camera_model import NEAR, project
+from executive.perception.camera_model import NEAR_PLANE, project
 from executive.perception.detectors.requests import PendingSearch
 
 ORACLE_CONFIDENCE = 0.9
@@ -95,7 +95,7 @@ class TruthCamera(SimCamera):
             mesh = load_mesh(self._world.models[body])
             outline = self._world.get_object_pose(body).apply(mesh.vertices)
             distances = X_WC.inverse().apply(outline)[:, 2]
-            if np.all(distances > NEAR):
+            if np.all(distances > NEAR_PLANE):
                 pixels = project(matrix, X_WC, outline)
                 outlines.append(_Outline(label, pixels, float(distances.mean())))
         return tuple(

@@ -14,7 +14,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import FaultInjected, NodeEnded, NodeStarted, Observer, RunEnded, TimedEvent
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
@@ -98,7 +98,7 @@ def run_mission(
         InputError: The mission does not exist, a pattern matches no node, or a substitute is no subclass of
             the skill that it replaces.
     """
-    skills = discover()
+    skills = load_skills()
     loaded = load_mission(mission, skills, set)
     events: list[TimedEvent] = []
 

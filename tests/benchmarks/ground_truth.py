@@ -21,7 +21,7 @@ from executive.ledger.item import State
 from executive.mission.load import load_mission
 from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.rated_detectors import build_rated_detectors
-from executive.plugins import discover, load_cell_kind
+from executive.plugins import load_cell_kind, load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.result import find_exit_code
@@ -271,7 +271,7 @@ def run_audited(
 def _run_in_this_process(
     mission: str, seed: int, runs: Path, scene: Path | None, detectors: DetectorMaker
 ) -> AuditedRun:
-    skills = discover()
+    skills = load_skills()
     loaded = load_mission(mission, skills, {}, load_cell_kind)
     maker = AuditedCellMaker(detectors)
     options = RunOptions(seed, kind=maker, scene=scene)

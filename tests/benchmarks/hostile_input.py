@@ -25,7 +25,7 @@ import click
 
 from executive.cli.main import COMMANDS, main
 from executive.cli.options import seed_option
-from executive.plugins import discover
+from executive.plugins import load_skills
 from tests.benchmarks.hostile_files import Arguments, TextMaker, write_data_set, write_model, write_odd_paths
 from tests.benchmarks.report import Figures, run_command, show_progress
 
@@ -59,7 +59,7 @@ def measure(texts: int, data_sets: int, models: int, seed: int) -> Figures:
     """Run commands with hostile missions, cells, libraries, data sets, models and paths."""
     for name in COMMANDS:
         import_module(f"executive.cli.{name}")
-    discover()
+    load_skills()
     groups: list[tuple[str, int, Writer]] = [
         ("texts", texts, TextMaker().write),
         ("data sets", data_sets, write_data_set),

@@ -19,7 +19,7 @@ from executive.cells.sim.scene_file import load_scene
 from executive.cli.options import runs_option, workers_option
 from executive.cli.progress import print_halt, show_progress
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from tests.benchmarks.ground_truth import FAULT, HUNG, AuditedRun, run_audited
 from tests.benchmarks.report import Figures, limit_option, run_command, write_json
 from tests.benchmarks.scenes_outside import DECLARED, GROUPS, MISSIONS, Case, list_cases
@@ -123,7 +123,7 @@ def write_scene(case: Case, folder: Path) -> Path | None:
 @cache
 def _load_cell_of(mission: str) -> CellConfig:
     """Return the cell file of a mission."""
-    return load_mission(mission, discover()).cell_config
+    return load_mission(mission, load_skills()).cell_config
 
 
 def run_job(job: Job) -> Done:

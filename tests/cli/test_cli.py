@@ -54,7 +54,7 @@ def project(monkeypatch):
 
     monkeypatch.setattr("executive.mission.load.load_mission", load_mission)
     monkeypatch.setattr("executive.record.recorded_run.record_run", record_run)
-    monkeypatch.setattr("executive.plugins.discover", dict)
+    monkeypatch.setattr("executive.plugins.load_skills", dict)
     monkeypatch.setattr("executive.view.report.page.try_write_report", lambda run: ("runs/x/report.html", ""))
     return asked
 
@@ -66,7 +66,7 @@ def invoke(*words: str):
 def test_sigterm_ends_a_command_with_a_word_as_ctrl_c_does(project, monkeypatch):
     before = signal.getsignal(signal.SIGTERM)
     # While it still loads what it needs, long before a run listens.
-    monkeypatch.setattr("executive.plugins.discover", lambda: os.kill(os.getpid(), signal.SIGTERM))
+    monkeypatch.setattr("executive.plugins.load_skills", lambda: os.kill(os.getpid(), signal.SIGTERM))
     shown = invoke("run", "sort")
     assert (shown.exit_code, shown.stdout, shown.stderr) == (130, "", "\nhalted\n")
     assert signal.getsignal(signal.SIGTERM) is before
@@ -75,7 +75,9 @@ def test_sigterm_ends_a_command_with_a_word_as_ctrl_c_does(project, monkeypatch)
 def test_sigterm_that_is_to_be_ignored_is_ignored(project, monkeypatch):
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
-        monkeypatch.setattr("executive.plugins.discover", lambda: os.kill(os.getpid(), signal.SIGTERM) or {})
+        monkeypatch.setattr(
+            "executive.plugins.load_skills", lambda: os.kill(os.getpid(), signal.SIGTERM) or {}
+        )
         assert invoke("run", "sort").exit_code == 0
     finally:
         signal.signal(signal.SIGTERM, before)

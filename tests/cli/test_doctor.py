@@ -226,7 +226,7 @@ def test_everything_is_examined_whatever_fails(monkeypatch):
     def fail() -> None:
         raise InputError("the skill is broken; correct it")
 
-    monkeypatch.setattr("executive.plugins.discover", fail)
+    monkeypatch.setattr("executive.plugins.load_skills", fail)
     monkeypatch.setitem(sys.modules, "executive.perception.detectors.roboflow.key", None)
     monkeypatch.setattr(doctor, "measure_frame_time", lambda renderer: (9.0, ""))
     found = shown(doctor.run_checks())

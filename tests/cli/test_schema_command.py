@@ -10,15 +10,15 @@ from click.testing import CliRunner
 from executive.cli.main import main
 from executive.mission.schema.file_schemas import make_library_schema, make_mission_schema
 from executive.mission.schema.types import make_cell_schema
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.tree.node_registry import load_control_nodes
 
 
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        ([], make_mission_schema(discover(), load_control_nodes())),
-        (["--library"], make_library_schema(discover(), load_control_nodes())),
+        ([], make_mission_schema(load_skills(), load_control_nodes())),
+        (["--library"], make_library_schema(load_skills(), load_control_nodes())),
         (["--cell"], make_cell_schema()),
     ],
 )

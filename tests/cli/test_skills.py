@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Out, Skill, param, port
 
 
@@ -48,7 +48,7 @@ class Rest(Skill):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.plugins.discover", lambda: {"PlaceNeatly": PlaceNeatly, "Rest": Rest})
+    monkeypatch.setattr("executive.plugins.load_skills", lambda: {"PlaceNeatly": PlaceNeatly, "Rest": Rest})
 
 
 def shown(*words: str) -> Result:
@@ -129,6 +129,6 @@ def test_an_unknown_skill_is_refused_in_either_form():
 def test_every_installed_skill_can_be_described(monkeypatch):
     monkeypatch.undo()
     printed = json.loads(shown("--json").stdout)
-    assert [facts["name"] for facts in printed] == list(discover())
+    assert [facts["name"] for facts in printed] == list(load_skills())
     for facts in printed:
         assert shown(facts["name"]).stdout.startswith(f"{facts['name']}\n")

@@ -37,7 +37,7 @@ class Dream(Rest):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("executive.plugins.discover", lambda: {"Rest": Rest, "Nap": Nap, "Dream": Dream})
+    monkeypatch.setattr("executive.plugins.load_skills", lambda: {"Rest": Rest, "Nap": Nap, "Dream": Dream})
 
 
 def conform(*words: str) -> Result:

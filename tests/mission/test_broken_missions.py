@@ -21,7 +21,7 @@ from executive.cli.main import main
 from executive.cli.streams import keep_stdout_clean
 from executive.mission.findings import MEANING_BY_CODE, Finding, MissionError
 from executive.mission.load import FindCellKind, load_mission
-from executive.plugins import discover, load_cell_kind
+from executive.plugins import load_cell_kind, load_skills
 from executive.skill import Skill
 
 FOLDER = Path(__file__).parent / "broken"
@@ -60,7 +60,7 @@ def rendered(path: Path, findings: Iterable[Finding]) -> str:
 @pytest.fixture(scope="module")
 def look(shared_cells: None) -> Look:
     """What is wrong with a mission; each is loaded once."""
-    skills, kind = discover(), functools.cache(load_cell_kind)
+    skills, kind = load_skills(), functools.cache(load_cell_kind)
     return functools.cache(lambda path: findings_of(path, skills, kind))
 
 
@@ -118,5 +118,5 @@ def test_every_kind_of_finding_has_a_broken_mission() -> None:
 if __name__ == "__main__":
     os.chdir(FOLDER)
     with keep_stdout_clean():
-        texts = [rendered(path, findings_of(path, discover())) for path in BROKEN]
+        texts = [rendered(path, findings_of(path, load_skills())) for path in BROKEN]
     WORDS.write_text("".join(texts), encoding="utf-8")

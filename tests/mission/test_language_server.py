@@ -16,7 +16,7 @@ import pytest
 from editor import Editor
 
 from executive.mission.text.file_search import get_shipped_folder
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.tree.node_registry import load_control_nodes
 
 SERVER = os.environ.get("YAML_LANGUAGE_SERVER") or shutil.which("yaml-language-server")
@@ -40,8 +40,10 @@ def editor() -> Iterator[Editor]:
     editor.close()
 
 
-SKILLS = set(discover())
-WORDS = {name for name, skill in discover().items() if not any(p.is_required for p in skill.params.values())}
+SKILLS = set(load_skills())
+WORDS = {
+    name for name, skill in load_skills().items() if not any(p.is_required for p in skill.params.values())
+}
 """Skills that may stand for themselves."""
 
 REASONS = {"Detect.unsure", "Grasp.missed", "Transit.dropped"}

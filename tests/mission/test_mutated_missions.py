@@ -22,7 +22,7 @@ from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError
 from executive.mission.load import LoadedMission, load_mission
 from executive.mission.model.grammar import USE_KEYWORD
-from executive.plugins import discover, load_cell_kind
+from executive.plugins import load_cell_kind, load_skills
 from executive.run import assembly
 from executive.run.assembly import RunOptions, assemble
 from executive.skill import Skill
@@ -57,7 +57,7 @@ class Trial:
     problems: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.skills = discover()
+        self.skills = load_skills()
         self.mutator = Mutator(bases())
 
     def try_mutant(self, seed: int) -> None:
@@ -134,7 +134,7 @@ def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) ->
 
 @pytest.mark.parametrize("file", OWN_BASES, ids=lambda file: file.stem)
 def test_the_bases_of_the_mutants_pass_the_check(file: Path) -> None:
-    assert load_mission(file, discover(), find_cell_kind=load_cell_kind).mission.name == file.stem
+    assert load_mission(file, load_skills(), find_cell_kind=load_cell_kind).mission.name == file.stem
 
 
 def test_the_bases_of_the_mutants_use_every_control_node() -> None:

@@ -18,13 +18,13 @@ from executive.mission.schema.types import make_cell_schema
 from executive.mission.source import Source
 from executive.mission.text.file_search import get_shipped_folder
 from executive.mission.text.yaml_text import parse_yaml, to_python_value
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.skill import Skill
 from executive.tree.node_registry import load_control_nodes
 
 MISSIONS = get_shipped_folder()
 SCHEMAS: dict[str, tuple[Callable[[], dict[str, Any]], str]] = {
-    "mission.schema.json": (lambda: make_mission_schema(discover(), load_control_nodes()), ""),
+    "mission.schema.json": (lambda: make_mission_schema(load_skills(), load_control_nodes()), ""),
     "cells/cell.schema.json": (make_cell_schema, " --cell"),
 }
 """The generated files: how each is made, and the option that prints it."""
@@ -62,8 +62,8 @@ def test_the_shipped_schema_is_the_generated_one(name: str) -> None:
 @pytest.mark.parametrize(
     "schema",
     [
-        make_mission_schema(discover(), load_control_nodes()),
-        make_library_schema(discover(), load_control_nodes()),
+        make_mission_schema(load_skills(), load_control_nodes()),
+        make_library_schema(load_skills(), load_control_nodes()),
         make_cell_schema(),
     ],
     ids=FILES,
@@ -201,7 +201,7 @@ def test_what_the_schema_marks_is_an_error_of_check_too(
     "schema",
     [
         {"$ref": f"{FOLDER}/library/library.schema.json"},
-        make_library_schema(discover(), load_control_nodes()),
+        make_library_schema(load_skills(), load_control_nodes()),
     ],
     ids=["shipped", "printed"],
 )

@@ -21,8 +21,8 @@ from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell
 from executive.mission.load import load_mission
 from executive.perception.detectors.requests import PendingSearch
-from executive.perception.detectors.screening import make_screened_detectors
-from executive.plugins import discover, load_cell_kind
+from executive.perception.detectors.screening import screen_detectors
+from executive.plugins import load_cell_kind, load_skills
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.result import Result
 from executive.run.assembly import RunOptions
@@ -88,7 +88,7 @@ def _fake(config: Any, *, crowd: Mapping[str, Any], **given: Any) -> FakeCell:
         name: CrowdedDetector(name, detector, camera, fake.cell.clock, **crowd)
         for name, detector in config.detectors.items()
     }
-    fake.cell.detectors.update(make_screened_detectors(parts, fake.cell.classes))  # type: ignore[attr-defined]
+    fake.cell.detectors.update(screen_detectors(parts, fake.cell.classes))  # type: ignore[attr-defined]
     return fake
 
 
@@ -113,7 +113,7 @@ def run_crowded(
     runs: Path, kind: Callable[..., Workcell], mission: str = "sort_overhead"
 ) -> tuple[Result, str]:
     """Run a shipped mission and return its result and its journal."""
-    skills = discover()
+    skills = load_skills()
     loaded = load_mission(mission, skills, find_cell_kind=load_cell_kind)
     options = RunOptions(1, keyboard=False, kind=kind)
     result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))

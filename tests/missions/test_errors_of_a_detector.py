@@ -12,7 +12,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.cells.fake.noisy_detector import NoisyDetector
 from executive.mission.load import LoadedMission, load_mission
 from executive.perception.detectors.setting import DetectorSetting
-from executive.plugins import discover, load_cell_kind
+from executive.plugins import load_cell_kind, load_skills
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 
@@ -26,7 +26,7 @@ def loaded(tmp_path: Path, mission: str) -> LoadedMission:
     text = (MISSIONS / f"{mission}.yaml").read_text().replace("cells/overhead.yaml", "cells/noisy.yaml")
     path = tmp_path / f"{mission}.yaml"
     path.write_text(text)
-    return load_mission(path, discover(), find_cell_kind=load_cell_kind)
+    return load_mission(path, load_skills(), find_cell_kind=load_cell_kind)
 
 
 class Spoilt(FakeCell):
@@ -77,7 +77,7 @@ class Dropping(Spoilt):
 def test_everything_is_in_its_bin_and_the_books_are_right(
     tmp_path: Path, kind: type[FakeCell], seed: int
 ) -> None:
-    run = assemble(loaded(tmp_path, "sort_overhead"), discover(), RunOptions(seed, kind=kind))
+    run = assemble(loaded(tmp_path, "sort_overhead"), load_skills(), RunOptions(seed, kind=kind))
     try:
         outcome, items, audit = run.execute(), run.count_items(), dict(run.count_ground_truth() or {})
     finally:

@@ -13,7 +13,7 @@ from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.events import ItemChanged, MotionPlanned, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission, load_mission
-from executive.plugins import discover, load_cell_kind
+from executive.plugins import load_cell_kind, load_skills
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
@@ -42,7 +42,7 @@ class Done:
 @functools.cache
 def loaded(name: str) -> LoadedMission:
     """Return a shipped mission."""
-    return load_mission(MISSIONS[name], discover(), find_cell_kind=load_cell_kind)
+    return load_mission(MISSIONS[name], load_skills(), find_cell_kind=load_cell_kind)
 
 
 def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = FakeCell) -> Done:
@@ -56,7 +56,7 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
     # Where an operator is asked, every class is asked for until there can be none of it left.
     requests = [*mission.routes] * 6
     options = RunOptions(seed, requests, kind=kind)
-    run = assemble(mission, discover(), options, [observe])
+    run = assemble(mission, load_skills(), options, [observe])
     try:
         outcome = run.execute()
         return Done(
@@ -135,7 +135,7 @@ def test_no_kit_gets_a_part_twice_and_a_full_table_gives_two_whole_kits(seed: in
 @pytest.mark.parametrize("quota", [1, 3])
 def test_no_bin_gets_more_than_its_quota(quota: int) -> None:
     overrides = {"quota": str(quota), "cell.table.objects": "[6, 6]"}
-    done = execute(load_mission(MISSIONS["sort_by_priority"], discover(), overrides), 5)
+    done = execute(load_mission(MISSIONS["sort_by_priority"], load_skills(), overrides), 5)
     placed = [row.label for row in done.rows if row.bin]
     there = [row.label for row in done.rows]
     assert {label: placed.count(label) for label in placed} == {

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from executive.cell.config import CameraConfig
 from executive.cell.frame import Frame
 from executive.perception.camera_model import (
-    NEAR,
+    NEAR_PLANE,
     compute_calibration,
     compute_camera_matrix,
     compute_look_at_pose,
@@ -66,7 +66,7 @@ def test_a_point_is_found_again_on_the_plane_it_lies_in(X_WC, point):
 
 @given(cameras, points)
 def test_opengl_matrices_draw_a_point_where_it_is_projected(X_WC, point):
-    assume(X_WC.inverse().apply(point)[2] > NEAR)
+    assume(X_WC.inverse().apply(point)[2] > NEAR_PLANE)
     left, top, right, bottom = part = (100.0, 50.0, 356.0, 306.0)
     view = np.array(compute_view_matrix(X_WC)).reshape(4, 4).T
     clip = np.array(compute_projection_matrix(K, part)).reshape(4, 4).T @ view @ [*point, 1.0]

@@ -13,7 +13,7 @@ from executive.perception.detectors import detector_registry
 from executive.perception.detectors.detector_registry import (
     build_detectors,
     find_detectable_labels,
-    find_problems,
+    find_detector_problems,
 )
 
 INSTALLED = ", ".join(sorted(detector_registry.find_detector_kinds()))
@@ -59,7 +59,7 @@ def oracle_installed(monkeypatch):
 def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path):
     configs = {"first": DetectorConfig(kind="embedded"), "second": DetectorConfig(kind="yolo")}
     sentence = f'detector "second" is of kind "yolo", which is not installed; installed: {INSTALLED}'
-    assert list(find_problems(configs, tmp_path)) == [(("detectors", "second", "kind"), sentence)]
+    assert list(find_detector_problems(configs, tmp_path)) == [(("detectors", "second", "kind"), sentence)]
     with pytest.raises(InputError) as caught:
         build(second=configs["second"])
     assert str(caught.value) == sentence
@@ -67,7 +67,7 @@ def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path)
 
 def test_a_wrong_option_is_found_at_its_key(tmp_path):
     configs = {"mine": DetectorConfig(kind="rfdetr", model_path="m.onnx", labels=["cube"])}
-    ((keys, sentence),) = find_problems(configs, tmp_path)
+    ((keys, sentence),) = find_detector_problems(configs, tmp_path)
     assert keys == ("detectors", "mine", "model_path")
     assert sentence.startswith(f"there is no model file {tmp_path / 'm.onnx'}; check the path")
 
@@ -76,7 +76,7 @@ def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, ora
     configs = {kind: DetectorConfig(kind=kind) for kind in ("embedded", "oracle", "yolo")}
     known = find_detectable_labels(configs, tmp_path)
     assert known == {"embedded": ("cube", "sphere", "duck"), "oracle": None, "yolo": None}
-    assert [keys for keys, _ in find_problems(configs, tmp_path)] == [("detectors", "yolo", "kind")]
+    assert [keys for keys, _ in find_detector_problems(configs, tmp_path)] == [("detectors", "yolo", "kind")]
 
 
 def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypatch):

@@ -13,7 +13,7 @@ from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.errors import Crowded, Unavailable
 from executive.geometry import Pose
-from executive.perception.detectors.screening import MAX_BOXES, make_screened_detectors, screen_answer
+from executive.perception.detectors.screening import MAX_BOXES, screen_answer, screen_detectors
 
 RATES = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.7)
 VISIBLE = np.ones((20, 20), bool)
@@ -60,7 +60,7 @@ def raise_unavailable() -> Answer:
 )
 def test_an_unusable_answer_names_the_detector(result: Any, error: type[Exception], message: str) -> None:
     eye: Any = SimpleNamespace(request=lambda frame, view: SimpleNamespace(ready=True, result=result))
-    request = make_screened_detectors({"eye": eye}, ["cube"])["eye"].request(FRAME, "full")
+    request = screen_detectors({"eye": eye}, ["cube"])["eye"].request(FRAME, "full")
     with pytest.raises(error) as raised:
         request.result()
     assert str(raised.value) == message

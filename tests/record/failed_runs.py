@@ -9,7 +9,7 @@ from typing import Any
 from executive.cells.fake.cell import FakeCell
 from executive.events import RunEnded
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.diagnosis.diagnose import diagnose
 from executive.record.diagnosis.diagnosis import Diagnosis
 from executive.record.timeline.timeline import Timeline
@@ -56,10 +56,10 @@ class FailedRun:
         if "\n" in mission:
             file = Path("trial.yaml")
             file.write_text(HEAD + mission)
-        self.loaded = load_mission(file, discover(), overrides or {})
+        self.loaded = load_mission(file, load_skills(), overrides or {})
         self.timeline = Timeline(keeps_history=False)
         options = RunOptions(3, requests, kind=FakeCell)
-        self.run = assemble(self.loaded, discover(), options, [self.timeline])
+        self.run = assemble(self.loaded, load_skills(), options, [self.timeline])
         assert isinstance(self.run.workcell, FakeCell)
         self.fake = self.run.workcell
         if objects:
@@ -73,7 +73,7 @@ class FailedRun:
 
     def diagnose(self, end: RunEnded, is_at_rest: Callable[[], bool]) -> Diagnosis | None:
         """Return the diagnosis of the run, which has ended."""
-        return diagnose(self.timeline, end, self.loaded, discover(), Path(), is_at_rest)
+        return diagnose(self.timeline, end, self.loaded, load_skills(), Path(), is_at_rest)
 
     def at_every_step(self, do: Callable[[], None]) -> None:
         """Have something done after every control step."""

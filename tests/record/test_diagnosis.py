@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 
 from executive.cell.json_values import to_json
 from executive.events import OperatorAsked
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.diagnosis.diagnosis import Diagnosis
 
 CUBE = [("cube", 0.5, 0.1)]
@@ -91,7 +91,7 @@ def test_an_undeclared_reason_is_reported_at_the_line_of_its_skill() -> None:
     run = FailedRun(PICK, objects=CUBE)
 
     def seals() -> bool:
-        raise discover()["MoveToScan"]().failure("tired", "no more")
+        raise load_skills()["MoveToScan"]().failure("tired", "no more")
 
     run.fake.tool.can_seal = seals
     story = run.tell()

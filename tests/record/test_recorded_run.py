@@ -12,7 +12,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import RunEnded, RunStarted, TargetSelected
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.journal import Journal, read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.run.assembly import RunOptions
@@ -45,10 +45,10 @@ def run(bring_one, tmp_path, monkeypatch):
     monkeypatch.setattr(FakeCell, "close", lambda self: closed.append(self))
 
     def once(*views, **options):
-        loaded = load_mission(bring_one, discover())
+        loaded = load_mission(bring_one, load_skills())
         try:
             record = RecordOptions(views, **options)
-            return record_run(loaded, discover(), RunOptions(3, kind=FakeCell), tmp_path / "runs", record)
+            return record_run(loaded, load_skills(), RunOptions(3, kind=FakeCell), tmp_path / "runs", record)
         finally:
             assert len(closed) == 1
 

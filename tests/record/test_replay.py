@@ -18,7 +18,7 @@ from executive.events import (
     ToolCommanded,
 )
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import ReplayResult, compare_replay, replay_run
@@ -34,15 +34,15 @@ QUICK = "sort_overhead"
 
 
 def recorded(missions: Path, runs: Path, name: str, kind: Any = FakeCell) -> Path:
-    loaded = load_mission(missions / f"{name}.yaml", discover())
+    loaded = load_mission(missions / f"{name}.yaml", load_skills())
     requests = [*loaded.routes] * 4
     options = RunOptions(3, requests, kind=kind)
-    record_run(loaded, discover(), options, runs, RecordOptions(saves_pictures=False))
+    record_run(loaded, load_skills(), options, runs, RecordOptions(saves_pictures=False))
     return find_run("latest", runs)
 
 
 def again(path: Path, mission: Path | None = None) -> ReplayResult:
-    return replay_run(path, read_journal(path / "journal.jsonl"), discover(), mission)
+    return replay_run(path, read_journal(path / "journal.jsonl"), load_skills(), mission)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_the_first_other_decision_of_an_edited_mission_is_reported(missions: Pat
 
 
 def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
-    file, skills = missions / "sort_overhead.yaml", discover()
+    file, skills = missions / "sort_overhead.yaml", load_skills()
     four_times = [during("*/Grasp", seal_fails(), nth=(1, 2, 3, 4))]
     log = InputLog.from_events(run_mission(file, seed=3, faults=four_times).events)
     assert compare_replay(load_mission(file, skills), skills, log, 3).is_equal
@@ -104,12 +104,12 @@ def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Pat
 
 def test_a_directory_without_answers_cannot_be_replayed(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="can be replayed: its journal contains no inputs"):
-        replay_run(tmp_path, [], discover())
+        replay_run(tmp_path, [], load_skills())
 
 
 def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missions: Path) -> None:
     """What the record did not decide in a step that it ended was not decided."""
-    file, skills = missions / "sort_overhead.yaml", discover()
+    file, skills = missions / "sort_overhead.yaml", load_skills()
     cut = [timed for timed in run_mission(file, seed=3).events if timed.tick <= 600]
     missing = next(n for n, timed in enumerate(cut) if isinstance(timed.event, ToolCommanded))
     decided = NodeStarted | NodeEnded | BranchChosen | TargetSelected | ItemChanged | ToolCommanded

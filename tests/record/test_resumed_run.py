@@ -26,7 +26,7 @@ from executive.events import (
     ToolCommanded,
 )
 from executive.mission.load import LoadedMission, load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import replay_run
@@ -69,12 +69,12 @@ class Cutter:
 
 
 def load(missions: Path, name: str) -> LoadedMission:
-    return load_mission(missions / f"{name}.yaml", discover())
+    return load_mission(missions / f"{name}.yaml", load_skills())
 
 
 def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> Result:
     """Run a mission on the fake cell, asking for every class four times."""
-    skills, views = options.pop("skills", discover()), options.pop("views", ())
+    skills, views = options.pop("skills", load_skills()), options.pop("views", ())
     frames = options.pop("frames", False)
     run = RunOptions(SEED, [*loaded.routes] * 4, **{"kind": FakeCell, **options})
     return record_run(loaded, skills, run, runs, RecordOptions(views, saves_pictures=frames))
@@ -88,14 +88,14 @@ def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
 
 
 def resumed(path: Path, **options: Any) -> Result:
-    skills, views = options.pop("skills", discover()), options.pop("views", ())
+    skills, views = options.pop("skills", load_skills()), options.pop("views", ())
     run = RunOptions(SEED, **{"kind": FakeCell, **options})
     return resume_run(path, skills, run, RecordOptions(views, saves_pictures=False))
 
 
 def redecided(path: Path) -> str:
     """Decide the whole run once more, its cuts included, and return what differs."""
-    return replay_run(path, read_journal(path / "journal.jsonl"), discover()).difference
+    return replay_run(path, read_journal(path / "journal.jsonl"), load_skills()).difference
 
 
 def placed(path: Path) -> Counter[str]:
@@ -220,7 +220,7 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["Detect", "Grasp"])
 def test_a_run_that_a_bug_ended_resumes_after_the_repair(missions: Path, tmp_path: Path, name) -> None:
-    skills = discover()
+    skills = load_skills()
     buggy = {**skills, name: make_raising(skills[name], ZeroDivisionError("a bug"), delay_steps=3)}
     first = run_of(load(missions, "sort_overhead"), tmp_path, skills=buggy)
     assert (first.status, "a bug" in first.message) == ("FAULT", True)
@@ -346,7 +346,7 @@ def unwilling(lets_go: bool) -> Any:
 
 
 def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> None:
-    loaded = load_mission(missions / "sort_overhead.yaml", discover(), {"attempts": "1"})
+    loaded = load_mission(missions / "sort_overhead.yaml", load_skills(), {"attempts": "1"})
     first = run_of(loaded, tmp_path, kind=unwilling(lets_go=False))
     assert (first.status, first.items.placed, first.items.rejected) == ("INCOMPLETE", 5, 1)
     path = Path(first.run)

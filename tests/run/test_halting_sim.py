@@ -20,7 +20,7 @@ from executive.geometry import Array
 from executive.mission.load import load_mission
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.journal import Journal, read_journal
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
@@ -60,9 +60,9 @@ class Halt:
 def halt(missions: Path, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Halt:
     """Press Ctrl-C in the first motion after some control steps of a sort."""
     earliest, file = request.param, tmp_path_factory.mktemp("halt") / "journal.jsonl"
-    loaded = load_mission(missions / "sort_overhead.yaml", discover())
+    loaded = load_mission(missions / "sort_overhead.yaml", load_skills())
     journal = Journal(file)
-    run = assemble(loaded, discover(), RunOptions(2, kind=make_oracle_kind()), [journal])
+    run = assemble(loaded, load_skills(), RunOptions(2, kind=make_oracle_kind()), [journal])
     workcell = run.workcell
     assert isinstance(workcell, SimCell)
     client, arm, advance = workcell._world.client, workcell._arm, workcell.advance

@@ -19,7 +19,7 @@ from executive.cell.workcell import Workcell
 from executive.cells.fake.cell import FakeCell
 from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission, load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.trace import Trace
 from executive.run.assembly import RunOptions, assemble
 from executive.run.lookahead_planner import LookaheadPlanner
@@ -69,7 +69,7 @@ class Interleaved:
 @cache
 def skills() -> dict[str, type[Skill]]:
     """Find the skills once: the search leaves caches of Python's own behind."""
-    return discover()
+    return load_skills()
 
 
 @cache

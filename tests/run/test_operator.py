@@ -15,7 +15,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError, Stopped
 from executive.events import Event, NodeEnded, NodeStarted, OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.replayed_run import compare_replay
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions, assemble
@@ -132,14 +132,14 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
             os.kill(os.getpid(), signal.SIGINT)
 
     type_in("")
-    loaded = load_mission(missions / "pick_on_request.yaml", discover())
+    loaded = load_mission(missions / "pick_on_request.yaml", load_skills())
     events: list[TimedEvent] = []
-    run = assemble(loaded, discover(), RunOptions(1, kind=FakeCell), [events.append, interrupt])
+    run = assemble(loaded, load_skills(), RunOptions(1, kind=FakeCell), [events.append, interrupt])
     outcome = run.execute()
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
     ends = {one.event.status for one in events if isinstance(one.event, NodeEnded)}
     assert ends == {"INVALID"}, "nothing failed, and nobody quit"
-    again = compare_replay(loaded, discover(), InputLog.from_events(events), 1)
+    again = compare_replay(loaded, load_skills(), InputLog.from_events(events), 1)
     assert again.difference == ""
     assert again.decisions == sum(isinstance(one.event, NodeStarted | NodeEnded) for one in events) > 0
 

@@ -13,7 +13,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import Event, NodeEnded, RequestGiven, RunEnded, TimedEvent, ToolCommanded
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 
@@ -22,9 +22,9 @@ def make(
     missions: Path, name: str = "sort_overhead", seed: int = 3, **options: Any
 ) -> tuple[Run, list[Event]]:
     events: list[Event] = []
-    loaded = load_mission(missions / f"{name}.yaml", discover())
+    loaded = load_mission(missions / f"{name}.yaml", load_skills())
     observers = [events.append, *options.pop("observers", [])]
-    return assemble(loaded, discover(), RunOptions(seed, kind=FakeCell, **options), observers), events
+    return assemble(loaded, load_skills(), RunOptions(seed, kind=FakeCell, **options), observers), events
 
 
 def fake_of(run: Run) -> FakeCell:
@@ -110,11 +110,11 @@ def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> No
 
 
 def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> None:
-    loaded = load_mission(missions / "sort_overhead.yaml", discover(), {"cell.kind": "hardware"})
+    loaded = load_mission(missions / "sort_overhead.yaml", load_skills(), {"cell.kind": "hardware"})
     with pytest.raises(
         InputError, match='no installed package offers cells of kind "hardware"; installed: fake, sim'
     ):
-        assemble(loaded, discover(), RunOptions(1))
+        assemble(loaded, load_skills(), RunOptions(1))
 
 
 def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(missions: Path) -> None:

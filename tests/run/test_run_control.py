@@ -11,15 +11,15 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault
 from executive.events import Event, FaultRaised, ItemChanged, RunEnded, TimedEvent
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
 from executive.run.run_control import RunControl
 
 
 def make(missions: Path, observer) -> Run:
-    loaded = load_mission(missions / "sort_overhead.yaml", discover())
-    return assemble(loaded, discover(), RunOptions(3, kind=FakeCell), [observer])
+    loaded = load_mission(missions / "sort_overhead.yaml", load_skills())
+    return assemble(loaded, load_skills(), RunOptions(3, kind=FakeCell), [observer])
 
 
 @pytest.mark.parametrize("steps", [0, 3])

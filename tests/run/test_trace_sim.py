@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.trace import Trace
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.oracle import make_oracle_kind
@@ -15,8 +15,8 @@ from executive.testing.oracle import make_oracle_kind
 
 def trace_of(missions: Path, seed: int) -> str:
     trace = Trace()
-    loaded = load_mission(missions / "sort_wrist.yaml", discover())
-    run = assemble(loaded, discover(), RunOptions(seed, kind=make_oracle_kind()), [trace])
+    loaded = load_mission(missions / "sort_wrist.yaml", load_skills())
+    run = assemble(loaded, load_skills(), RunOptions(seed, kind=make_oracle_kind()), [trace])
     try:
         assert run.execute().status == "SUCCESS"
     finally:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.skill import Skill
 from skills.approach import Approach
 from skills.detect import Detect
@@ -58,6 +58,6 @@ def test_the_least_time_follows_from_cell_and_params(
     assert skill.min_time(Least(), {**defaults(skill), **given}) == seconds
 
 
-@pytest.mark.parametrize("skill", discover().values())
+@pytest.mark.parametrize("skill", load_skills().values())
 def test_every_skill_can_be_asked_with_nothing_but_its_defaults(skill: type[Skill]) -> None:
     assert skill.min_time(Least(), defaults(skill)) >= 0.0

@@ -12,7 +12,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault, InputError
 from executive.events import RunEnded, RunStarted, TimedEvent
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults import FaultyCell, after, detector_dead, during, seal_fails
 from executive.testing.run_mission import run_mission
@@ -88,8 +88,8 @@ def test_without_disturbances_a_mission_goes_as_it_always_goes() -> None:
         return [one for one in events if not isinstance(one.event, FrameCaptured)]
 
     events: list[TimedEvent] = []
-    loaded, options = load_mission("sort_overhead", discover()), RunOptions(7, (), kind=FakeCell)
-    run = assemble(loaded, discover(), options, [events.append])
+    loaded, options = load_mission("sort_overhead", load_skills()), RunOptions(7, (), kind=FakeCell)
+    run = assemble(loaded, load_skills(), options, [events.append])
     run.execute()
     assert without_images(run_mission("sort_overhead", seed=7).events) == without_images(events)
 

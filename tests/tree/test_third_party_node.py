@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from executive.cli.main import main
 from executive.mission.findings import MissionError
 from executive.mission.load import load_mission
-from executive.plugins import discover, load_cell_kind
+from executive.plugins import load_cell_kind, load_skills
 from executive.testing.run_mission import MissionResult, run_mission
 
 RACE = '''
@@ -133,7 +133,7 @@ def run(tree: str) -> MissionResult:
 )
 def test_a_mission_that_uses_it_is_checked(project: Path, tree: str, code: str) -> None:
     with pytest.raises(MissionError) as caught:
-        load_mission(write(tree), discover(), find_cell_kind=load_cell_kind)
+        load_mission(write(tree), load_skills(), find_cell_kind=load_cell_kind)
     assert code in {finding.code for finding in caught.value.findings}
 
 

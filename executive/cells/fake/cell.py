@@ -27,7 +27,7 @@ from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
 from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import find_arm_errors
-from executive.perception.detectors.screening import make_screened_detectors
+from executive.perception.detectors.screening import screen_detectors
 from executive.perception.localization import build_localizer
 
 ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
@@ -117,7 +117,7 @@ class FakeCell(CellWithoutHardware):
             arm=self.arm,
             tool=self.tool,
             camera=self.camera,
-            detectors=make_screened_detectors(self.detectors, classes),
+            detectors=screen_detectors(self.detectors, classes),
             localizer=build_localizer("plane", classes, bins),
         )
 

@@ -16,7 +16,7 @@ from executive.perception.detectors.requests import ChangedRequest
 from executive.perception.detectors.setting import (
     DetectorSetting,
     OptionErrors,
-    find_wrong_options,
+    find_option_errors,
     read_options,
 )
 
@@ -68,7 +68,7 @@ class NoisyDetector:
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
         del base
-        invalid_options = list(find_wrong_options(NoisyOptions, config))
+        invalid_options = list(find_option_errors(NoisyOptions, config))
         yield from invalid_options
         if not invalid_options and config.options["of"] not in others:
             yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(others)}'

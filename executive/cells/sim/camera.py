@@ -21,8 +21,8 @@ from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
 from executive.perception.camera_check import describe_displacement
 from executive.perception.camera_model import (
-    FAR,
-    NEAR,
+    FAR_PLANE,
+    NEAR_PLANE,
     compute_calibration,
     compute_projection_matrix,
     compute_view_matrix,
@@ -77,7 +77,11 @@ class Render:
     def depth(self) -> Array:
         """Distances along the optical axis `(H, W)` [m], inf at pixels without a body."""
         with np.errstate(divide="ignore"):
-            distances = FAR * NEAR / (FAR - (FAR - NEAR) * self.depth_buffer.astype(np.float64))
+            distances = (
+                FAR_PLANE
+                * NEAR_PLANE
+                / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * self.depth_buffer.astype(np.float64))
+            )
         return np.where(self.depth_buffer < 1.0, distances, np.inf)
 
 
@@ -143,7 +147,7 @@ def add_depth_noise(depth: Array, config: DepthConfig, rng: np.random.Generator)
 
 def _compute_edge_mask(depth: Array, config: DepthConfig) -> Mask:
     """Return the mask `(H, W)` of the pixels near a discontinuity of the depth."""
-    finite = np.where(np.isfinite(depth), depth, FAR).astype(np.float32)
+    finite = np.where(np.isfinite(depth), depth, FAR_PLANE).astype(np.float32)
     kernel = np.ones((3, 3), np.uint8)
     edges = (cv2.dilate(finite, kernel) - cv2.erode(finite, kernel) > config.edge).astype(np.uint8)
     width = 2 * config.edge_width + 1

@@ -66,7 +66,9 @@ def build_detectors(
         raise
 
 
-def find_problems(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
+def find_detector_problems(
+    configs: Mapping[str, DetectorConfig], base: Path
+) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key in the cell file and an error message for each error that prevents a detector.
 
     A kind may check its options in a static method `check(config, base, others)`, where `others` are the

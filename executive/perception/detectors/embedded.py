@@ -11,7 +11,7 @@ from executive.perception.detectors.rfdetr import RfdetrDetector
 from executive.perception.detectors.setting import (
     DetectorSetting,
     OptionErrors,
-    find_wrong_options,
+    find_option_errors,
     read_options,
 )
 
@@ -37,7 +37,7 @@ class EmbeddedDetector(RfdetrDetector):
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each option in the cell file with an error message: this kind of detector has no options."""
         del base, others
-        yield from find_wrong_options(Section, config)
+        yield from find_option_errors(Section, config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:

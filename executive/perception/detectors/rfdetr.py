@@ -19,8 +19,8 @@ from executive.perception.detectors.requests import ThreadedDetector
 from executive.perception.detectors.setting import (
     DetectorSetting,
     OptionErrors,
-    find_wrong_class_map,
-    find_wrong_options,
+    find_class_map_errors,
+    find_option_errors,
     read_options,
 )
 from executive.perception.detectors.views import Region, search_regions
@@ -90,7 +90,7 @@ class RfdetrDetector(ThreadedDetector):
         The model is not loaded.
         """
         del others
-        wrong = list(find_wrong_options(RfdetrOptions, config))
+        wrong = list(find_option_errors(RfdetrOptions, config))
         yield from wrong
         if wrong:
             return
@@ -102,7 +102,7 @@ class RfdetrDetector(ThreadedDetector):
         except InputError as error:
             yield "labels", str(error)
             return
-        yield from find_wrong_class_map(config, options.class_map, names)
+        yield from find_class_map_errors(config, options.class_map, names)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:

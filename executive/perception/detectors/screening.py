@@ -87,9 +87,7 @@ class ScreenedDetector:
         )
 
 
-def make_screened_detectors(
-    detectors: Mapping[str, Detector], labels: Collection[str]
-) -> dict[str, Detector]:
+def screen_detectors(detectors: Mapping[str, Detector], labels: Collection[str]) -> dict[str, Detector]:
     """Return detectors with screened answers, by name; `labels` are the class names in the cell file."""
     return {name: ScreenedDetector(detector, name, labels) for name, detector in detectors.items()}
 

@@ -47,7 +47,7 @@ class DetectorSetting:
     get_detector: Callable[[str], Detector]
 
 
-def find_wrong_options(options: type[Section], config: DetectorConfig) -> OptionErrors:
+def find_option_errors(options: type[Section], config: DetectorConfig) -> OptionErrors:
     """Yield each missing, unknown or invalid option in the section of a detector, with an error message."""
     try:
         options.model_validate(config.options)
@@ -71,12 +71,12 @@ def read_options(options: type[OptionsT], config: DetectorConfig) -> OptionsT:
     Raises:
         InputError: An option is missing, unknown or invalid.
     """
-    for _, message in find_wrong_options(options, config):
+    for _, message in find_option_errors(options, config):
         raise InputError(message)
     return options.model_validate(config.options)
 
 
-def find_wrong_class_map(
+def find_class_map_errors(
     config: DetectorConfig, class_map: Mapping[str, str], labels: Collection[str]
 ) -> OptionErrors:
     """Yield the option `class_map` with an error message if it has a class that the model lacks."""

@@ -42,7 +42,7 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Finger
     }
 
 
-def describe_changes(measured: Fingerprint, current: Fingerprint) -> str:
+def list_changed_properties(measured: Fingerprint, current: Fingerprint) -> str:
     """Return the names of the properties that differ between two fingerprints, or ""."""
     return ", ".join(
         name for name in dict.fromkeys([*measured, *current]) if measured.get(name) != current.get(name)

@@ -49,7 +49,7 @@ class FrameRange(Section):
     blue: tuple[float, float]
 
     @staticmethod
-    def of(samples: Sequence[FrameStatistics]) -> FrameRange | None:
+    def compute(samples: Sequence[FrameStatistics]) -> FrameRange | None:
         """Return the ranges of the statistics of several frames; None if there are no frames."""
         if not samples:
             return None

@@ -14,7 +14,7 @@ from executive.cell.error_rates import ErrorRates
 from executive.errors import InputError
 from executive.perception.envelope.frame_statistics import FrameRange
 
-SUFFIX = ".measured.json"
+MEASUREMENT_SUFFIX = ".measured.json"
 """Suffix of a measurement file; the name of the cell comes before it."""
 MAX_FILE_SIZE = 1_000_000
 """Maximum size of a measurement file [byte]."""

@@ -14,13 +14,13 @@ from executive.errors import InputError
 from executive.perception.detectors.detector_registry import build_detectors, find_detector_kinds
 from executive.perception.detectors.requests import ChangedRequest
 from executive.perception.detectors.setting import ClosableDetector
-from executive.perception.envelope.fingerprint import compute_fingerprint, describe_changes
+from executive.perception.envelope.fingerprint import compute_fingerprint, list_changed_properties
 from executive.perception.envelope.frame_statistics import FrameRange, compute_frame_statistics
-from executive.perception.envelope.measurement import SUFFIX, Measurement, read_measurements
+from executive.perception.envelope.measurement import MEASUREMENT_SUFFIX, Measurement, read_measurements
 
 FAKE_KIND = "fake"
 """Kind of cell whose detectors are not measured, because they read the true positions of the objects."""
-MEASURING_MINUTES = 2
+MEASUREMENT_MINUTES = 2
 """Typical duration of a measurement on two cores [min]."""
 
 
@@ -116,7 +116,7 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
             envelopes[name] = DetectorEnvelope(match.rates.build_error_rates(threshold), match.frames)
             continue
         older = next((each for cell, each in stored if (cell, each.detector) == (config.cell, name)), None)
-        changes = describe_changes(older.fingerprint, current) if older else ""
+        changes = list_changed_properties(older.fingerprint, current) if older else ""
         cause = f"was measured before a change of {changes}" if changes else "was never measured in this cell"
         reason = f"detector {name} {cause}, so high error rates are assumed; {advise_measuring(config)}"
         envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([reason, *problems])))
@@ -125,7 +125,7 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
 
 def advise_measuring(config: CellConfig) -> str:
     """Return the advice to measure a detector, with the command: a clause for messages."""
-    return f"measure it with `executive evaluate --cell {config.cell}` (about {MEASURING_MINUTES} min)"
+    return f"measure it with `executive evaluate --cell {config.cell}` (about {MEASUREMENT_MINUTES} min)"
 
 
 def find_unmeasured_detectors(
@@ -150,9 +150,9 @@ def _read_all_measurements(folders: Sequence[Path]) -> tuple[list[tuple[str, Mea
     """Return all stored measurements, each with the name of its cell, and messages about unreadable files."""
     stored: list[tuple[str, Measurement]] = []
     problems = []
-    for file in (file for folder in folders for file in sorted(folder.glob(f"*{SUFFIX}"))):
+    for file in (file for folder in folders for file in sorted(folder.glob(f"*{MEASUREMENT_SUFFIX}"))):
         try:
-            stored += [(file.name.removesuffix(SUFFIX), each) for each in read_measurements(file)]
+            stored += [(file.name.removesuffix(MEASUREMENT_SUFFIX), each) for each in read_measurements(file)]
         except InputError as error:
             problems.append(str(error))
     return stored, problems

@@ -102,7 +102,7 @@ def evaluate(
         answered_by=dict(answer_counts),
         by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
         reliability=errors.estimate_error_rates(repeats),
-        frames=FrameRange.of(statistics_of_frames),
+        frames=FrameRange.compute(statistics_of_frames),
     )
 
 

@@ -11,7 +11,7 @@ import yaml
 from markupsafe import Markup
 
 from executive.errors import ExecutiveError
-from executive.perception.evidence import describe_unknown
+from executive.perception.evidence import describe_unknown_labels
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis import diagnosis_text
 from executive.record.pictures.palette import PALETTE
@@ -73,7 +73,7 @@ def render_report(facts: ReportFacts) -> str:
         verdict=_describe_end(facts),
         counts={} if result is None else asdict(result.items),
         audit=asdict(result.audit) if result is not None and result.audit is not None else {},
-        unknown=describe_unknown({} if result is None else result.unknown),
+        unknown=describe_unknown_labels({} if result is None else result.unknown),
         story=story,
         story_facts=[] if story is None else list(diagnosis_text.list_facts(story)),
         last_picture=next((each for each in facts.pictures if story and each.file == story.picture), None),

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from executive.events import ItemChanged
-from executive.perception.evidence import describe_unknown
+from executive.perception.evidence import describe_unknown_labels
 from executive.record.diagnosis.diagnosis_text import format_diagnosis, make_resume_command, wrap_lines
 from executive.record.result import Result, describe_disagreement
 
@@ -63,7 +63,7 @@ def format_summary(
     times = f"{result.robot_time_s:.1f} s on the robot's clock, {result.wall_time_s:.1f} s by the wall clock"
     groups = sorted(group_items_by_outcome(items).items())
     outcomes = [f"  {outcome}: {', '.join(names)}" for outcome, names in groups]
-    if unknown := describe_unknown(result.unknown):
+    if unknown := describe_unknown_labels(result.unknown):
         outcomes.append(f"  {unknown}")
     outcomes += [f"  assumed error rates: {doubt}" for doubt in result.doubts]
     warning = wrap_lines(describe_disagreement(result), "", "  ", max_lines=3)

@@ -8,11 +8,13 @@ from executive.campaign.faults.campaign import Campaign
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 
 
 def subject_of(mission: str, seed: int = 0, **overrides: str) -> MissionUnderTest:
-    return MissionUnderTest(load_mission(mission, discover(), overrides), discover(), FakeCell, "fake", seed)
+    return MissionUnderTest(
+        load_mission(mission, load_skills(), overrides), load_skills(), FakeCell, "fake", seed
+    )
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.view.figures.fault_figures import FaultFigures, Trial
 
 MISSION = """\
@@ -49,8 +49,8 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> MissionUnderTest:
     (folder / "cells").mkdir()
     shutil.copy(missions / "cells" / "fruit.yaml", folder / "cells")
     (folder / "small.yaml").write_text(MISSION)
-    loaded = load_mission(folder / "small.yaml", discover(), {"cell.table.objects": "[1, 1]"})
-    return MissionUnderTest(loaded, discover(), FakeCell, "fake", 0)
+    loaded = load_mission(folder / "small.yaml", load_skills(), {"cell.table.objects": "[1, 1]"})
+    return MissionUnderTest(loaded, load_skills(), FakeCell, "fake", 0)
 
 
 @pytest.fixture(scope="module")
@@ -164,4 +164,4 @@ def test_a_mission_that_does_not_succeed_by_itself_or_with_wrong_books_is_not_tr
         "routes: {apple: premium_crate}\ntree: MoveToScan\n"
     )
     with pytest.raises(InputError, match=r"without a fault, blind .* or a mission that observes the whole"):
-        Campaign(replace(small, loaded=load_mission(file, discover())))
+        Campaign(replace(small, loaded=load_mission(file, load_skills())))

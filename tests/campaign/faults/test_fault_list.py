@@ -11,14 +11,14 @@ from executive.campaign.faults.fault_list import list_faults, list_skill_nodes
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 
 
 @pytest.mark.parametrize(
     "mission", ["pick_on_request", pytest.param("sort_overhead", marks=pytest.mark.slow)]
 )
 def test_every_reason_of_every_node_is_there_once_and_lasting_and_so_is_a_bug_in_each(mission: str) -> None:
-    subject = MissionUnderTest(load_mission(mission, discover()), discover(), FakeCell, "fake", 0)
+    subject = MissionUnderTest(load_mission(mission, load_skills()), load_skills(), FakeCell, "fake", 0)
     listed = {(fault.location, fault.kind, fault.occasion) for fault in Campaign(subject).faults}
     nodes = list_skill_nodes(subject)
     assert len(nodes) >= 20

@@ -12,7 +12,7 @@ from executive.campaign.faults.planned_fault import SkillFault, make_substitutes
 from executive.campaign.faults.trial import record_trial, run_trial
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, ItemChanged, NodeEnded, RunEnded
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.testing.run_mission import run_mission
 from executive.view.figures.fault_figures import Trial
@@ -150,7 +150,7 @@ def test_a_fault_repeated_is_recorded(campaign: Campaign, tmp_path: Path) -> Non
 
 
 def test_a_skill_that_says_in_its_second_start_that_it_dropped_something_has_let_it_fall() -> None:
-    skills = discover()
+    skills = load_skills()
     path = (
         "tree/2:repeat/do/carry_and_watch/try/retry/do/deliver_and_watch/parallel/deliver/1:retry/do/Transit"
     )

@@ -15,7 +15,7 @@ from executive.cells.fake.cell import FakeCell, SilentOperator
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.mission.parse.cell_file import load_cell
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.run_skill import run_skill
 from skills.approach import Approach
@@ -171,7 +171,7 @@ def test_a_mission_is_rehearsed_in_a_cell_of_kind_fake_and_its_trays_fill_evenly
         "    times: 4\n"
         "    do: [MoveToScan, Detect, Localize, SelectTarget, Approach, Grasp, Transit, Release]\n"
     )
-    run = assemble(load_mission(file, discover()), discover(), RunOptions(1))
+    run = assemble(load_mission(file, load_skills()), load_skills(), RunOptions(1))
     assert isinstance(run.workcell, FakeCell)
     outcome = run.execute()
     assert outcome.status == "SUCCESS", outcome

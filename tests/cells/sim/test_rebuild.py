@@ -20,7 +20,7 @@ from executive.geometry import Array
 from executive.mission.load import load_mission
 from executive.motion.limits import JointLimits
 from executive.motion.trajectory import Trajectory
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults.world_access import open_world
 from executive.testing.oracle import make_oracle_kind
@@ -58,14 +58,14 @@ def state_of(cell: SimCell | SimpleNamespace) -> str:
 
 @pytest.fixture(scope="module")
 def mission(missions: Path):
-    return load_mission(missions / "sort_overhead.yaml", discover())
+    return load_mission(missions / "sort_overhead.yaml", load_skills())
 
 
 @pytest.fixture(scope="module")
 def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
     """One run, and what it would have left at some of its control steps."""
     folder = tmp_path_factory.mktemp("logs")
-    run = assemble(mission, discover(), RunOptions(SEED, kind=make_oracle_kind()))
+    run = assemble(mission, load_skills(), RunOptions(SEED, kind=make_oracle_kind()))
     cell = run.workcell
     assert isinstance(cell, SimCell)
     cell.log_to(folder / "log")

@@ -42,7 +42,7 @@ def test_a_frame_that_shows_the_workspace_in_part_says_nothing():
 
 def test_a_frame_within_the_tolerance_of_the_range_is_no_difference_and_a_darker_one_is():
     frames = [compute_frame_statistics(frame_of(colour), TABLE) for colour in (WOOD, (200, 180, 150))]
-    measured = FrameRange.of([frame for frame in frames if frame])
+    measured = FrameRange.compute([frame for frame in frames if frame])
     assert measured.brightness == (176.7, 193.3)
     assert measured.describe_difference(FrameStatistics(170.0, 0.0, 195.0, 175.0, 145.0)) == ""
     dark = FrameStatistics(30.0, 0.0, 35.0, 180.0, 150.0)
@@ -51,4 +51,4 @@ def test_a_frame_within_the_tolerance_of_the_range_is_no_difference_and_a_darker
 
 
 def test_without_frames_there_is_no_range():
-    assert FrameRange.of([]) is None
+    assert FrameRange.compute([]) is None

@@ -8,7 +8,7 @@ from plain_frames import frame_of
 from executive.cell.error_rates import ErrorRates, assume_rates
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.detectors.requests import PendingSearch
-from executive.perception.envelope.fingerprint import compute_fingerprint, describe_changes
+from executive.perception.envelope.fingerprint import compute_fingerprint, list_changed_properties
 from executive.perception.envelope.frame_statistics import FrameRange
 from executive.perception.envelope.measurement import (
     Measurement,
@@ -123,4 +123,4 @@ def test_measurements_of_other_detectors_in_a_file_are_kept(stored):
 
 
 def test_changed_properties_are_named():
-    assert describe_changes({"a": "1", "b": "2"}, {"a": "1", "b": "3", "c": "4"}) == "b, c"
+    assert list_changed_properties({"a": "1", "b": "2"}, {"a": "1", "b": "3", "c": "4"}) == "b, c"

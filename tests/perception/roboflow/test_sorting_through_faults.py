@@ -14,7 +14,7 @@ from stub_server import BODIES, SPOILT, StubServer, predictions
 from executive.mission.load import load_mission
 from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
 from executive.perception.detectors.onnx_model import OnnxModel, read_labels
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble
 
 SECRET = "SECRET1234567890"
@@ -87,8 +87,8 @@ def sort(arrange, stub):
                 stub.start()
 
         path, overrides = arrange(FALLBACK, objects, deadline=1.0)
-        loaded = load_mission(path, discover(), overrides)
-        run = assemble(loaded, discover(), RunOptions(1), [restart_server])
+        loaded = load_mission(path, load_skills(), overrides)
+        run = assemble(loaded, load_skills(), RunOptions(1), [restart_server])
         with contextlib.closing(run):
             outcome, truth = run.execute(), run.count_ground_truth()
         assert SECRET not in repr(events)

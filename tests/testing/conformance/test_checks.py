@@ -11,7 +11,7 @@ from pathlib import Path
 import faulty_skills as faulty
 import pytest
 
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.skill import Skill
 from executive.testing.conformance import list_conformance_checks
 from executive.testing.conformance.conformance_check import RULES, Check, ConformanceError
@@ -197,10 +197,10 @@ QUICK = ("Grasp", "Release", "SelectTarget")
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in discover()]
+    "name", [pytest.param(name, marks=[] if name in QUICK else pytest.mark.slow) for name in load_skills()]
 )
 def test_every_shipped_skill_conforms(name: str) -> None:
-    for check in list_conformance_checks(discover()[name], name=name):
+    for check in list_conformance_checks(load_skills()[name], name=name):
         check()
 
 

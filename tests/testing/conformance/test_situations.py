@@ -10,7 +10,7 @@ import pytest
 from executive.cell.detection import Detections
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell, Steps
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 from executive.testing.conformance import SkillScene
 from executive.testing.conformance.conformance_check import arrange_nothing
@@ -75,17 +75,17 @@ def test_what_a_skill_needs_is_made_up() -> None:
 
 
 def test_a_skill_is_tried_in_every_situation_that_it_may_begin_in() -> None:
-    assert names(discover()["MoveToScan"]) == [
+    assert names(load_skills()["MoveToScan"]) == [
         "with an empty tool",
         "with an item in the tool",
         "with an empty tool and pose: next",
         "with an empty tool and pose: aside",
     ]
-    assert names(discover()["Grasp"]) == ["with an empty tool"]
+    assert names(load_skills()["Grasp"]) == ["with an empty tool"]
     assert names(Everything)[:3] == [
         "with an empty tool", "with an item in the tool", "with an empty tool and all inputs given",
     ]  # fmt: skip
-    given = names(discover()["MoveToScan"], lambda scene: {"pose": "home"})
+    given = names(load_skills()["MoveToScan"], lambda scene: {"pose": "home"})
     assert given == ["with an empty tool", "with an item in the tool"], "a param that is given is not varied"
 
 
@@ -103,7 +103,7 @@ def test_the_tool_holds_what_the_skill_needs(needs: Any, held: list[bool]) -> No
 
 def test_a_skill_without_arm_finds_the_cup_on_its_target() -> None:
     for name, touches in (("Grasp", True), ("Approach", False)):
-        scene, _ = prepare_scene(discover()[name], Situation("", False), arrange_nothing)
+        scene, _ = prepare_scene(load_skills()[name], Situation("", False), arrange_nothing)
         assert scene.cell.tool.touching is touches
 
 

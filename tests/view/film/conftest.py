@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.recorded_run import record_run
 from executive.record.run_directory import RunDirectory
 from executive.run.assembly import RunOptions
@@ -20,7 +20,7 @@ def filmed_run(tmp_path_factory: pytest.TempPathFactory) -> RunDirectory:
     """The directory of a run that brings one object; nobody is to write into it."""
     folder = tmp_path_factory.mktemp("run")
     (folder / "bring_one.yaml").write_text(MISSION)
-    skills = discover()
+    skills = load_skills()
     loaded = load_mission(folder / "bring_one.yaml", skills)
     result = record_run(loaded, skills, RunOptions(5, kind=make_oracle_kind()), folder / "runs")
     return RunDirectory(Path(result.run))

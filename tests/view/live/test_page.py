@@ -22,7 +22,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.events import RunEnded
 from executive.geometry import Pose
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.result import Result
 from executive.run.assembly import RunOptions, assemble
 from executive.run.run import Run
@@ -56,11 +56,11 @@ def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> 
     """Execute a run that is paused first, while something is done at its page."""
     file = folder / "mission.yaml"
     file.write_text(text)
-    loaded = load_mission(file, discover())
+    loaded = load_mission(file, load_skills())
     page = LivePage()
     # In real time, so that there is something to pause.
     options = RunOptions(3, keyboard=False, realtime=True, kind=FakeCell)
-    run = assemble(loaded, discover(), options, [page])
+    run = assemble(loaded, load_skills(), options, [page])
     run.control.pause()
     page.open(run)
     outcomes: list[RunEnded] = []
@@ -152,7 +152,7 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     file = tmp_path / "mission.yaml"
     file.write_text(MISSION)
     page = LivePage()
-    run = assemble(load_mission(file, discover()), discover(), RunOptions(3, kind=FakeCell), [page])
+    run = assemble(load_mission(file, load_skills()), load_skills(), RunOptions(3, kind=FakeCell), [page])
     page.open(run)
     page._server.kill()
     assert run.execute().status == "SUCCESS"

@@ -12,7 +12,7 @@ import pytest
 
 from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.recorded_run import record_run
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
@@ -61,9 +61,9 @@ def recorded(folder: Path, kind: Callable[..., FakeCell]) -> Path:
     """Run the mission with two objects, and return its run directory."""
     file = folder / "trial.yaml"
     file.write_text(MISSION)
-    loaded = load_mission(file, discover(), {"cell.kind": "fake", "cell.table.objects": "[2, 2]"})
+    loaded = load_mission(file, load_skills(), {"cell.kind": "fake", "cell.table.objects": "[2, 2]"})
     with contextlib.suppress(Cut):
-        record_run(loaded, discover(), RunOptions(3, (), kind=kind), folder / "my runs")
+        record_run(loaded, load_skills(), RunOptions(3, (), kind=kind), folder / "my runs")
     return find_run("latest", folder / "my runs")
 
 

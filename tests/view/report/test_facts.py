@@ -14,7 +14,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.events import Event, FaultInjected, RequestGiven, RunResumed
 from executive.mission.text.file_search import get_shipped_folder
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.journal_format import encode_event
 from executive.record.recorded_run import RecordOptions
 from executive.record.resumed_run import resume_run
@@ -45,7 +45,7 @@ def test_a_run_that_ended_is_described_by_its_result(failed):
 def test_an_interrupted_and_resumed_run_is_described_as_one(killed, copy):
     run = copy(killed)
     assert ReportFacts(run).status == INTERRUPTED
-    resume_run(run, discover(), RunOptions(3, kind=FakeCell), RecordOptions(saves_pictures=False))
+    resume_run(run, load_skills(), RunOptions(3, kind=FakeCell), RecordOptions(saves_pictures=False))
     facts = ReportFacts(run)
     assert (facts.status, facts.resume_command) == ("SUCCESS", "")
     transits = [one for one in facts.timeline.activations if one.node.endswith("/Transit")]

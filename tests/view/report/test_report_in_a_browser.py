@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from executive.mission.load import load_mission
-from executive.plugins import discover
+from executive.plugins import load_skills
 from executive.record.recorded_run import record_run
 from executive.run.assembly import RunOptions
 from executive.view.report.page import write_report
@@ -17,7 +17,7 @@ MISSION = Path(__file__).parents[3] / "missions" / "sort_wrist.yaml"
 
 
 def test_verdict_pictures_timeline_and_tree_are_to_be_seen(visit, tmp_path: Path) -> None:
-    skills = discover()
+    skills = load_skills()
     result = record_run(load_mission(MISSION, skills), skills, RunOptions(3), tmp_path)
     file = write_report(Path(result.run))
     visit.page.goto(f"file://{file.resolve()}")

@@ -24,7 +24,7 @@ from executive.perception.detectors.roboflow.key import ApiKey
 from executive.perception.detectors.roboflow.server_options import (
     WORKFLOW_OPTIONS,
     RoboflowOptions,
-    find_wrong_roboflow_options,
+    find_roboflow_option_errors,
 )
 from executive.perception.detectors.setting import DetectorSetting, OptionErrors
 from executive.perception.detectors.views import Region, remove_duplicates, search_regions
@@ -56,7 +56,7 @@ class RoboflowDetector(ThreadedDetector):
         Raises:
             InputError: An option is missing, unknown or invalid.
         """
-        for _, message in find_wrong_roboflow_options(config):
+        for _, message in find_roboflow_option_errors(config):
             raise InputError(message)
         return cls(config, RoboflowOptions.model_validate(config.options), setting, ApiKey())
 
@@ -64,13 +64,13 @@ class RoboflowDetector(ThreadedDetector):
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
         del base, others
-        yield from find_wrong_roboflow_options(config)
+        yield from find_roboflow_option_errors(config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
         """Return the class names of the cell that the model can find; None if not listed in the options."""
         del base
-        if any(True for _ in find_wrong_roboflow_options(config)):
+        if any(True for _ in find_roboflow_option_errors(config)):
             return None
         options = RoboflowOptions.model_validate(config.options)
         return tuple(options.class_map.get(name, name) for name in options.labels) or None

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from executive.cell.config import DetectorConfig, Section
 from executive.perception.detectors.roboflow.key import KEY_VARIABLE
-from executive.perception.detectors.setting import OptionErrors, find_wrong_class_map, find_wrong_options
+from executive.perception.detectors.setting import OptionErrors, find_class_map_errors, find_option_errors
 
 HOSTED_URL = "https://serverless.roboflow.com"
 """Address of Roboflow's hosted server."""
@@ -73,9 +73,9 @@ class RoboflowOptions(Section):
         return "workspace and workflow_id" if self.api == "workflow" else "model_id"
 
 
-def find_wrong_roboflow_options(config: DetectorConfig) -> OptionErrors:
+def find_roboflow_option_errors(config: DetectorConfig) -> OptionErrors:
     """Yield each invalid option, with a message."""
-    wrong = list(find_wrong_options(RoboflowOptions, config))
+    wrong = list(find_option_errors(RoboflowOptions, config))
     for option, message in wrong:
         if any(part in option.lower() for part in SECRET_WORDS):
             message = (
@@ -89,7 +89,7 @@ def find_wrong_roboflow_options(config: DetectorConfig) -> OptionErrors:
     yield from _check_url(options.url)
     yield from _check_workflow(options) if options.api == "workflow" else _check_model(options)
     if options.labels:
-        yield from find_wrong_class_map(config, options.class_map, options.labels)
+        yield from find_class_map_errors(config, options.class_map, options.labels)
 
 
 def _check_model(options: RoboflowOptions) -> OptionErrors:
