@@ -37,7 +37,8 @@ def run_started(**fields: Any) -> RunStarted:
 def run_ended(status: str = "SUCCESS", **fields: Any) -> RunEnded:
     """Return the end of a run."""
     defaults: dict[str, Any] = {
-        "reason": "", "message": "", "node": "", "empty": False, "holds": "", "ticks": 1, "robot_time": 0.0,
+        "reason": "", "message": "", "node": "", "is_table_empty": False, "held_item": "", "ticks": 1,
+        "robot_time": 0.0,
     }  # fmt: skip
     return RunEnded(status, **defaults | fields)
 
@@ -46,7 +47,7 @@ def item_changed(item: str, state: str = "seen", **fields: Any) -> ItemChanged:
     """Return a change of an item, whose class is the first part of its name."""
     defaults: dict[str, Any] = {
         "label": item.partition("-")[0], "position": [0.5, 0.0, 0.02], "looks": 1, "attempts": 0, "bin": "",
-        "why": "",
+        "reason": "",
     }  # fmt: skip
     return ItemChanged(item, state=state, **defaults | fields)
 
@@ -62,10 +63,10 @@ def detected(label: str, **fields: Any) -> DetectedObject:
 def frame_searched(*found: DetectedObject, **fields: Any) -> FrameSearched:
     """Return a look with confident detections."""
     defaults: dict[str, Any] = {
-        "frame": 1, "camera": "overhead", "detector": "embedded", "view": "table", "unsure": [],
-        "unknown": [],
+        "frame": 1, "camera": "overhead", "detector": "embedded", "view": "table", "doubtful": [],
+        "unknown_labels": [],
     }  # fmt: skip
-    return FrameSearched(found=list(found), **defaults | fields)
+    return FrameSearched(confident=list(found), **defaults | fields)
 
 
 def skill_started(node: str, item: str = "") -> NodeStarted:

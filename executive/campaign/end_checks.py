@@ -52,7 +52,7 @@ def check_journal(events: Sequence[TimedEvent], outcome: RunEnded) -> Iterator[s
 def check_held_item(outcome: RunEnded, workcell: Workcell) -> Iterator[str]:
     """Yield a problem if tool and `RunEnded` disagree on whether an item is held at the end."""
     holding = workcell.cell.tool.holding
-    if holding and outcome.holds not in {item.item for item in workcell.accounts.summaries()}:
-        yield f'the tool holds an object, but the held item of the run is "{outcome.holds}"'
-    if not holding and outcome.holds:
-        yield f'the tool is empty, but the held item of the run is "{outcome.holds}"'
+    if holding and outcome.held_item not in {item.item for item in workcell.accounts.summaries()}:
+        yield f'the tool holds an object, but the held item of the run is "{outcome.held_item}"'
+    if not holding and outcome.held_item:
+        yield f'the tool is empty, but the held item of the run is "{outcome.held_item}"'

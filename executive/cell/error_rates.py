@@ -17,7 +17,7 @@ class ErrorRates:
         jitter: Standard deviation of the random error of the centre of a box, along each axis [pixel].
         repeated: Fraction of the errors that a second look from the same camera pose repeats.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
-        doubt: Reason why the rates are assumed; "" if they are measured.
+        assumption_reason: Reason why the rates are assumed; "" if they are measured.
     """
 
     threshold: float
@@ -27,7 +27,7 @@ class ErrorRates:
     jitter: float
     repeated: float = 0.0
     bias: float = 0.0
-    doubt: str = ""
+    assumption_reason: str = ""
 
 
 def assume_rates(threshold: float, doubt: str) -> ErrorRates:
@@ -44,5 +44,5 @@ def assume_rates(threshold: float, doubt: str) -> ErrorRates:
         jitter=2.0,
         repeated=0.8,
         bias=0.002,
-        doubt=doubt,
+        assumption_reason=doubt,
     )

@@ -35,7 +35,7 @@ class Accounts(Protocol):
         """Maximum number of boxes in one look, by label, for labels that the cell file does not declare."""
 
     @property
-    def doubts(self) -> Sequence[str]:
+    def assumption_reasons(self) -> Sequence[str]:
         """Reasons why error rates of detectors were assumed instead of measured."""
 
     def summaries(self) -> Sequence[ItemChanged]:

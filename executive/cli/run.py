@@ -104,13 +104,13 @@ def command(
                 page.finish(result, report and str(Path(report).resolve()))
                 problem = "; ".join(filter(None, (problem, page.problem)))
         problem = "; ".join(filter(None, (problem, *(view.problem for view in views))))
-        if problem and (views or result.story is not None):
+        if problem and (views or result.diagnosis is not None):
             click.echo(f"note: {problem}", err=True)
         if terminal_view is not None:
             items = terminal_view.timeline.items.list_items()
             click.echo(format_summary(result, items, repeat, report), err=True, nl=False)
-        elif result.story is not None:
-            click.echo("\n".join(format_diagnosis(result.story, result.run, repeat, report)), err=True)
+        elif result.diagnosis is not None:
+            click.echo("\n".join(format_diagnosis(result.diagnosis, result.run, repeat, report)), err=True)
         elif result.status == "INCOMPLETE" or describe_disagreement(result):
             end_description = describe_end(result.status, result.reason, result.node, result.message)
             click.echo("\n".join(filter(None, (describe_disagreement(result), end_description))), err=True)

@@ -15,13 +15,13 @@ class MotionPlanned(Event):
     """The arm planned a motion.
 
     Attributes:
-        ahead: True if the motion was planned before a skill requested it.
-        waits: Time from this event until the motion may start [s].
+        planned_ahead: True if the motion was planned before a skill requested it.
+        delay: Time from this event until the motion may start [s].
         duration: Duration of the motion [s]; 0 if there is no motion.
     """
 
-    ahead: bool
-    waits: float
+    planned_ahead: bool
+    delay: float
     duration: float
 
 
@@ -42,15 +42,15 @@ class InputRead(Event):
 
     Attributes:
         name: Name of the input, for instance `tool.holding`.
-        nth: How many times the input has been read in this control step, including this time.
+        read_number: How many times the input has been read in this control step, including this time.
         value: The value, or the message of the exception.
-        raised: Name of the exception that the cell raised; "" for a value.
+        exception: Name of the exception that the cell raised; "" for a value.
     """
 
     name: str
-    nth: int
+    read_number: int
     value: JsonValue
-    raised: str = ""
+    exception: str = ""
 
 
 @dataclass(frozen=True)

@@ -41,18 +41,18 @@ class FrameSearched(Event):
         camera: Name of the camera.
         detector: Name of the detector.
         view: Name of the searched region of the frame: `table` or `full`.
-        found: Confident detections.
-        unsure: Doubtful or contradicted detections.
-        unknown: Labels of the detections whose class the cell file does not declare.
+        confident: Confident detections.
+        doubtful: Doubtful or contradicted detections.
+        unknown_labels: Labels of the detections whose class the cell file does not declare.
     """
 
     frame: int
     camera: str
     detector: str
     view: str
-    found: Sequence[DetectedObject]
-    unsure: Sequence[DetectedObject]
-    unknown: Sequence[str]
+    confident: Sequence[DetectedObject]
+    doubtful: Sequence[DetectedObject]
+    unknown_labels: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class ItemChanged(Event):
         looks: Number of looks in which the item was detected.
         attempts: Number of failed attempts to pick the item.
         bin: Name of the bin that contains a placed item, or "".
-        why: Reason of the state, or "".
+        reason: Reason of the state, or "".
     """
 
     item: str
@@ -77,7 +77,7 @@ class ItemChanged(Event):
     looks: int
     attempts: int
     bin: str
-    why: str
+    reason: str
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pydantic import Field, JsonValue
 
 from executive.events.event import Event
 
-JOURNAL_FORMAT = 2
+JOURNAL_FORMAT = 3
 """Version of the journal format; journals of format 1 contain no version."""
 
 RunStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|INCOMPLETE|FAILURE|FAULT|HALTED)$")]
@@ -61,10 +61,10 @@ class RequestGiven(Event):
     """The operator made a request.
 
     Attributes:
-        wanted: The requested class; `rescan` for a new look; None to quit.
+        request: The requested class; `rescan` for a new look; None to quit.
     """
 
-    wanted: str | None
+    request: str | None
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,10 @@ class RunHalted(Event):
     """The run was halted: the tick loop ended, and the arm starts to brake.
 
     Attributes:
-        ticked: True if the tree was ticked in this control step.
+        is_tree_ticked: True if the tree was ticked in this control step.
     """
 
-    ticked: bool
+    is_tree_ticked: bool
 
 
 @dataclass(frozen=True)
@@ -83,14 +83,14 @@ class RunResumed(Event):
     """An interrupted run was resumed.
 
     Attributes:
-        ticked: Number of control steps before the interruption that are still valid.
-        intent: Last command to the tool before the interruption, `open` or `close`; "" if there was none;
-            `unknown` if arm or tool executed commands that the journal lacks.
+        valid_ticks: Number of control steps before the interruption that are still valid.
+        last_command: Last command to the tool before the interruption, `open` or `close`; "" without a
+            command; `unknown` if arm or tool executed commands that the journal lacks.
         versions: Versions of this project, Python, the machine and the required packages.
     """
 
-    ticked: int
-    intent: str
+    valid_ticks: int
+    last_command: str
     versions: Mapping[str, str]
 
 
@@ -115,9 +115,9 @@ class RunEnded(Event):
         reason: Reason of the failure, for instance `Transit.dropped`; "" on success.
         message: Sentence that explains the status, with measured values, or "".
         node: Path of the node that determined the status, or "".
-        empty: True if by the ledger no object with a route was left, and no look showed a label that the cell
-            file does not declare.
-        holds: Item in the tool; `something` if the ledger has no such item; "" for an empty tool.
+        is_table_empty: True if the ledger contains no object with a route, and no look showed a label that
+            the cell file does not declare.
+        held_item: Item in the tool; `something` if the ledger has no such item; "" for an empty tool.
         ticks: Number of control steps.
         robot_time: Time on the clock of the run [s].
     """
@@ -126,7 +126,7 @@ class RunEnded(Event):
     reason: str
     message: str
     node: str
-    empty: bool
-    holds: str
+    is_table_empty: bool
+    held_item: str
     ticks: int
     robot_time: float

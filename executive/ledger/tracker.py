@@ -49,7 +49,7 @@ class Tracker:
 
     Attributes:
         unknown: Largest number of boxes in one look for each label that is not in the cell file.
-        doubts: Reasons why error rates of detectors are assumed and not measured, one for each kind.
+        assumption_reasons: Reasons for assumed (not measured) error rates of detectors, one of each kind.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Tracker:
         """Search for untracked items, from `lose_track` to `record_bin_contents`, or None."""
         self._last_frame_id = 0
         self.unknown: Counter[str] = Counter()
-        self.doubts: list[str] = []
+        self.assumption_reasons: list[str] = []
 
     @property
     def records(self) -> Sequence[Record]:
@@ -87,9 +87,9 @@ class Tracker:
         frame = detections.frame
         self.unknown |= Counter(detection.label for detection in detections.unknown)
         # The numbers after the colon of a message differ between frames, so one message per kind is kept.
-        kind = detections.error_rates.doubt.partition(":")[0]
-        if kind and not any(doubt.startswith(kind) for doubt in self.doubts):
-            self.doubts.append(detections.error_rates.doubt)
+        kind = detections.error_rates.assumption_reason.partition(":")[0]
+        if kind and not any(reason.startswith(kind) for reason in self.assumption_reasons):
+            self.assumption_reasons.append(detections.error_rates.assumption_reason)
         if frame.id != self._last_frame_id:
             self._last_frame_id = frame.id
             self._update(detections, observations)

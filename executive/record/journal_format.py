@@ -118,9 +118,9 @@ def decode_events(lines: Iterable[bytes], name: str) -> list[TimedEvent]:
                 period = event.step
             if period and abs(timed.clock - timed.tick * period - clock_offset) > CLOCK_TOLERANCE:
                 raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
-            if isinstance(event, InputRead) and event.name == "clock" and not event.raised:
+            if isinstance(event, InputRead) and event.name == "clock" and not event.exception:
                 clock_offset = _read_clock_offset(event.value)
-            elif isinstance(event, InputRead) and not event.raised:
+            elif isinstance(event, InputRead) and not event.exception:
                 check_input(event.name, event.value)
         except ValueError as error:
             if number == 1 and (message := _describe_old_format(line)):

@@ -121,8 +121,8 @@ class PictureRecorder:
         return PictureScene(
             image=frame.image,
             visible=frame.visible,
-            detections=[_to_detection(found) for found in searched.found],
-            selected=_find_selected(selection, searched.found, position),
+            detections=[_to_detection(found) for found in searched.confident],
+            selected=_find_selected(selection, searched.confident, position),
             mission=timeline.started.mission if timeline.started else "",
             clock=timed.clock,
             camera=frame.camera,

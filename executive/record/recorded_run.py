@@ -188,13 +188,13 @@ class Recording:
             reason=outcome.reason,
             message=outcome.message,
             node=outcome.node,
-            holds=outcome.holds,
+            held_item=outcome.held_item,
             seed=seed,
             items=ItemCounts(**item_counts),
-            unknown=accounts.unknown,
-            doubts=accounts.doubts,
-            empty=outcome.empty,
-            audit=None if audit is None else make_audit(item_counts, audit, outcome.empty),
+            unknown_labels=accounts.unknown,
+            assumption_reasons=accounts.assumption_reasons,
+            is_table_empty=outcome.is_table_empty,
+            audit=None if audit is None else make_audit(item_counts, audit, outcome.is_table_empty),
             planning=timeline.planning,
             requests=list_requests(timeline),
             ticks=outcome.ticks,
@@ -202,7 +202,7 @@ class Recording:
             wall_time_s=round(wall_time, 3),
             trace=self.recorder.trace,
             run=str(path),
-            story=diagnose(
+            diagnosis=diagnose(
                 timeline, outcome, self.loaded, self.skills, path, lambda: workcell.cell.arm.at_rest
             ),
         )

@@ -199,7 +199,7 @@ def _to_decision(timed: TimedEvent, edited: bool) -> TimedEvent | None:
         case TargetSelected():
             event = replace(event, frame=0)
         case ItemChanged():
-            event = replace(event, position=(), looks=0, attempts=0, why="")
+            event = replace(event, position=(), looks=0, attempts=0, reason="")
         case ToolCommanded():
             pass
         case _:

@@ -23,8 +23,8 @@ from executive.record.timeline.timeline import PlanningTotals, Timeline
 QUIT_REQUEST = "quit"
 """Request that ends the requests of the operator."""
 
-RESULT_VERSION = 2
-"""Version of the schema of `result.json`; version 1 had no `version`, no skipped items and no `agrees`."""
+RESULT_VERSION = 3
+"""Version of the schema of `result.json`; versions before 3 had other keys."""
 
 MISTAKE_DESCRIPTIONS = {
     "wrong_bin": "in a wrong bin",
@@ -73,11 +73,11 @@ class Result:
     Attributes:
         version: Version of the schema.
         mission: Name of the mission.
-        status, reason, message, node, empty, holds, ticks: As in `RunEnded`.
+        status, reason, message, node, is_table_empty, held_item, ticks: As in `RunEnded`.
         seed: Seed of all random numbers.
         items: Number of items by final state, from the ledger.
-        unknown: Largest number of boxes in a look for each label that the cell file does not declare.
-        doubts: Reasons for which error rates of detectors were assumed.
+        unknown_labels: Largest number of boxes in a look for each label that the cell file does not declare.
+        assumption_reasons: Reasons for which error rates of detectors were assumed.
         audit: Comparison with the true places of the objects; None in a cell without ground truth.
         planning: Number of planned motions, and time spent waiting for them.
         requests: Requests with which a scripted operator repeats the run.
@@ -85,7 +85,7 @@ class Result:
         wall_time_s: Wall time of the run [s].
         trace: Hash of all decisions.
         run: The run directory, or "".
-        story: Diagnosis of a run that did not succeed, or None.
+        diagnosis: Diagnosis of a run that did not succeed, or None.
     """
 
     version: int = RESULT_VERSION
@@ -94,12 +94,12 @@ class Result:
     reason: str
     message: str
     node: str
-    holds: str = ""
+    held_item: str = ""
     seed: int
     items: ItemCounts = ItemCounts()
-    unknown: Mapping[str, int] = field(default_factory=dict)
-    doubts: Sequence[str] = ()
-    empty: bool = False
+    unknown_labels: Mapping[str, int] = field(default_factory=dict)
+    assumption_reasons: Sequence[str] = ()
+    is_table_empty: bool = False
     audit: Audit | None = None
     planning: PlanningTotals = field(default_factory=PlanningTotals)
     requests: Sequence[str] = ()
@@ -108,7 +108,7 @@ class Result:
     wall_time_s: float = 0.0
     trace: str = ""
     run: str = ""
-    story: Diagnosis | None = None
+    diagnosis: Diagnosis | None = None
 
 
 def write_result(path: Path, result: Result) -> None:

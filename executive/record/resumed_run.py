@@ -102,9 +102,9 @@ def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
     end = find_end(events)
     if end is None:
         return False
-    if end.status == "INCOMPLETE" and end.holds:
+    if end.status == "INCOMPLETE" and end.held_item:
         raise InputError(
-            f'the run in "{directory.path}" ended with {end.holds} in the tool and cannot be '
+            f'the run in "{directory.path}" ended with {end.held_item} in the tool and cannot be '
             "resumed; take it out of the tool and run the mission again"
         )
     if end.status in FINAL_STATUSES and read_result(directory, events) is not None:

@@ -92,7 +92,7 @@ class InputLog:
         valid: list[TimedEvent] = []
         for timed in events:
             if isinstance(timed.event, RunResumed):
-                valid = _select_before(valid, timed.event.ticked)
+                valid = _select_before(valid, timed.event.valid_ticks)
             valid.append(timed)
         incomplete_ends = _find_incomplete_ends(valid)
         interruptions: dict[int, Interruption] = {}

@@ -52,9 +52,9 @@ class InputReplayer:
         """
         self._read_counts[name] += 1
         inputs, now = self._inputs.get(name, deque()), (self._tick, self._read_counts[name])
-        while inputs and (inputs[0].tick, inputs[0].reading.nth) <= now:
+        while inputs and (inputs[0].tick, inputs[0].reading.read_number) <= now:
             reading = inputs.popleft().reading
-            if reading.raised:
+            if reading.exception:
                 raise _make_exception(reading)
             self._last_values[name] = reading.value
         if name not in self._last_values:
@@ -66,7 +66,7 @@ class InputReplayer:
 
 def _make_exception(reading: InputRead) -> BaseException:
     """Return an exception with the recorded class name and message."""
-    kind = getattr(errors, reading.raised, None) or type(reading.raised, (Exception,), {})
+    kind = getattr(errors, reading.exception, None) or type(reading.exception, (Exception,), {})
     error = kind(reading.value)
     assert isinstance(error, BaseException)
     return error

@@ -54,7 +54,7 @@ def check_items(accounts: Accounts) -> LoopEnd:
     if lost:
         message = f"{len(lost)} object(s) were lost and not found again: {', '.join(lost)}"
         return LoopEnd("FAILURE", "lost", message)
-    rejected = [f"{item.item} ({item.why})" for item in items if item.state == "rejected"]
+    rejected = [f"{item.item} ({item.reason})" for item in items if item.state == "rejected"]
     if rejected:
         message = f"{len(rejected)} object(s) were not sorted: {', '.join(rejected)}"
         return LoopEnd("INCOMPLETE", "rejected", message)

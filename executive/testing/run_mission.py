@@ -48,7 +48,7 @@ class MissionResult(RunEnded):
     @property
     def agrees(self) -> bool:
         """True if the counts of ledger and audit agree, or there is no audit."""
-        return self.audit is None or is_confirmed_by_audit(self.items, self.audit, self.empty)
+        return self.audit is None or is_confirmed_by_audit(self.items, self.audit, self.is_table_empty)
 
     def list_activated_nodes(self, pattern: str) -> list[str]:
         """Return the paths of all activated nodes, in order of activation, that match the pattern."""

@@ -44,17 +44,17 @@ class Report:
     Attributes:
         label: Class.
         state: State.
-        why: Reason for the state, or "".
+        reason: Reason of the state, or "".
     """
 
     label: str
     state: str
-    why: str
+    reason: str
 
     @property
     def is_doubted(self) -> bool:
         """True if it tells a reader that the item may not be where it belongs."""
-        return self.state in ("rejected", "lost") or (self.state == "placed" and bool(self.why))
+        return self.state in ("rejected", "lost") or (self.state == "placed" and bool(self.reason))
 
 
 @dataclass(frozen=True)
@@ -302,4 +302,4 @@ def read_reports(journal: Path) -> dict[str, Report]:
     """Return what a journal says last about each item, by item."""
     events = (timed.event for timed in read_journal(journal))
     changes = (event for event in events if isinstance(event, ItemChanged))
-    return {change.item: Report(change.label, change.state, change.why) for change in changes}
+    return {change.item: Report(change.label, change.state, change.reason) for change in changes}

@@ -245,7 +245,7 @@ class _RunWithHalts:
         """Return the figures and problems of the halt that this child has made."""
         run, workcell = self._run, self._run.workcell
         self._journal.close()
-        halt = {**self._halt, "holds": outcome.holds}
+        halt = {**self._halt, "holds": outcome.held_item}
         halt["rest_s"] = (outcome.ticks - halt["tick"]) * workcell.cell.clock.step
         problems = [
             *check_journal(read_journal(self._journal_path), outcome),

@@ -189,8 +189,8 @@ def check_result(result: Result, *, change_made: str) -> list[str]:
     may_lose = change_made.startswith(("removed", "dropped"))
     if result.status != "SUCCESS" and not (may_lose and result.reason == "lost"):
         problems.append(f"it ended with {result.status} {result.reason}: {result.message}")
-    if result.holds:
-        problems.append(f"the tool holds {result.holds} at the end")
+    if result.held_item:
+        problems.append(f"the tool holds {result.held_item} at the end")
     return problems
 
 

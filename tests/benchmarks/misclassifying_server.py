@@ -212,7 +212,7 @@ def _row(label: str, objects: Sequence[FoundObject]) -> Figures:
 
 def _reports(one: FoundObject) -> str:
     """Return the states of the items of an object."""
-    return ", ".join(f"{report.state} {report.why}".strip() for report in one.reports) or "none"
+    return ", ".join(f"{report.state} {report.reason}".strip() for report in one.reports) or "none"
 
 
 if __name__ == "__main__":

@@ -209,7 +209,7 @@ def _describe(one: Done) -> str:
     objects = "; ".join(
         f"{thing.label} {'fell' if thing.fell_in_wrong_bin else 'put'} into {thing.bin} as "
         f"{', '.join(thing.items) or 'no item'}"
-        + "".join(f" ({report.state}{report.why and ': ' + report.why})" for report in thing.reports)
+        + "".join(f" ({report.state}{report.reason and ': ' + report.reason})" for report in thing.reports)
         for thing in one.run.in_wrong_bin
     )
     run = one.run

@@ -176,7 +176,7 @@ class TestKills:
         result = Result(mission="sort", seed=3, status="FAILURE", reason="lost", message="", node="")
         assert kills.check_result(result, change_made="removed cube") == []
         assert len(kills.check_result(result, change_made="moved cube")) == 1
-        assert len(kills.check_result(replace(result, holds="cube-1"), change_made="dropped cube")) == 1
+        assert len(kills.check_result(replace(result, held_item="cube-1"), change_made="dropped cube")) == 1
 
 
 class TestDamagedRecords:

@@ -61,7 +61,7 @@ def test_a_journal_without_exactly_one_end_is_reported(journal: list[TimedEvent]
 
 
 def test_a_journal_with_another_end_than_the_run_is_reported() -> None:
-    (problem,) = check_journal(journal_of(end=replace(HALTED, holds="cube_1")), HALTED)
+    (problem,) = check_journal(journal_of(end=replace(HALTED, held_item="cube_1")), HALTED)
     assert problem.startswith("the journal ends with RunEnded(status='HALTED'")
 
 
@@ -80,4 +80,4 @@ def test_the_held_item_must_be_named(holding: bool, statuses: str, problem: list
         cell=SimpleNamespace(tool=SimpleNamespace(holding=holding)),
         accounts=SimpleNamespace(summaries=lambda: [item_changed("cube_1")]),
     )
-    assert list(check_held_item(replace(HALTED, holds=statuses), workcell)) == problem
+    assert list(check_held_item(replace(HALTED, held_item=statuses), workcell)) == problem

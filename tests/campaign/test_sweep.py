@@ -46,7 +46,7 @@ def work(job: Job) -> Result:
         raise ValueError("seed three")
     if job.seed == 4:
         raise InputError("there is no place for seed four")
-    return result(job.seed, ticks=os.getpid(), unknown=dict(job.overrides))
+    return result(job.seed, ticks=os.getpid(), unknown_labels=dict(job.overrides))
 
 
 def test_every_seed_is_run_once_in_another_process():
@@ -54,7 +54,7 @@ def test_every_seed_is_run_once_in_another_process():
     results = swept(range(1, 5), work, progress=lambda done, total: reported.append((done, total)))
     assert [entry.seed for entry in results] == [1, 2, 3, 4]
     assert results[0].ticks != os.getpid()
-    assert results[0].unknown == {"a": "1"}
+    assert results[0].unknown_labels == {"a": "1"}
     assert (results[2].status, results[2].message) == ("FAULT", "ValueError: seed three")
     assert (results[3].status, results[3].message) == ("FAULT", "there is no place for seed four")
     assert results[2].planning == PlanningTotals()

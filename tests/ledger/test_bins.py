@@ -37,7 +37,7 @@ def test_what_came_down_in_its_bin_is_there_though_no_look_shows_it(
         bench.look()
     assert bench.end() == {"cube-1": final}
     why = "it probably fell into the bin" if final[0] == "placed" else final[1]
-    assert bench.ledger.summaries()[0].why == why
+    assert bench.ledger.summaries()[0].reason == why
     assert bench.ledger.count_attempts("cube-1") == 1
 
 
@@ -62,7 +62,7 @@ def test_what_must_have_fallen_into_a_bin_takes_a_place_there_until_a_look_shows
     bench.look(IN_RED, view="full")
     assert bench.ledger.count_objects_in("red_bin") == 1
     (row,) = bench.ledger.summaries()
-    assert (row.state, row.bin, row.why) == ("placed", "red_bin", "")
+    assert (row.state, row.bin, row.reason) == ("placed", "red_bin", "")
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ def test_an_object_with_uncertain_detections_only_is_an_item_in_doubt(bench: Ben
     assert (bench.ledger.summaries()[0].looks, bench.ledger.is_certain("cube-1")) == (0, False)
     assert bench.ledger.find_uncertain_items() == ["cube-1"]
     look = next(event for event in bench.events if isinstance(event, FrameSearched))
-    assert (look.found, [one.label for one in look.unsure]) == ([], ["cube"])
+    assert (look.confident, [one.label for one in look.doubtful]) == ([], ["cube"])
 
 
 @pytest.mark.parametrize("unsure", [[], [THERE], [("duck", 0.5, 0.0)]], ids=["nothing", "cube", "no route"])
@@ -134,6 +134,6 @@ def test_a_new_item_that_proves_to_be_one_that_fell_is_reported_as_none(bench: B
     bench.look(unsure=[("cube", 0.6, 0.1)])
     bench.look(("cube", 0.6, 0.1))
     changes = [event for event in bench.events if isinstance(event, ItemChanged)]
-    states = {change.item: (change.state, change.why) for change in changes}
+    states = {change.item: (change.state, change.reason) for change in changes}
     assert states == {"cube-1": ("seen", ""), "cube-2": ("phantom", "it is cube-1")}
     assert not bench.ledger.is_open("cube-2")

@@ -186,7 +186,7 @@ def test_an_item_that_is_given_up_in_the_tool_stays_there_until_it_is_released(b
     assert bench.ledger.find_held_item() == "cube-1"
     bench.ledger.record_placement("cube-1", "red_bin")
     (row,) = bench.ledger.summaries()
-    assert (row.state, row.bin, row.why) == ("placed", "red_bin", "")
+    assert (row.state, row.bin, row.reason) == ("placed", "red_bin", "")
 
 
 def test_an_item_that_is_given_up_in_the_tool_and_put_back_is_rejected(bench: Bench) -> None:
@@ -216,7 +216,7 @@ def test_every_change_is_reported_and_the_accounts_balance(bench: Bench) -> None
     assert changes[-1] == ItemChanged("cube-1", "cube", "placed", [0.5, 0.0, 0.025], 2, 0, "red_bin", "")
     looks = [event for event in bench.events if isinstance(event, FrameSearched)]
     assert looks[-1] == FrameSearched(3, looks[-1].camera, "eye", "full", [], [], [])
-    assert looks[0].found[0] == DetectedObject("cube", 0.9, [0.0, 0.0, 1.0, 1.0], [0.5, 0.0, 0.025], "")
+    assert looks[0].confident[0] == DetectedObject("cube", 0.9, [0.0, 0.0, 1.0, 1.0], [0.5, 0.0, 0.025], "")
 
 
 def test_an_item_nobody_entered_is_a_fault(bench: Bench) -> None:

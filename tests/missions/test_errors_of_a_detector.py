@@ -84,4 +84,4 @@ def test_everything_is_in_its_bin_and_the_books_are_right(
         run.close()
     assert (outcome.status, outcome.message) == ("SUCCESS", "")
     assert items["placed"] == audit["right"] == items["seen"] >= 3
-    assert is_confirmed_by_audit(items, audit, outcome.empty)
+    assert is_confirmed_by_audit(items, audit, outcome.is_table_empty)

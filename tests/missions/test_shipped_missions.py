@@ -51,7 +51,7 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
 
     def observe(timed: TimedEvent) -> None:
         if isinstance(timed.event, MotionPlanned):
-            ahead.append(timed.event.ahead)
+            ahead.append(timed.event.planned_ahead)
 
     # Where an operator is asked, every class is asked for until there can be none of it left.
     requests = [*mission.routes] * 6
@@ -72,7 +72,7 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
 
 def assert_done(name: str, done: Done) -> None:
     assert (done.outcome.status, done.outcome.message) == ("SUCCESS", "")
-    assert is_confirmed_by_audit(done.items, done.audit, done.outcome.empty)
+    assert is_confirmed_by_audit(done.items, done.audit, done.outcome.is_table_empty)
     assert done.items["placed"] == done.audit["right"] >= 1
     assert done.items["lost"] == done.audit["wrong_bin"] == 0
     if name not in KEEPS_SOMETHING:

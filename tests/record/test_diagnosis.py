@@ -70,8 +70,10 @@ def test_a_success_has_no_story() -> None:
     ],
 )  # fmt: skip
 def test_every_control_node_says_why_it_did_not_stop_a_failure(tree: str, expected: str) -> None:
-    chain = FailedRun(tree, objects=CUBE).tell().chain
-    assert [f"{link.name}: {link.why}" for link in chain if link.why] == [expected] * bool(expected)
+    chain = FailedRun(tree, objects=CUBE).tell().passed_nodes
+    assert [f"{link.name}: {link.explanation}" for link in chain if link.explanation] == [expected] * bool(
+        expected
+    )
 
 
 def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
@@ -84,7 +86,7 @@ def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
     )
     run.fake.detector.answers = lambda look, true: "gone" if look == 2 else true
     story = run.tell()
-    assert story.chain[2].why == "runs again only after IsHolding.empty"
+    assert story.passed_nodes[2].explanation == "runs again only after IsHolding.empty"
 
 
 def test_an_undeclared_reason_is_reported_at_the_line_of_its_skill() -> None:
@@ -117,8 +119,8 @@ def test_a_fault_says_where_it_was_raised_and_what_is_known_of_the_arm(at_rest, 
 
     run.fake.tool.can_seal = broken
     story = run.tell(at_rest)
-    assert (story.arm, story.verdict) == (arm, "Grasp: ZeroDivisionError: vacuum gauge")
-    assert story.next[0].startswith(first)
+    assert (story.arm_state, story.verdict) == (arm, "Grasp: ZeroDivisionError: vacuum gauge")
+    assert story.advice[0].startswith(first)
     assert re.fullmatch(r"record/test_diagnosis\.py:\d+, in broken", story.raised_at)
     assert story.node.path == "tree/5:retry/do/Grasp"
 
@@ -134,7 +136,7 @@ def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
     run.at_every_step(let_go_and_stop)
     story = run.tell()
     said = ["find cube-1 in the cell: the tool released it at the end of the run"]
-    assert (story.holds, story.left, story.next) == ("", ["cube-1"], said)
+    assert (story.held_item, story.unsorted_items, story.advice) == ("", ["cube-1"], said)
 
 
 def test_a_halt_at_a_question_says_so() -> None:
@@ -167,5 +169,5 @@ def test_every_failure_has_a_diagnosis(breaks, slips, misses, gone, stop) -> Non
     if story is not None:
         assert TypeAdapter(Diagnosis).validate_json(json.dumps(to_json(story), allow_nan=False)) == story
         assert story.verdict
-        assert [link.path for link in story.chain][-1:] == ([outcome.node] if outcome.node else [])
-        assert all(link.why for link in story.chain[:-1])
+        assert [link.path for link in story.passed_nodes][-1:] == ([outcome.node] if outcome.node else [])
+        assert all(link.explanation for link in story.passed_nodes[:-1])

@@ -236,22 +236,31 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
         ),
         (
             b'{"kind": "RunHalted", "tick": 1, "clock": 0.1}',
-            'RunHalted has no key "ticked"; its keys are kind',
-        ),
-        (b'{"kind": "RunHalted", "tick": 1, "clock": 0.1, "ticked": true, "x": 1}', 'the unknown key "x"'),
-        (
-            b'{"kind": "RunHalted", "tick": 1, "clock": 0.1, "ticked": 1}',
-            '"ticked" of RunHalted: input should',
+            'RunHalted has no key "is_tree_ticked"; its keys are kind',
         ),
         (
-            b'{"kind": "RunHalted", "tick": 1.0, "clock": 0.1, "ticked": true}',
+            b'{"kind": "RunHalted", "tick": 1, "clock": 0.1, "is_tree_ticked": true, "x": 1}',
+            'the unknown key "x"',
+        ),
+        (
+            b'{"kind": "RunHalted", "tick": 1, "clock": 0.1, "is_tree_ticked": 1}',
+            '"is_tree_ticked" of RunHalted: input should',
+        ),
+        (
+            b'{"kind": "RunHalted", "tick": 1.0, "clock": 0.1, "is_tree_ticked": true}',
             '"tick" is 1.0, not an integer',
         ),
-        (b'{"kind": "RunHalted", "tick": 1e12, "clock": 0.1, "ticked": true}', '"tick" is 1000000000000.0'),
-        (b'{"kind": "RunHalted", "tick": 1, "clock": "0", "ticked": true}', "\"clock\" is '0', not a time"),
-        (b'{"kind": "RunHalted", "tick": 1, "clock": NaN, "ticked": true}', "expected value"),
         (
-            b'{"kind": "RunHalted", "tick": 240, "clock": 3.0, "ticked": true}',
+            b'{"kind": "RunHalted", "tick": 1e12, "clock": 0.1, "is_tree_ticked": true}',
+            '"tick" is 1000000000000.0',
+        ),
+        (
+            b'{"kind": "RunHalted", "tick": 1, "clock": "0", "is_tree_ticked": true}',
+            "\"clock\" is '0', not a time",
+        ),
+        (b'{"kind": "RunHalted", "tick": 1, "clock": NaN, "is_tree_ticked": true}', "expected value"),
+        (
+            b'{"kind": "RunHalted", "tick": 240, "clock": 3.0, "is_tree_ticked": true}',
             '"tick" 240 and "clock" 3.0 contra',
         ),
         (
@@ -260,7 +269,7 @@ def test_a_new_run_needs_a_new_journal_and_one_that_goes_on_an_old_one(path):
         ),
         (
             encode_event(at(1, frame_searched(detected("cube")))).replace(b'"label"', b'"name"'),
-            '"found.0.label" of Fr',
+            '"confident.0.label" of Fr',
         ),
         (
             encode_event(at(1, item_changed("cube-1"))).replace(b"[0.5, 0.0, 0.02]", b"[0.5, 0.0]"),
@@ -292,7 +301,7 @@ def test_a_journal_of_the_first_format_is_named(path, first, version):
     with pytest.raises(InputError) as raised:
         read_journal(path)
     assert str(raised.value) == (
-        f"{path}: this journal has format 1, written by executive {version}; this version reads format 2; "
+        f"{path}: this journal has format 1, written by executive {version}; this version reads format 3; "
         f"read the journal with executive {version}, or run the mission again"
     )
 
@@ -314,7 +323,7 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
         run_started(requests=["cube"], params={"a": [1, 0.5]}), NODE,
         skill_ended("a/Grasp", outputs={"x": [1]}),
         BranchChosen("a", "again", "Grasp.missed", "no seal"),
-        frame_searched(detected("cube"), unknown=["x"]),
+        frame_searched(detected("cube"), unknown_labels=["x"]),
         item_changed("cube-1"), TargetSelected("cube-1", "cube", 1, "red_bin"), MotionPlanned(True, 0.0, 1.5),
         ToolCommanded("close"), InputRead("sensor", 1, value), OperatorAsked(["cube"]), RequestGiven(None),
         FaultInjected("seal_breaks", "a", "cube-1", "cube", [0.5]), RunHalted(True),

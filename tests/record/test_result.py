@@ -28,7 +28,8 @@ AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "fell_in_wrong_b
 
 def result(audit=AUDIT, status="SUCCESS", empty=True) -> Result:
     return Result(
-        mission="sort", seed=7, status=status, reason="", message="", node="", empty=empty, items=ITEMS,
+        mission="sort", seed=7, status=status, reason="", message="", node="", is_table_empty=empty,
+        items=ITEMS,
         audit=None if audit is None else make_audit(asdict(ITEMS), audit, empty), ticks=240, run="r",
     )  # fmt: skip
 
@@ -46,9 +47,9 @@ def test_is_written_and_can_be_read_again(tmp_path):
     write_result(tmp_path / "result.json", result())
     written = json.loads((tmp_path / "result.json").read_text())
     assert list(written) == [
-        "version", "mission", "status", "reason", "message", "node", "holds", "seed", "items", "unknown",
-        "doubts", "empty", "audit", "planning", "requests", "ticks", "robot_time_s", "wall_time_s", "trace",
-        "run", "story",
+        "version", "mission", "status", "reason", "message", "node", "held_item", "seed", "items",
+        "unknown_labels", "assumption_reasons", "is_table_empty", "audit", "planning", "requests", "ticks",
+        "robot_time_s", "wall_time_s", "trace", "run", "diagnosis",
     ]  # fmt: skip
     assert written["audit"] == {"agrees": True, **AUDIT}
     (tmp_path / "journal.jsonl").touch()

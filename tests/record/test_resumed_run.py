@@ -205,7 +205,7 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
                 os.kill(os.getpid(), signal.SIGINT)
 
     halted = run_of(load(missions, "sort_overhead"), tmp_path, views=[Stopper(0, 0)])
-    assert (halted.status, bool(halted.holds)) == ("HALTED", True)
+    assert (halted.status, bool(halted.held_item)) == ("HALTED", True)
     path = Path(halted.run)
     result = resumed(path)
     assert (result.status, result.items.placed) == ("SUCCESS", 6)
@@ -213,7 +213,7 @@ def test_a_run_that_was_halted_goes_on(missions: Path, tmp_path: Path) -> None:
     assert redecided(path) == ""
     events = [one.event for one in read_journal(path / "journal.jsonl")]
     since = [type(event) for event in events].index(RunResumed)
-    ahead = [event.ahead for event in events[since:] if isinstance(event, MotionPlanned)]
+    ahead = [event.planned_ahead for event in events[since:] if isinstance(event, MotionPlanned)]
     assert sum(ahead) == 6 + 5, "on the cell itself the ways into bins and to next targets are planned ahead"
 
 

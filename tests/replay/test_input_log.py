@@ -28,7 +28,7 @@ def test_answers_are_in_order_by_the_name_of_the_input() -> None:
     log = InputLog.from_events(
         [START, sense(0, False), sense(0, "arm", name="arm.met"), sense(7, True, nth=2)]
     )
-    assert [(one.tick, one.reading.nth, one.reading.value) for one in log.inputs["tool.holding"]] == [
+    assert [(one.tick, one.reading.read_number, one.reading.value) for one in log.inputs["tool.holding"]] == [
         (0, 1, False),
         (7, 2, True),
     ]

@@ -78,7 +78,7 @@ class Bench:
     @property
     def ahead(self) -> list[bool]:
         """For each motion so far, True if it was planned ahead."""
-        return [plan.ahead for plan in self.plans]
+        return [plan.planned_ahead for plan in self.plans]
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_after_the_first_approach_nothing_is_waited_for(bench: Bench, label: str
     bench.carry(targets)
     bench.carry(targets)
     assert bench.ahead == [False, True, True, True]
-    assert [plan.waits for plan in bench.plans] == [LATENCY, 0, 0, 0]
+    assert [plan.delay for plan in bench.plans] == [LATENCY, 0, 0, 0]
 
 
 def test_the_next_target_is_the_one_that_is_selected_when_the_arm_is_free(bench: Bench) -> None:
@@ -133,7 +133,7 @@ def test_an_approach_that_was_not_foreseen_is_waited_for(bench: Bench, change: s
         duck.position[0] += 0.002
         targets = bench.look()
     bench.run(Approach(target=sort_pickable_targets(bench.context.cell, targets)[change == "another"]))
-    assert (bench.ahead[-1], bench.plans[-1].waits) == (False, LATENCY)
+    assert (bench.ahead[-1], bench.plans[-1].delay) == (False, LATENCY)
 
 
 def test_a_carry_to_another_bin_is_waited_for_and_the_approach_after_it_is_not(bench: Bench) -> None:

@@ -88,7 +88,11 @@ def variables(root: Behaviour) -> list[dict[str, Any]]:
 def items_of(workcell: Workcell) -> dict[str, object]:
     """Return the counts and the final states of the items, and the labels and doubts of the ledger."""
     accounts = workcell.accounts
-    details = {"unknown": accounts.unknown, "doubts": accounts.doubts, "rows": accounts.summaries()}
+    details = {
+        "unknown": accounts.unknown,
+        "reasons": accounts.assumption_reasons,
+        "rows": accounts.summaries(),
+    }
     return {**accounts.count_states(), **details}
 
 

@@ -49,7 +49,7 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
     rejected = next(row for row in run.workcell.accounts.summaries() if row.state == "rejected")
-    assert rejected.why == "could not be picked (6 failed attempts)"
+    assert rejected.reason == "could not be picked (6 failed attempts)"
 
 
 def test_a_reason_nobody_catches_ends_the_mission(missions: Path) -> None:
@@ -100,7 +100,7 @@ def test_requests_are_served_in_order_and_the_rest_is_left(missions: Path) -> No
         fake.world.put(label, x, y)
     outcome, items, audit = run.execute(), run.count_items(), run.count_ground_truth()
     assert outcome.status == "SUCCESS"
-    assert [one.event.wanted for one in events if isinstance(one.event, RequestGiven)] == [
+    assert [one.event.request for one in events if isinstance(one.event, RequestGiven)] == [
         "cube",
         "rescan",
         "cube",

@@ -54,7 +54,7 @@ def test_the_held_item_is_reported_at_the_end(missions: Path) -> None:
             run.control.stop()
 
     run = make(missions, stop)
-    held = run.execute().holds
+    held = run.execute().held_item
     assert held in {row.item for row in run.workcell.accounts.summaries()}
 
 

@@ -39,7 +39,7 @@ def test_an_item_whose_place_stays_unknown_is_rejected(fake: FakeCell, targets: 
     recover(fake)
     fake.ledger.close(completed=True)
     (cube,) = (one for one in fake.ledger.summaries() if one.item == "cube-1")
-    assert (cube.state, cube.why) == ("rejected", REASON_UNTRACKED)
+    assert (cube.state, cube.reason) == ("rejected", REASON_UNTRACKED)
 
 
 def test_an_object_that_no_look_had_shown_is_counted_in_its_bin(fake: FakeCell) -> None:

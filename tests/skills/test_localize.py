@@ -59,7 +59,7 @@ def test_an_object_too_high_for_its_class_in_the_depth_image_contradicts_it(fake
     fake.world.put("cube", 0.5, 0.0)
     look_in_depth(fake, 0.08, times=3)
     (row,) = fake.ledger.summaries()
-    assert (row.state, row.why) == (
+    assert (row.state, row.reason) == (
         "rejected",
         "no look is certain of it: its top is 80 mm above the table, "
         "and that of a cube 50, 100, 106 or 110 mm",

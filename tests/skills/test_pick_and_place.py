@@ -183,7 +183,7 @@ def test_an_item_is_given_up_with_its_reason_after_the_failures_the_mission_gran
         fake.ledger.record_miss("cube-1")
         run_skill(RejectTarget(item="cube-1", after=2), fake)
         assert fake.ledger.is_open("cube-1") is is_open, failures
-    assert fake.ledger.summaries()[0].why == "could not be picked (2 failed attempts)"
+    assert fake.ledger.summaries()[0].reason == "could not be picked (2 failed attempts)"
 
 
 def test_move_to_scan_goes_to_the_cameras_first_pose_only_if_the_table_is_out_of_view(fake: FakeCell) -> None:

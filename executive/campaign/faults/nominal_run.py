@@ -80,7 +80,9 @@ def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
             f"{description} ends as {outcome.status} {outcome.reason}: {outcome.message}; "
             "a campaign needs a run that succeeds: choose another seed"
         )
-    if audit is not None and (audit["unseen"] or not is_confirmed_by_audit(items, audit, outcome.empty)):
+    if audit is not None and (
+        audit["unseen"] or not is_confirmed_by_audit(items, audit, outcome.is_table_empty)
+    ):
         raise InputError(
             f"{description} ends with a wrong ledger: the ledger says {format_counts(items)}; "
             f"the audit {format_counts(audit)}; choose another seed, or a mission that observes the "

@@ -29,7 +29,7 @@ class DetectorEnvelope:
     """Error rates of one detector, and the measured conditions to which they apply.
 
     Attributes:
-        error_rates: Measured error rates, or assumed error rates if `error_rates.doubt` is not "".
+        error_rates: Measured error rates, or assumed error rates (with an `assumption_reason`).
         frame_range: Ranges of the frame statistics in the measurement; None if unknown or not measured.
     """
 
@@ -133,8 +133,8 @@ def find_unmeasured_detectors(
 ) -> Iterator[tuple[tuple[str, str], str]]:
     """Yield each detector without an applicable measurement: its keys in the cell file, and the reason."""
     for name, envelope in find_envelopes(config, base, folders).items():
-        if envelope.error_rates.doubt:
-            yield ("detectors", name), envelope.error_rates.doubt
+        if envelope.error_rates.assumption_reason:
+            yield ("detectors", name), envelope.error_rates.assumption_reason
 
 
 def find_measurable_detectors(config: CellConfig) -> Iterator[str]:

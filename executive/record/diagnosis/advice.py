@@ -31,8 +31,8 @@ def give_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[
     """
     if arm != "at rest":
         yield f"keep away from the arm until you have seen it stand still: {arm}"
-    if run.end.holds:
-        content = "the object" if run.end.holds == "something" else run.end.holds
+    if run.end.held_item:
+        content = "the object" if run.end.held_item == "something" else run.end.held_item
         can_resume = run.end.status != "FAILURE"
         resumption = f"to resume this run, leave {content} in the tool; " if can_resume else ""
         yield f"{resumption}take {content} out of the tool before a new run"

@@ -73,23 +73,23 @@ def diagnose(
         verdict=describe_cause(run),
         node=_make_deciding_node(run),
         item=run.item,
-        chain=[
+        passed_nodes=[
             PassedNode(entry.node.path, entry.name, _format_place(entry.node), entry.explanation)
             for entry in run.failure_path
             if entry.explanation or entry is run.failure_path[-1]
         ],
-        reads=reads,
-        look=_find_last_look(run),
-        lost=[_make_lost_item(name, item) for name, item in run.lost_items.items()],
-        running=[run.format_skill_name(path) for path in run.halted_skills],
-        left=[name for name, item in left.items() if item.last_change.label in loaded.routes],
-        arm=arm,
-        holds=end.holds,
+        readings=reads,
+        last_look=_find_last_look(run),
+        lost_items=[_make_lost_item(name, item) for name, item in run.lost_items.items()],
+        halted_skills=[run.format_skill_name(path) for path in run.halted_skills],
+        unsorted_items=[name for name, item in left.items() if item.last_change.label in loaded.routes],
+        arm_state=arm,
+        held_item=end.held_item,
         raised_at=_find_exception_place(timeline.traceback),
-        recorded=not run.is_unrecorded,
-        resumes=end.status not in FINAL_STATUSES and (not run.is_unrecorded or has_begun),
+        is_recorded=not run.is_unrecorded,
+        can_resume=end.status not in FINAL_STATUSES and (not run.is_unrecorded or has_begun),
         picture=_find_picture_file(run, run_folder),
-        next=list(give_advice(run, arm, reads)),
+        advice=list(give_advice(run, arm, reads)),
     )
 
 

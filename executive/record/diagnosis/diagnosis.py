@@ -30,13 +30,13 @@ class PassedNode:
 
     Attributes:
         path, name, place: As in `DecidingNode`.
-        why: Reason why the node did not handle the failure; "" for the origin.
+        explanation: Reason why the node did not handle the failure; "" for the origin.
     """
 
     path: str
     name: str
     place: str
-    why: str
+    explanation: str
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,12 @@ class ItemFailure:
     """Last failure of a skill that worked on an item.
 
     Attributes:
-        what: Name of the failure, which consists of skill and reason: `Transit.dropped`.
+        failure: Name of the failure, which consists of skill and reason: `Transit.dropped`.
         message: Message of the failure.
         clock: Time of the failure [s].
     """
 
-    what: str
+    failure: str
     message: str
     clock: float
 
@@ -61,17 +61,17 @@ class LostItem:
     Attributes:
         item: Name of the item.
         look: Last look (image with its detections) in which the item was detected, or None.
-        unseen: Number of looks after `look`.
-        held, dropped: Last times at which the tool picked and dropped the item [s], or None.
-        failed: Last failure of a skill that worked on the item, or None.
+        later_looks: Number of looks after `look`.
+        held_at, dropped_at: Last times at which the tool picked and dropped the item [s], or None.
+        last_failure: Last failure of a skill that worked on the item, or None.
     """
 
     item: str
     look: Sighting | None
-    unseen: int
-    held: float | None
-    dropped: float | None
-    failed: ItemFailure | None
+    later_looks: int
+    held_at: float | None
+    dropped_at: float | None
+    last_failure: ItemFailure | None
 
 
 @dataclass(frozen=True)
@@ -86,19 +86,19 @@ class Diagnosis:
         verdict: The cause in one sentence.
         node: Node that determined the status, or None.
         item: Item that this node worked on, or "".
-        chain: Nodes that did not handle the failure, from the root on, and the origin of the failure.
-        reads: Inputs that the failed skill read from the cell, the latest first.
-        look: Last look in which the item was detected, or else the last look; None without a look.
-        lost: Lost items.
-        running: Names of the skills that were halted, with their items.
-        left: Names of the items that the mission had to sort and did not sort.
-        arm: `at rest`, or a text about the state of the arm.
-        holds: Item that the tool holds, `something` for an unknown object, or "".
+        passed_nodes: Nodes that did not handle the failure, from the root on, and the origin of the failure.
+        readings: Inputs that the failed skill read from the cell, the latest first.
+        last_look: Last look in which the item was detected, or else the last look; None without a look.
+        lost_items: Lost items.
+        halted_skills: Names of the skills that were halted, with their items.
+        unsorted_items: Names of the items that the mission had to sort and did not sort.
+        arm_state: `at rest`, or a text about the state of the arm.
+        held_item: Item that the tool holds, `something` for an unknown object, or "".
         raised_at: File, line and function in which the exception of a fault was raised, or "".
-        recorded: True if the journal contains the whole run.
-        resumes: True if the run can be resumed.
+        is_recorded: True if the journal contains the whole run.
+        can_resume: True if the run can be resumed.
         picture: File of the picture of the failure, relative to the run directory, or "".
-        next: Advice in sentences, the most urgent first.
+        advice: Advice in sentences, the most urgent first.
     """
 
     status: str
@@ -108,16 +108,16 @@ class Diagnosis:
     verdict: str
     node: DecidingNode | None
     item: str
-    chain: Sequence[PassedNode]
-    reads: Sequence[Reading]
-    look: Sighting | Look | None
-    lost: Sequence[LostItem]
-    running: Sequence[str]
-    left: Sequence[str]
-    arm: str
-    holds: str
+    passed_nodes: Sequence[PassedNode]
+    readings: Sequence[Reading]
+    last_look: Sighting | Look | None
+    lost_items: Sequence[LostItem]
+    halted_skills: Sequence[str]
+    unsorted_items: Sequence[str]
+    arm_state: str
+    held_item: str
     raised_at: str
-    recorded: bool
-    resumes: bool
+    is_recorded: bool
+    can_resume: bool
     picture: str
-    next: Sequence[str]
+    advice: Sequence[str]

@@ -45,7 +45,7 @@ def format_diagnosis(diagnosis: Diagnosis, run: str, repeat: str, report: str = 
     for label, text in list_facts(diagnosis):
         lines += wrap_lines(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, max_lines=3)
     commands = {"record": run, "report": report, "repeat": repeat}
-    if diagnosis.resumes:
+    if diagnosis.can_resume:
         commands["resume"] = make_resume_command(run)
     return lines + [f"{label:{_LABEL_WIDTH}}{command}" for label, command in commands.items() if command]
 
@@ -53,34 +53,36 @@ def format_diagnosis(diagnosis: Diagnosis, run: str, repeat: str, report: str = 
 def list_facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     """Yield label and sentence of each fact, except the verdict and the failure path."""
     node = diagnosis.node
-    if node is not None and not any(passed.why for passed in diagnosis.chain):
+    if node is not None and not any(passed.explanation for passed in diagnosis.passed_nodes):
         yield "where", f"{node.path} ({node.place})"
     if diagnosis.raised_at:
-        hint = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.recorded else ""
+        hint = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.is_recorded else ""
         yield "raised at", diagnosis.raised_at + hint
-    if diagnosis.reads:
-        reads = diagnosis.reads[:_MAX_READINGS]
+    if diagnosis.readings:
+        reads = diagnosis.readings[:_MAX_READINGS]
         yield "the cell", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in reads)
-    for lost in diagnosis.lost[:_MAX_LOST_ITEMS]:
+    for lost in diagnosis.lost_items[:_MAX_LOST_ITEMS]:
         yield "lost", _format_lost_item(lost)
     # The sentence about a lost item contains its last look.
-    if not diagnosis.lost:
-        yield "last look", _format_look(diagnosis.look)
+    if not diagnosis.lost_items:
+        yield "last look", _format_look(diagnosis.last_look)
     if diagnosis.picture:
         yield "picture", diagnosis.picture
     tool_texts = {"": "is empty", "something": "holds an unknown object"}
-    arm = "the arm is at rest" if diagnosis.arm == "at rest" else f"the arm: {diagnosis.arm}"
-    yield "now", f"{arm}, the tool {tool_texts.get(diagnosis.holds, 'holds ' + diagnosis.holds)}"
-    if diagnosis.left:
-        yield "left to do", f"{len(diagnosis.left)}: {', '.join(diagnosis.left)}"
-    for sentence in diagnosis.next:
+    arm = "the arm is at rest" if diagnosis.arm_state == "at rest" else f"the arm: {diagnosis.arm_state}"
+    yield "now", f"{arm}, the tool {tool_texts.get(diagnosis.held_item, 'holds ' + diagnosis.held_item)}"
+    if diagnosis.unsorted_items:
+        yield "left to do", f"{len(diagnosis.unsorted_items)}: {', '.join(diagnosis.unsorted_items)}"
+    for sentence in diagnosis.advice:
         yield "next", sentence
 
 
 def _format_failure_path(diagnosis: Diagnosis) -> list[str]:
     """Return a line for each node that did not handle the failure, and for the origin of the failure."""
     mission_prefix = f"{diagnosis.mission}:"
-    passed = [(entry.name, entry.why, entry.place) for entry in diagnosis.chain if entry.why]
+    passed = [
+        (entry.name, entry.explanation, entry.place) for entry in diagnosis.passed_nodes if entry.explanation
+    ]
     node = diagnosis.node
     if not passed or node is None:
         return []
@@ -125,15 +127,15 @@ def _format_look(look: Sighting | Look | None) -> str:
 
 
 def _format_lost_item(lost: LostItem) -> str:
-    look, failed, dropped = lost.look, lost.failed, lost.dropped
+    look, failed, dropped = lost.look, lost.last_failure, lost.dropped_at
     facts = [lost.item]
     if look is not None:
         facts[0] += f" seen last{_format_position(look.position)} at {look.clock:.2f} s"
-        facts[0] += f", not in the {_format_count(lost.unseen, 'look')} since"
+        facts[0] += f", not in the {_format_count(lost.later_looks, 'look')} since"
     if dropped is not None and (failed is None or failed.clock != dropped):
         facts.append(f"dropped at {dropped:.2f} s")
     if failed is not None:
-        facts.append(f"{failed.what} at {failed.clock:.2f} s: {failed.message}")
+        facts.append(f"{failed.failure} at {failed.clock:.2f} s: {failed.message}")
     return "; ".join(facts)
 
 

@@ -115,14 +115,14 @@ class ItemsTimeline:
 
     def add_look(self, event: FrameSearched, clock: float) -> None:
         """Add a look at the time `clock` [s], after `add_change` has added the changes of its items."""
-        self.look = Look(event.frame, event.camera, event.detector, clock, len(event.found))
+        self.look = Look(event.frame, event.camera, event.detector, clock, len(event.confident))
         # The classes of a look are sorted, so that most runs of a mission have the same order of classes.
-        self.classes |= dict.fromkeys(sorted(found.label for found in event.found))
+        self.classes |= dict.fromkeys(sorted(found.label for found in event.confident))
         for item in self.by_name.values():
             item.unseen_look_count += 1
         for name in self._newly_seen:
             item = self.by_name[name]
-            item.sighting = _make_sighting(self.look, item.last_change, event.found)
+            item.sighting = _make_sighting(self.look, item.last_change, event.confident)
             item.unseen_look_count = 0
         self._newly_seen.clear()
 

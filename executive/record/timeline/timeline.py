@@ -105,13 +105,13 @@ class Timeline:
                     self.selections.append((self.clock, event.item))
             case events.MotionPlanned():
                 self.planning.motions += 1
-                self.planning.ahead += event.ahead
-                self.planning.waited_s += event.waits
+                self.planning.ahead += event.planned_ahead
+                self.planning.waited_s += event.delay
             case events.OperatorAsked():
                 self.question = event
             case events.RequestGiven():
                 self.question = None
-                self.requests.append(event.wanted)
+                self.requests.append(event.request)
             case events.FaultInjected():
                 self.faults.append((self.clock, event.name))
             case events.FaultRaised():
@@ -191,5 +191,5 @@ class Timeline:
         self._readings.pop(event.name, None)
         # The diagnosis quotes only values of these types, not poses, images or lists.
         if isinstance(event.value, (bool, int, float, str)):
-            reading = Reading(event.name, event.value, event.raised, self.tick, self.clock)
+            reading = Reading(event.name, event.value, event.exception, self.tick, self.clock)
             self._readings[event.name] = reading

@@ -95,7 +95,7 @@ def describe_result(result: Result | RunEnded | None) -> tuple[str, str, str]:
     if isinstance(result, RunEnded):
         return result.status, result.message, ""
     counts = ", ".join(f"{count} {end}" for end, count in asdict(result.items).items() if count)
-    verdict = result.message if result.story is None else result.story.verdict
+    verdict = result.message if result.diagnosis is None else result.diagnosis.verdict
     return result.status, verdict, f"{counts}; {result.robot_time_s:.1f} s"
 
 

@@ -121,7 +121,7 @@ function showItems() {
   find("items").querySelector("tbody").replaceChildren(...rows.map((item) => {
     const row = document.createElement("tr");
     row.className = item.state;
-    for (const text of [item.item, item.label, item.state, item.bin, item.why]) {
+    for (const text of [item.item, item.label, item.state, item.bin, item.reason]) {
       row.appendChild(document.createElement("td")).textContent = text ?? "";
     }
     return row;
@@ -134,7 +134,7 @@ function showCamera() {
   const drawing = makeElement("svg", { viewBox: `0 0 ${look.width} ${look.height}`, class: "look" });
   drawing.append(makeElement("image", { href: look.source, width: look.width, height: look.height }));
   const targetIndex = findTarget(look);
-  look.found.forEach((detection, index) => drawing.append(...drawDetection(detection, index === targetIndex)));
+  look.detections.forEach((detection, index) => drawing.append(...drawDetection(detection, index === targetIndex)));
   document.querySelector("#look .picture").replaceChildren(drawing);
   find("frame").textContent = `${look.camera}, frame ${look.frame} at ${look.stamp.toFixed(2)} s, by ${look.detector}`;
 }
@@ -156,8 +156,8 @@ function findTarget(look) {
   const item = state.decision && state.items[state.decision.item];
   if (!item || !item.position || item.state === "placed") return -1;
   const distance = (detection) => (detection.position ? Math.hypot(detection.position[0] - item.position[0], detection.position[1] - item.position[1]) : Infinity);
-  const nearest = look.found.reduce((best, detection, index) => (best < 0 || distance(detection) < distance(look.found[best]) ? index : best), -1);
-  return nearest >= 0 && distance(look.found[nearest]) < MAX_TARGET_DISTANCE ? nearest : -1;
+  const nearest = look.detections.reduce((best, detection, index) => (best < 0 || distance(detection) < distance(look.detections[best]) ? index : best), -1);
+  return nearest >= 0 && distance(look.detections[nearest]) < MAX_TARGET_DISTANCE ? nearest : -1;
 }
 
 function makeElement(tag, attributes) {

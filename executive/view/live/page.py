@@ -144,7 +144,7 @@ class LivePage:
         if not self._threads:
             return
         if result is not None:
-            message = result.message if result.story is None else result.story.verdict
+            message = result.message if result.diagnosis is None else result.diagnosis.verdict
             self._enqueue(PageChange(result=RunOutcome(result.status, message, result.run, report)))
         self._queue.put(None)
         try:

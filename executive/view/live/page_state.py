@@ -101,5 +101,5 @@ def _encode_look(frame: Frame, look: events.FrameSearched) -> Json:
     return {
         "source": "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode(),
         "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
-        "detector": look.detector, "stamp": frame.stamp, "found": [vars(one) for one in look.found],
+        "detector": look.detector, "stamp": frame.stamp, "detections": [vars(one) for one in look.confident],
     }  # fmt: skip

@@ -62,7 +62,7 @@ def write_report(path: Path) -> Path:
 def render_report(facts: ReportFacts) -> str:
     """Return the report as HTML; texts of missions and skills are escaped."""
     result, timeline = facts.result, facts.timeline
-    story = None if result is None else result.story
+    diagnosis = None if result is None else result.diagnosis
     item_names = [item.item for item in facts.objects]
     params = facts.start.params
     return render_template(
@@ -73,10 +73,12 @@ def render_report(facts: ReportFacts) -> str:
         verdict=_describe_end(facts),
         counts={} if result is None else asdict(result.items),
         audit=asdict(result.audit) if result is not None and result.audit is not None else {},
-        unknown=describe_unknown_labels({} if result is None else result.unknown),
-        story=story,
-        story_facts=[] if story is None else list(diagnosis_text.list_facts(story)),
-        last_picture=next((each for each in facts.pictures if story and each.file == story.picture), None),
+        unknown=describe_unknown_labels({} if result is None else result.unknown_labels),
+        diagnosis=diagnosis,
+        diagnosis_facts=[] if diagnosis is None else list(diagnosis_text.list_facts(diagnosis)),
+        last_picture=next(
+            (picture for picture in facts.pictures if diagnosis and picture.file == diagnosis.picture), None
+        ),
         titles={node.path: node.title for node in facts.nodes},
         describe_place=describe_place_on_table,
         colours=_choose_colours(facts.activity_times.activities),
@@ -104,8 +106,8 @@ def _describe_status(facts: ReportFacts) -> str:
     result, end = facts.result, facts.end
     if end is None:
         return "The journal has no end: the run was killed, or is still running."
-    if result is not None and result.story is not None:
-        return result.story.verdict
+    if result is not None and result.diagnosis is not None:
+        return result.diagnosis.verdict
     if end.message:
         return end.message
     if result is None:

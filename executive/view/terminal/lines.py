@@ -68,7 +68,7 @@ class LineView:
                 after = f", after {event.reason}" if event.reason else ""
                 return f"{self._names_by_path[event.node]}: {event.choice}{after}"
             case events.RequestGiven():
-                return f"request: {event.wanted}"
+                return f"request: {event.request}"
             case events.ItemChanged():
                 return self._describe_change(event)
         return ""
@@ -82,8 +82,8 @@ class LineView:
         if item is not None and _get_described_fields(item.last_change) == _get_described_fields(change):
             return ""
         bin_text = f" in {change.bin}" if change.state == "placed" and change.bin else ""
-        return f"{change.item} {change.state}{bin_text}" + (f": {change.why}" if change.why else "")
+        return f"{change.item} {change.state}{bin_text}" + (f": {change.reason}" if change.reason else "")
 
 
 def _get_described_fields(change: events.ItemChanged) -> tuple[str, ...]:
-    return change.label, change.state, change.bin, change.why
+    return change.label, change.state, change.bin, change.reason

@@ -63,12 +63,13 @@ def format_summary(
     times = f"{result.robot_time_s:.1f} s on the robot's clock, {result.wall_time_s:.1f} s by the wall clock"
     groups = sorted(group_items_by_outcome(items).items())
     outcomes = [f"  {outcome}: {', '.join(names)}" for outcome, names in groups]
-    if unknown := describe_unknown_labels(result.unknown):
+    if unknown := describe_unknown_labels(result.unknown_labels):
         outcomes.append(f"  {unknown}")
-    outcomes += [f"  assumed error rates: {doubt}" for doubt in result.doubts]
+    outcomes += [f"  assumed error rates: {doubt}" for doubt in result.assumption_reasons]
     warning = wrap_lines(describe_disagreement(result), "", "  ", max_lines=3)
-    if result.story is not None:
-        lines = [times, *outcomes, "", *format_diagnosis(result.story, result.run, repeat_command, report)]
+    if result.diagnosis is not None:
+        diagnosis = format_diagnosis(result.diagnosis, result.run, repeat_command, report)
+        lines = [times, *outcomes, "", *diagnosis]
     else:
         end = describe_end(result.status, result.reason, result.node, result.message)
         lines = [end, times, f"{result.run}  (repeat: {repeat_command})", *outcomes]
@@ -97,7 +98,7 @@ def group_items_by_outcome(items: Iterable[ItemChanged]) -> dict[str, list[str]]
         elif item.state == "placed":
             outcomes[item.bin].append(item.item)
         else:
-            details = ": ".join(filter(None, (describe_place_on_table(item), item.why)))
+            details = ": ".join(filter(None, (describe_place_on_table(item), item.reason)))
             outcomes[item.state].append(f"{item.item} ({details})" if details else item.item)
     if phantom_count:
         outcomes["phantom"].append(f"{phantom_count} seen by mistake")

@@ -47,8 +47,8 @@ def test_a_motion_planned_ahead_is_known_at_once_and_begins_where_the_running_on
     rig.run()
     planning = rig.arm.plan(BESIDE)
     assert planning.ready
-    assert rig.events[-1].ahead is True
-    assert rig.events[-1].waits == 0.0
+    assert rig.events[-1].planned_ahead is True
+    assert rig.events[-1].delay == 0.0
     second = planning.result()
     assert np.array_equal(second.start, first.end)
     rig.arm.start(second)
@@ -62,7 +62,7 @@ def test_a_motion_planned_ahead_too_late_is_waited_for_as_long_as_it_takes(rig: 
     rig.arm.plan_ahead("home")
     rig.step(4)
     assert not rig.arm.plan("home").ready
-    assert rig.events[-1].waits == pytest.approx(20 / 240, abs=1e-4)
+    assert rig.events[-1].delay == pytest.approx(20 / 240, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_what_was_planned_ahead_answers_no_other_question(rig: Rig, goal: Goal |
     rig.arm.plan_ahead(BESIDE)
     rig.step(20)
     assert not rig.arm.plan(goal, task).ready
-    assert rig.events[-1].ahead is False
+    assert rig.events[-1].planned_ahead is False
 
 
 def test_what_was_planned_ahead_is_of_no_use_once_the_arm_was_stopped_on_its_way(rig: Rig) -> None:

@@ -83,7 +83,7 @@ def test_a_camera_that_is_moved_during_a_run_ends_it_once_the_tool_is_empty() ->
 
     kind = partial(make_oracle_kind(), camera=partial(Pushed, renders_images=True))
     result = run_mission("sort_overhead", kind, seed=1)
-    assert (result.status, result.reason, result.holds) == ("FAILURE", "Detect.camera_moved", "")
+    assert (result.status, result.reason, result.held_item) == ("FAILURE", "Detect.camera_moved", "")
     assert result.agrees and result.items["placed"] > 0
 
 

@@ -69,7 +69,7 @@ def test_a_damaged_file_is_named_and_the_rates_are_assumed(overhead, tmp_path):
     (tmp_path / "overhead.measured.json").write_text("{")
     error_rates = find_envelopes(overhead, tmp_path, [tmp_path])["embedded"].error_rates
     assert (error_rates.miss_rate, error_rates.repeated) == (0.15, 0.8)
-    reason = error_rates.doubt
+    reason = error_rates.assumption_reason
     assert "was never measured in this cell" in reason
     assert f"the measurements in {tmp_path}/overhead.measured.json cannot be read" in reason
 
@@ -104,7 +104,7 @@ def test_rates_are_assumed_for_frames_outside_the_measured_ranges(overhead, colo
     envelope = DetectorEnvelope(RATES.build_error_rates(0.5), WOOD)
     detector = RatedDetector(Silent(), envelope, overhead, "embedded")
     answered = detector.request(frame_of(colour), "table").result().error_rates
-    doubt = answered.doubt
+    doubt = answered.assumption_reason
     assert answered == (assume_rates(0.5, doubt) if doubted else RATES.build_error_rates(0.5))
     start = "the workspace differs from all images with which detector embedded was measured: "
     assert doubt.startswith(f"{start}brightness 60, measured 180 to 195; red 60") == doubted

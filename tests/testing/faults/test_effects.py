@@ -110,7 +110,7 @@ def test_an_operator_wants_something_else_first() -> None:
         "operator_asks_rescan",
         "operator_quits",
     ]
-    assert [one.event.wanted for one in result.events if isinstance(one.event, RequestGiven)] == ["cube"]
+    assert [one.event.request for one in result.events if isinstance(one.event, RequestGiven)] == ["cube"]
 
 
 def ask(cell: FaultyCell) -> Request:

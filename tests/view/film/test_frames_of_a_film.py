@@ -123,7 +123,7 @@ STORY = SimpleNamespace(verdict="Grasp failed: no seal")
     [
         (RESULT, ("SUCCESS", "", "6 seen, 5 placed, 1 rejected; 15.5 s")),
         (
-            replace(RESULT, status="FAILURE", message="x", story=STORY),
+            replace(RESULT, status="FAILURE", message="x", diagnosis=STORY),
             ("FAILURE", "Grasp failed: no seal", "6 seen, 5 placed, 1 rejected; 15.5 s"),
         ),
         (run_ended("HALTED", message="by the user"), ("HALTED", "by the user", "")),

@@ -101,7 +101,7 @@ def test_an_image_is_shown_with_what_the_arm_hides_darker() -> None:
     data = base64.b64decode(look.pop("source").removeprefix("data:image/jpeg;base64,"))
     assert look == {
         "frame": 3, "camera": "wrist", "detector": "embedded", "stamp": 0.5, "width": 64, "height": 48,
-        "found": [vars(box)],
+        "detections": [vars(box)],
     }  # fmt: skip
     shown = cv2.cvtColor(cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
     assert np.allclose(shown[24, 8], (200, 100, 50), atol=6)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html.parser import HTMLParser
 
-SECTIONS = ("story", "commands", "objects", "timeline", "tree", "inputs")
+SECTIONS = ("diagnosis", "commands", "objects", "timeline", "tree", "inputs")
 EMPTY = {"meta", "link", "img"}
 
 

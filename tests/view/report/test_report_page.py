@@ -50,9 +50,12 @@ def test_the_verdict_comes_first_and_then_why_objects_timeline_and_tree(failed):
     )
     for section, words in (
         ("header", "trial , seed 3, 1.4 s on the robot's clock"),
-        ("story", "Nodes that did not handle the failure, from the root down: retry all 2 attempts failed"),
-        ("story", "tree/5:retry/do/Grasp"),
-        ("story", "left to do 2: sphere-1"),
+        (
+            "diagnosis",
+            "Nodes that did not handle the failure, from the root down: retry all 2 attempts failed",
+        ),
+        ("diagnosis", "tree/5:retry/do/Grasp"),
+        ("diagnosis", "left to do 2: sphere-1"),
         ("tree", "2 failed missed: no seal on"),
         ("timeline", "Grasp Grasp of sphere-1: FAILURE"),
     ):

@@ -134,7 +134,7 @@ RESULT = Result(
 def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_a_shell():
     items = [
         item_changed("cube-1", "placed", bin="red_bin"), item_changed("cube-2", "placed", bin="red_bin"),
-        item_changed("duck-1", "rejected", position=[0.5, 0.1, 0.0], why="three misses"),
+        item_changed("duck-1", "rejected", position=[0.5, 0.1, 0.0], reason="three misses"),
     ]  # fmt: skip
     repeat = format_repeat_command("my mission.yaml", 7, {"attempts": "a b"}, ["cube"])
     lines = [

@@ -74,7 +74,7 @@ def test_a_time_that_is_over(abroad) -> None:
     story = FailedRun(tree, objects=CUBE, overrides={"patience": "1.0"}).tell()
     assert story.verdict == "timeout: the body was not done after 1 s during Transit of cube-1"
     assert (story.node.path, story.node.place) == ("tree/timeout", "trial.yaml:7")
-    assert story.next == [
+    assert story.advice == [
         "take cube-1 out of the tool before a new run",
         "to let the mission continue after timeout.timeout: add a try with a catch for this failure "
         "around line 7, or allow more than 1 s with --set patience=...",
@@ -109,9 +109,9 @@ def test_a_detector_that_gives_no_answer(at_home) -> None:
     run = FailedRun("sort_overhead", objects=CUBE)
     run.fake.detector.answers = lambda look, true: "the server is gone"
     story = run.tell()
-    chain = [link.why for link in story.chain if link.why]
+    chain = [link.explanation for link in story.passed_nodes if link.explanation]
     assert chain[0::2] == ["catches only Detect.unsure", "all 10 attempts failed: 10 x Detect.unavailable"]
-    assert [unnumbered(each) for each in story.next] == [
+    assert [unnumbered(each) for each in story.advice] == [
         "make sure that detector.embedded answers again",
         "to let the mission continue after Detect.unavailable: catch this failure in the try at "
         "missions/library/sorting.yaml:N, or allow more than 10 attempts at missions/library/sorting.yaml:N",
@@ -123,16 +123,16 @@ def test_a_camera_that_was_moved_is_mounted_again_and_its_failure_not_caught(at_
     run.fake.camera.displacement_message = "camera overhead is not where the cell file says"
     story = run.tell()
     assert story.reason == "Detect.camera_moved"
-    assert story.next == ["mount camera and bins as the cell file says, or measure the pose again"]
+    assert story.advice == ["mount camera and bins as the cell file says, or measure the pose again"]
 
 
 def test_a_halt_while_something_hangs_on_the_tool(at_home) -> None:
     run = FailedRun("sort_overhead", objects=[*CUBE, *DUCK])
     run.at_every_step(lambda: run.run.control.stop() if run.fake.world.held and run.height > 0.1 else None)
     story = run.tell()
-    assert (story.holds, story.left, story.resumes) == ("cube-1", ["cube-1", "duck-1"], True)
+    assert (story.held_item, story.unsorted_items, story.can_resume) == ("cube-1", ["cube-1", "duck-1"], True)
     assert story.verdict == "halted by the user during Transit of cube-1 and Wait"
-    assert story.next == [
+    assert story.advice == [
         "to resume this run, leave cube-1 in the tool; take cube-1 out of the tool before a new run"
     ]
 
@@ -185,9 +185,10 @@ next        to let the mission continue after PutDown.blocked: catch this failur
 
 STORY = Diagnosis(
     status="FAILURE", reason="Grasp.missed", clock=1.0, mission="trial.yaml", item="",
-    verdict="Grasp failed (missed): no seal", chain=[], reads=[], look=None, lost=[],
-    node=DecidingNode("tree/Grasp", "Grasp", "trial.yaml:7"), running=[], left=[], arm="at rest", holds="",
-    raised_at="", picture="", next=[], recorded=True, resumes=False,
+    verdict="Grasp failed (missed): no seal", passed_nodes=[], readings=[], last_look=None, lost_items=[],
+    node=DecidingNode("tree/Grasp", "Grasp", "trial.yaml:7"), halted_skills=[], unsorted_items=[],
+    arm_state="at rest", held_item="",
+    raised_at="", picture="", advice=[], is_recorded=True, can_resume=False,
 )  # fmt: skip
 
 
@@ -197,10 +198,10 @@ def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
     story = replace(
         STORY,
         verdict="Grasp failed: " + "no seal, " * 90,
-        chain=[*chain, PassedNode("tree/Grasp", "Grasp", "trial.yaml:7", "")],
-        look=Sighting(1, "c", "d", 1.0, "cube-1", 0, 1, "cube", 0.5, [0.1, 0.2, 0.3]),
-        left=[f"cube-{index}" for index in range(400)],
-        next=["do this " * 60],
+        passed_nodes=[*chain, PassedNode("tree/Grasp", "Grasp", "trial.yaml:7", "")],
+        last_look=Sighting(1, "c", "d", 1.0, "cube-1", 0, 1, "cube", 0.5, [0.1, 0.2, 0.3]),
+        unsorted_items=[f"cube-{index}" for index in range(400)],
+        advice=["do this " * 60],
         picture="frames/000001_cube-1_missed.jpg",
     )
     repeat = "executive run trial" + " --set a=b" * 30
@@ -223,5 +224,7 @@ def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
     ],
 )
 def test_what_is_known_of_arm_and_tool_is_said_in_words(arm, holds, said) -> None:
-    lines = format_diagnosis(replace(STORY, arm=arm, holds=holds), "runs/latest", "executive run trial")
+    lines = format_diagnosis(
+        replace(STORY, arm_state=arm, held_item=holds), "runs/latest", "executive run trial"
+    )
     assert any(re.fullmatch(f"now         the arm ?{said}", line) for line in lines)
