@@ -1,4 +1,4 @@
-"""Error classes, and functions that make text from users and servers safe for messages."""
+"""Error classes, and functions for the texts of error messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _CONTROL_CHARACTER = re.compile(
 """Control characters except tab and line feed, invisible Unicode format characters, Unicode line separators,
 and lone surrogates."""
 _QUOTATION_OR_WORD = re.compile(r'"[^"\n]*"|\S+')
-"""A quotation or a word."""
+"""A quotation in double quotes within one line, or a word: the pieces of a message that may be too long."""
 
 
 class ExecutiveError(Exception):
@@ -40,7 +40,7 @@ class InputError(ExecutiveError):
 
 
 class Fault(ExecutiveError):
-    """A bug or a broken device. It ends the run without retries, after the arm has braked to rest.
+    """A bug or a broken device. A fault ends the run without retries, after the arm has braked to rest.
 
     Attributes:
         node: Path of the tree node that raised the fault, or "" outside the tree.
@@ -52,15 +52,15 @@ class Fault(ExecutiveError):
 
 
 class RecordLost(Fault):
-    """The record cannot be written or was deleted; the run stops, because it could not be explained later."""
+    """The record of the run cannot be written or was deleted. The run ends: nobody could explain it later."""
 
 
 class Unreachable(ExecutiveError):
-    """No joint configuration within the limits reaches a goal; the message states by how much."""
+    """No joint configuration within the joint limits reaches a goal; the message states the distance."""
 
 
 class Blocked(ExecutiveError):
-    """Every motion comes too close to an obstacle; the message names the obstacle and the distance."""
+    """Every motion to a goal comes too close to an obstacle; the message states obstacle and distance."""
 
 
 class Unavailable(ExecutiveError):
@@ -68,7 +68,7 @@ class Unavailable(ExecutiveError):
 
 
 class Crowded(Unavailable):
-    """A detector found more boxes than there can be objects in a cell."""
+    """A detector found more boxes than the maximum number of objects in a cell."""
 
 
 class DeadlinePassed(Unavailable):
@@ -76,47 +76,49 @@ class DeadlinePassed(Unavailable):
 
 
 class NoDepth(ExecutiveError):
-    """A detection cannot be localized, because the depth image has no usable values in its box."""
+    """A detection cannot be localized, for instance because the depth image has no values in the box."""
 
 
 class Stopped(BaseException):
     """The run was halted while a skill waited for the operator.
 
-    A halt is not a failure; `except Exception` in a skill does not catch this exception.
+    A halt is not a failure, so `except Exception` in a skill does not catch this exception.
     """
 
 
 def describe_os_error(error: OSError) -> str:
-    """Return the message of an error of the operating system, in lower case."""
+    """Return the message of an operating system error in lower case."""
     return (error.strerror or str(error)).lower()
 
 
 @contextmanager
-def explain_os_errors(kind: type[ExecutiveError], problem: str, advice: str = "") -> Iterator[None]:
+def explain_os_errors(error_class: type[ExecutiveError], problem: str, advice: str = "") -> Iterator[None]:
     """Convert an OSError in the `with` block to an error with an explanation.
 
     Args:
-        kind: Class of the raised error.
-        problem: Failed action, as in `the file cannot be read`.
-        advice: Consequence of the failure, or advice to the user, or "".
+        error_class: Class of the raised error.
+        problem: Clause about the failed action, for instance `the file cannot be read`.
+        advice: Clause with the consequence of the failure or with advice to the user, or "".
     """
     try:
         yield
     except OSError as error:
-        raise kind(f"{problem}: {describe_os_error(error)}" + (f"; {advice}" if advice else "")) from error
+        message = f"{problem}: {describe_os_error(error)}"
+        raise error_class(f"{message}; {advice}" if advice else message) from error
 
 
 def escape_control_characters(text: str) -> str:
-    r"""Return `text` with control characters written as in JSON, for instance `\u001b`."""
+    r"""Return `text` with the JSON escape sequence of each control character, for instance `\u001b`."""
     return _CONTROL_CHARACTER.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def shorten_quotations(text: str) -> str:
-    """Return `text` with every quotation and word shortened to `MAX_QUOTATION_LENGTH` characters."""
+    """Return `text` in which every quotation and word has at most `MAX_QUOTATION_LENGTH` characters."""
 
     def shorten(match: re.Match[str]) -> str:
-        piece = match[0]
-        end = '…"' if piece.startswith('"') and piece.endswith('"') else "…"
-        return piece if len(piece) <= MAX_QUOTATION_LENGTH else piece[: MAX_QUOTATION_LENGTH - len(end)] + end
+        if len(match[0]) <= MAX_QUOTATION_LENGTH:
+            return match[0]
+        ellipsis = '…"' if match[0].startswith('"') and match[0].endswith('"') else "…"
+        return match[0][: MAX_QUOTATION_LENGTH - len(ellipsis)] + ellipsis
 
     return _QUOTATION_OR_WORD.sub(shorten, text)

@@ -6,10 +6,10 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """Exit code of a command; members with the name of a run's status are the codes of that status."""
+    """Exit code of a command; a run with the status FAILURE, for instance, ends with the code FAILURE."""
 
     SUCCESS = 0
-    FAILURE = 1  # also if the audit disagrees with the ledger
+    FAILURE = 1  # also used if the audit of the simulator disagrees with the ledger
     INVALID_INPUT = 2
     FAULT = 3
     INCOMPLETE = 4

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+"""NumPy array of floats; docstrings state the shape."""
 GRAVITY = 9.81
 """Gravitational acceleration [m/s²]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A rigid transform, which consists of a rotation and a translation.
+    """Rigid transform: a rotation followed by a translation.
 
     Attributes:
         rotation: Rotation matrix `(3, 3)`.
@@ -36,7 +37,7 @@ class Pose:
 
     @staticmethod
     def of(position: ArrayLike, quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Pose:
-        """Return the pose with a position `(3,)` [m] and the normalized quaternion `(x, y, z, w)`."""
+        """Return the pose with a position `(3,)` [m] and a quaternion `(x, y, z, w)` of any length."""
         return Pose(rotation_from_quaternion(quaternion), np.asarray(position, dtype=float))
 
     def __matmul__(self, other: Pose) -> Pose:
@@ -47,30 +48,30 @@ class Pose:
         return Pose(self.rotation.T, -self.rotation.T @ self.position)
 
     def apply(self, points: ArrayLike) -> Array:
-        """Return points `(3,)` or `(N, 3)` [m] transformed by this pose: from C to W for `X_WC`."""
+        """Transform points `(3,)` or `(N, 3)` [m]; `X_WC` transforms them from frame C to frame W."""
         return np.asarray(points, dtype=float) @ self.rotation.T + self.position
 
     @property
     def quaternion(self) -> Array:
-        """The rotation as a unit quaternion `(x, y, z, w)` with `w >= 0`."""
+        """Rotation as a unit quaternion `(x, y, z, w)` with `w >= 0`."""
         return quaternion_from_rotation(self.rotation)
 
     @property
     def rotation_vector(self) -> Array:
-        """The rotation vector `(3,)`: axis times angle [rad], with an angle of at most pi; OpenCV's rvec."""
-        # The import of scipy.spatial takes 0.3 s, and few runs need a rotation vector.
+        """Rotation axis times rotation angle (0 to pi) [rad], `(3,)`; OpenCV calls this vector `rvec`."""
+        # scipy.spatial is imported here because the import takes 0.3 s, and few runs need it.
         from scipy.spatial.transform import Rotation
 
         return np.asarray(Rotation.from_matrix(self.rotation).as_rotvec())
 
     def to_rounded_list(self, digits: int = 6) -> list[float]:
-        """Return position and quaternion as a list of seven rounded numbers."""
+        """Return position and quaternion as seven numbers, rounded to `digits` decimal places."""
         return [round(float(value), digits) for value in (*self.position, *self.quaternion)]
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Normalize a quaternion `(x, y, z, w)`, and return its rotation matrix `(3, 3)`."""
-    x, y, z, w = np.asarray(quaternion, dtype=float) / np.linalg.norm(np.asarray(quaternion, dtype=float))
+    """Return the rotation matrix `(3, 3)` of a quaternion `(x, y, z, w)` of any length."""
+    x, y, z, w = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -81,17 +82,17 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
 
 
 def quaternion_from_rotation(rotation: Array) -> Array:
-    """Return the unit quaternion `(x, y, z, w)`, `w >= 0`, of a rotation matrix `(3, 3)`.
+    """Return the unit quaternion `(x, y, z, w)` with `w >= 0` of a rotation matrix `(3, 3)`.
 
-    Shepperd's method divides by the largest of the four components, so that it is numerically stable.
+    Shepperd's method: the largest component is computed first, so that the result is numerically stable.
     """
     r = rotation
-    squares = np.array([r[0, 0], r[1, 1], r[2, 2], r[0, 0] + r[1, 1] + r[2, 2]])
-    largest = int(np.argmax(squares))
-    if largest == 3:
-        q = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1 + squares[3]])
+    diagonal_and_trace = [r[0, 0], r[1, 1], r[2, 2], np.trace(r)]
+    i = int(np.argmax(diagonal_and_trace))  # index of the largest component
+    if i == 3:
+        q = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1 + np.trace(r)])
     else:
-        i, j, k = largest, (largest + 1) % 3, (largest + 2) % 3
+        j, k = (i + 1) % 3, (i + 2) % 3
         q = np.empty(4)
         q[i] = 1 + r[i, i] - r[j, j] - r[k, k]
         q[j] = r[j, i] + r[i, j]
@@ -108,9 +109,9 @@ def rotate_about_z(angle: float) -> Array:
 
 
 def make_tool_down_pose(position: ArrayLike, yaw: float = 0.0) -> Pose:
-    """Return the tool pose `X_WT` at `position` `(3,)` [m] with the z axis of the tool vertically down.
+    """Return the tool pose `X_WT` at `position` `(3,)` [m] whose z axis points vertically down.
 
-    At `yaw` 0 [rad], the y axes of tool and world are parallel, and the x axis of the tool points in the
-    negative x direction of the world: an iiwa has this orientation with elbow up and joint 7 near zero.
+    At `yaw` 0 [rad], the y axes of tool and world are parallel, and their x axes are opposite. An iiwa with
+    its elbow up has this orientation if the angle of joint 7 is near zero.
     """
     return Pose(rotate_about_z(yaw) @ np.diag([-1.0, 1.0, -1.0]), np.asarray(position, dtype=float))

@@ -1,6 +1,6 @@
 """Plugins: skills, cell kinds and other classes that packages register as entry points.
 
-The project in the working directory is used like an installed package, even if it is not installed.
+The entry points of the project in the working directory are found even if the project is not installed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from executive.cell.workcell import CellKind
-from executive.errors import InputError
+from executive.errors import InputError, explain_os_errors
 from executive.skill import Skill
 
 if sys.version_info >= (3, 11):
@@ -25,32 +25,33 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-PROJECT_FILE = "pyproject.toml"
 SKILL_GROUP = "executive.skills"
+"""Entry-point group of skills."""
 CELL_KIND_GROUP = "executive.cells"
-
+"""Entry-point group of kinds of cells."""
 _CLASS_PATH = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
+"""Import path of a class: `module:Class`."""
 _EXAMPLE_LINE = 'Wave = "my_package.wave:Wave"'
+"""Line of a pyproject.toml that registers a class, for error messages."""
 
 
 def load_skills() -> dict[str, type[Skill]]:
-    """Return every skill of the entry-point group `executive.skills`, by name.
+    """Return the classes of all registered skills, by name.
 
     Raises:
         InputError: Two packages register the same name, an entry is not a skill or cannot be loaded, or the
             pyproject.toml of the project in the working directory is invalid.
     """
-    found: dict[str, type[Skill]] = {}
+    skills: dict[str, type[Skill]] = {}
     for name, entry in list_entries(SKILL_GROUP, "skill").items():
-        loaded = entry.load()
-        if not (isinstance(loaded, type) and issubclass(loaded, Skill)):
-            raise InputError(f'the entry point "{name}" ({entry.value}) is not a Skill subclass')
-        found[name] = loaded
-    return found
+        skills[name] = skill = entry.load()
+        if not (isinstance(skill, type) and issubclass(skill, Skill)):
+            raise InputError(f'the entry point "{name}" ({entry.value}) is not a subclass of Skill')
+    return skills
 
 
 def load_cell_kind(name: str) -> CellKind:
-    """Return the class that builds cells of a kind.
+    """Return the class that builds the cells of the kind `name`.
 
     Raises:
         InputError: No package registers this kind, or its class cannot be loaded.
@@ -72,8 +73,8 @@ class PluginEntry:
     Attributes:
         name: Name of the entry point.
         value: Import path of the class: `module:Class`.
-        kind: Kind of plugin for error messages, for instance `skill`.
-        remedy: Advice to the user if the class cannot be loaded.
+        kind: Kind of the plugin, for error messages, for instance `skill`.
+        remedy: Clause that tells the user how to unregister the class.
     """
 
     name: str
@@ -85,11 +86,11 @@ class PluginEntry:
         """Import and return the class.
 
         Raises:
-            InputError: The import of the module raised an exception, or the module lacks the class.
+            InputError: The import of the module raised an exception, or the class is not in the module.
         """
         try:
             return EntryPoint(self.name, self.value, "").load()
-        except Exception as error:  # A plugin's module may raise anything.
+        except Exception as error:  # The import runs third-party code, which may raise any exception.
             raise InputError(
                 f'the {self.kind} "{self.name}" ({self.value}) cannot be loaded: {type(error).__name__}: '
                 f"{error}{_locate_error(error)}; correct it, or {self.remedy}"
@@ -97,33 +98,34 @@ class PluginEntry:
 
 
 def list_entries(group: str, kind: str) -> dict[str, PluginEntry]:
-    """Return the entries of a group by name, sorted by name, without importing their classes.
+    """Return the entries of an entry-point group by name, sorted by name, without importing their classes.
 
-    The project in the working directory (`find_project`) need not be installed: this function appends its
-    folder to `sys.path`. The entries in its pyproject.toml replace those of an installation of the project.
+    The folder of the project in the working directory (`find_project`) is appended to `sys.path`. If the
+    project is also installed, the entries in its pyproject.toml replace the installed entries. `kind` is the
+    kind of the plugins for error messages.
 
     Raises:
         InputError: Two packages register the same name, or the pyproject.toml of the project is invalid.
     """
     project = find_project()
-    found: dict[str, PluginEntry] = {}
     entries = (*_list_installed_entries(group, kind, project), *_list_project_entries(group, kind, project))
+    entry_by_name: dict[str, PluginEntry] = {}
     for entry in sorted(entries, key=lambda entry: (entry.name, entry.value)):
-        if entry.name in found and found[entry.name].value != entry.value:
+        first_entry = entry_by_name.setdefault(entry.name, entry)
+        if first_entry.value != entry.value:
             raise InputError(
-                f'the {kind} "{entry.name}" is registered twice, by {found[entry.name].value} and '
+                f'the {kind} "{entry.name}" is registered twice, by {first_entry.value} and '
                 f"{entry.value}; uninstall or rename one of them"
             )
-        found[entry.name] = entry
-    return found
+    return entry_by_name
 
 
 def _list_installed_entries(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
     """Yield the entries of all installed packages except the project itself."""
-    for point in entry_points(group=group):
-        package = point.dist.name if point.dist else point.module.partition(".")[0]
+    for entry in entry_points(group=group):
+        package = entry.dist.name if entry.dist else entry.module.partition(".")[0]
         if project is None or _normalize(package) != _normalize(project.name):
-            yield PluginEntry(point.name, point.value, kind, f"uninstall the package {package}")
+            yield PluginEntry(entry.name, entry.value, kind, f"uninstall the package {package}")
 
 
 def _list_project_entries(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
@@ -132,7 +134,7 @@ def _list_project_entries(group: str, kind: str, project: Project | None) -> Ite
         return
     folder = str(project.file.parent)
     if folder not in sys.path:
-        # At the end of the path, the folder cannot shadow installed modules.
+        # The folder is the last entry of the path, so that its modules do not shadow installed modules.
         sys.path.append(folder)
     for name, value in entries.items():
         yield PluginEntry(name, value, kind, f"remove it from {project.file}")
@@ -144,7 +146,7 @@ def _normalize(package: str) -> str:
 
 
 def _locate_error(error: Exception) -> str:
-    """Return file and line of the plugin in which an error was raised, or "" if there are none."""
+    """Return the clause `, in FILE:LINE` about the plugin code that raised an error, or "" if unknown."""
     if isinstance(error, SyntaxError):
         return ""  # The message of a syntax error already names file and line.
     ignored_folders = Path(__file__).parent, Path(traceback.__file__).parent
@@ -158,12 +160,12 @@ def _locate_error(error: Exception) -> str:
 
 @dataclass(frozen=True)
 class Project:
-    """A folder with a pyproject.toml.
+    """A Python project: a folder with a pyproject.toml.
 
     Attributes:
         file: Path of the pyproject.toml.
-        name: Name of the project in this file, or "".
-        project_table: Content of the table `project` in this file.
+        name: Name of the project in the file, or "".
+        project_table: Content of the table `project` of the file.
     """
 
     file: Path
@@ -171,43 +173,40 @@ class Project:
     project_table: Mapping[str, Any]
 
     def read_entries(self, group: str) -> dict[str, str]:
-        """Return the entries of the table `[project.entry-points."<group>"]`: `module:Class` by name.
+        """Return the table `[project.entry-points."<group>"]`: import paths of classes by name.
 
         Raises:
             InputError: The value is not a table of strings `module:Class`.
         """
         groups = self.project_table.get("entry-points", {})
         entries = groups.get(group, {}) if isinstance(groups, dict) else groups
+        table = f'{self.file}: [project.entry-points."{group}"]'
         if not isinstance(entries, dict):
-            raise InputError(
-                f"{self._locate(group)} is not a table; write lines like {_EXAMPLE_LINE} below it"
-            )
+            raise InputError(f"{table} is not a table; write lines like {_EXAMPLE_LINE} below it")
         for name, value in entries.items():
             if not isinstance(value, str) or _CLASS_PATH.fullmatch(value) is None:
                 raise InputError(
-                    f'{self._locate(group)}: "{name}" names no class: {value!r}; write it as {_EXAMPLE_LINE}'
+                    f'{table}: "{name}" is not the import path of a class: {value!r}; '
+                    f"write it as {_EXAMPLE_LINE}"
                 )
         return entries
 
-    def _locate(self, group: str) -> str:
-        return f'{self.file}: [project.entry-points."{group}"]'
-
 
 def find_project() -> Project | None:
-    """Return the project with the nearest pyproject.toml, in the working directory or above it, or None.
+    """Return the project with the nearest pyproject.toml in the working directory or above it; None without.
 
-    A user who works in a folder trusts its code, as with pytest. In a folder in which every user may write,
-    such as /tmp, a pyproject.toml is ignored.
+    The user is assumed to trust the code in the working directory. A pyproject.toml in a folder in which all
+    users may write, such as /tmp, is ignored.
 
     Raises:
-        InputError: The file cannot be read, or is not TOML.
+        InputError: The file cannot be read, or is not valid TOML.
     """
     try:
         working_directory = Path.cwd()
     except FileNotFoundError:
         return None  # The working directory was deleted.
     for folder in (working_directory, *working_directory.parents):
-        file = folder / PROJECT_FILE
+        file = folder / "pyproject.toml"
         # Unlike `Path.is_file`, `os.path.isfile` returns False if the folder is not readable.
         if os.path.isfile(file) and not _is_shared(folder):
             return _read_project(file)
@@ -215,24 +214,20 @@ def find_project() -> Project | None:
 
 
 def _is_shared(folder: Path) -> bool:
-    """Return True if all users may write in a folder, as in /tmp (sticky bit, writable by others)."""
+    """Return True if all users may write in a folder: others may write, and the sticky bit is set."""
     mode = folder.stat().st_mode
     return bool(mode & stat.S_ISVTX and mode & stat.S_IWOTH)
 
 
 def _read_project(file: Path) -> Project:
+    """Return the project with the given pyproject.toml."""
     try:
-        content = tomllib.loads(file.read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"{file} cannot be read: {error.strerror}; the plugins of the project are registered there"
-        ) from None
+        with explain_os_errors(InputError, f"{file} cannot be read", "the file registers plugins"):
+            content = tomllib.loads(file.read_bytes().decode("utf-8"))
     except UnicodeDecodeError as error:
         raise InputError(f"{file} is not UTF-8 text: byte {error.start} is invalid") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            f"{file} is not valid TOML: {error}; correct the file: it registers plugins"
-        ) from None
+        raise InputError(f"{file} is not valid TOML: {error}; the file registers plugins") from None
     table = content.get("project", {})
     if not isinstance(table, dict):
         raise InputError(f"{file}: project is not a table; begin it with a line [project]")

@@ -12,27 +12,28 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from types import TracebackType
 from typing import Any, TypeVar
 
-Result = TypeVar("Result")
+ReturnT = TypeVar("ReturnT")
+"""Type of the return value of a submitted function."""
 
 
 class WorkerPool(ProcessPoolExecutor):
     """A pool of spawned processes that ends with its parent process.
 
-    The processes ignore Ctrl-C, which a terminal sends to all of them, so that the parent process decides
-    when they stop. An exception in the `with` block kills the processes.
+    A terminal sends Ctrl-C to all processes. The processes of the pool ignore Ctrl-C, so that the parent
+    process decides when they stop. An exception in the `with` block kills the processes.
 
     Args:
-        count: Maximum number of processes.
+        max_workers: Maximum number of processes.
     """
 
-    def __init__(self, count: int) -> None:
-        # A forked process would contain locks of threads that it does not have.
+    def __init__(self, max_workers: int) -> None:
+        # A fork copies locks that other threads hold, without the threads that would release them.
         spawn = multiprocessing.get_context("spawn")
-        super().__init__(count, mp_context=spawn, initializer=_initialize_worker)
+        super().__init__(max_workers, mp_context=spawn, initializer=_initialize_worker)
 
-    def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
-        """Call `fn` in one of the processes; the call may start a process."""
-        # A new process inherits the signal mask, which blocks Ctrl-C until the process ignores it.
+    def submit(self, fn: Callable[..., ReturnT], /, *args: Any, **kwargs: Any) -> Future[ReturnT]:
+        """Call `fn` in a process of the pool; start a process if all are busy."""
+        # A new process inherits the signal mask: Ctrl-C is blocked until `_initialize_worker` ignores it.
         previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
             return super().submit(fn, *args, **kwargs)
@@ -51,18 +52,19 @@ class WorkerPool(ProcessPoolExecutor):
 def kill_workers() -> None:
     """Kill all processes that `multiprocessing` started; their pools are unusable afterwards."""
     for process in multiprocessing.active_children():
-        # After SIGTERM, a run would halt regularly, and the process would lose the order of its queue.
+        # A run would handle SIGTERM as a halt, and the process would not end.
         process.kill()
 
 
 def _initialize_worker() -> None:
+    """Ignore Ctrl-C, and start the thread that ends this process with its parent process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     threading.Thread(target=_exit_with_parent, name="exit with parent", daemon=True).start()
 
 
 def _exit_with_parent() -> None:
-    """Wait until the parent process has ended, then exit at once."""
+    """Wait until the parent process has ended, then exit without cleanup."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     # `join` waits for the parent process, not for the thread that started this process.
@@ -73,9 +75,9 @@ def _exit_with_parent() -> None:
 def build_command(module: str, *arguments: str) -> list[str]:
     """Return the command that runs a module with the interpreter of this process.
 
-    Unlike `python -m`, the command does not import modules from the working directory, in which a file of the
-    user may have the name of a library.
+    `python -m` would import libraries from the working directory if a file there had the name of a library.
     """
+    # With `-c`, `sys.path` contains "", the working directory; the script removes the entry.
     script = (
         "import sys; sys.path[:] = filter(None, sys.path); "
         "module = sys.argv.pop(1); import runpy; runpy.run_module(module, None, '__main__')"

@@ -1,8 +1,8 @@
 """Base class of skills: typed ports and params, declared reasons of failure, and a generator `run`.
 
-The generator `run` yields once per control step (status RUNNING). It returns for SUCCESS, and raises
-`self.failure(reason, message)` for FAILURE. Its `finally` clauses run at every end, also after a halt. A
-`run` that never waits may be a function without `yield`. The mission checker, the JSON Schema, the
+The generator `run` yields once per control step (status RUNNING), returns for SUCCESS, and raises
+`self.failure(reason, message)` for FAILURE. The `finally` clauses of `run` are also executed after a halt. If
+`run` never waits, it may be a function without `yield`. The mission checker, the JSON Schema, the
 documentation and the tree use the declarations in the class body.
 """
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from executive.cell.protocols import Cell, MinTimes
 
 T = TypeVar("T")
+"""Type of the value of a port."""
 
 
 class Direction(Enum):
@@ -29,10 +30,10 @@ class Direction(Enum):
 
 
 In = Annotated[T, Direction.IN]
-"""Type of an input: when the skill starts, it reads the variable of the port."""
+"""Annotation of an input: the skill reads the variable of the port when the skill starts."""
 
 Out = Annotated[T, Direction.OUT]
-"""Type of an output: when the skill succeeds, it writes the variable of the port."""
+"""Annotation of an output: the skill writes the variable of the port when the skill succeeds."""
 
 Seconds = Annotated[float, "s"]
 Metres = Annotated[float, "m"]
@@ -40,7 +41,7 @@ MetresPerSecond = Annotated[float, "m/s"]
 
 
 class ToolState(Enum):
-    """Required or resulting state of the tool of the arm."""
+    """State of the tool that a skill requires, or that a skill leaves."""
 
     ANY = "any"
     EMPTY = "empty"
@@ -62,7 +63,7 @@ class Param:
         ge: Minimum value, or None.
         le: Maximum value, or None.
         choices: Allowed values, or None for any value.
-        refers: Kind of name in the cell that the value is (`bin`, `detector`, `pose`, `class`), or "".
+        refers: Kind of name (`bin`, `detector`, `pose`, `class`) if the value is a name in the cell; else "".
         doc: Description of the param.
     """
 
@@ -87,11 +88,11 @@ class Port:
     """A typed input or output of a skill.
 
     Attributes:
-        name: Attribute of the skill; also the default name of the variable of the port.
+        name: Attribute of the skill; by default, the variable of the port has this name.
         type: Python type of the value.
         direction: IN or OUT.
         default: Value of an input without a variable; `...` if the input needs a variable with a value.
-        refers: Kind of name that the value is (`item`, `bin`, `class`), or "".
+        refers: Kind of name (`item`, `bin`, `class`) if the value is a name; else "".
         doc: Description of the port.
     """
 
@@ -117,18 +118,18 @@ def param(
     refers: str = "",
     doc: str = "",
 ) -> Any:
-    """Declare a param of a skill; the arguments are attributes of `Param`."""
+    """Declare a param of a skill; `Param` describes the arguments."""
     # `Skill.__init_subclass__` sets name, type and unit.
     return Param("", None, "", default, ge, le, choices, refers, doc)
 
 
 def port(*, default: Any = ..., refers: str = "", doc: str = "") -> Any:
-    """Declare a port of a skill; the arguments are attributes of `Port`."""
+    """Declare a port of a skill; `Port` describes the arguments."""
     return param(default, refers=refers, doc=doc)
 
 
 class SkillFailed(Exception):
-    """Failure of a skill, with a reason that the skill declares and a message with measured values."""
+    """Failure of a skill: a reason that the skill declares, and a message with measured values."""
 
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)
@@ -147,9 +148,9 @@ class Skill:
         senses: True if the skill gets new information: an image, or a request of the operator.
         moves: True if the skill moves the arm.
         tool_state: State of the tool that the skill requires (ANY: none), and after success (ANY: unchanged).
-        tool_left: State of the tool after a failure, by reason, and after a halt (key `halt`), for those that
-            change the state; ANY if the state is unknown.
-        waits: Name of the param whose duration [s] passes before every success, or "".
+        tool_left: State of the tool after a failure (key: reason) or a halt (key: `halt`); ANY if unknown. A
+            reason without a key leaves the state unchanged.
+        waits: Name of the param that contains the minimum time until success [s], or "".
     """
 
     params: ClassVar[Mapping[str, Param]] = {}
@@ -163,62 +164,63 @@ class Skill:
     waits: ClassVar[str] = ""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Convert the annotated attributes of the class body to `params` and `ports`."""
         super().__init_subclass__(**kwargs)
         _require_annotations(cls)
         params, ports = dict(cls.params), dict(cls.ports)
         for name, hint in list(cls.__annotations__.items()):
             if hint is ClassVar or str(hint).endswith("ClassVar"):
-                # Python 3.10 does not evaluate a ClassVar without a type.
+                # `get_type_hints` of Python 3.10 does not accept a ClassVar without a type.
                 del cls.__annotations__[name]
         hints = get_type_hints(cls, include_extras=True)
         for name in cls.__annotations__:
             hint = hints[name]
             if get_origin(hint) is ClassVar:
                 continue
-            base, *metadata = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-            declared = cls.__dict__.get(name)
+            value_type, *metadata = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+            declaration = cls.__dict__.get(name)
             direction = next((value for value in metadata if isinstance(value, Direction)), None)
             if direction is not None:
-                options = declared if isinstance(declared, Param) else port()
-                ports[name] = Port(name, base, direction, options.default, options.refers, options.doc)
-            elif isinstance(declared, Param):
+                options = declaration if isinstance(declaration, Param) else port()
+                ports[name] = Port(name, value_type, direction, options.default, options.refers, options.doc)
+            elif isinstance(declaration, Param):
                 unit = next((value for value in metadata if isinstance(value, str)), "")
-                params[name] = replace(declared, name=name, type=base, unit=unit)
+                params[name] = replace(declaration, name=name, type=value_type, unit=unit)
             else:
                 raise TypeError(
                     f"{cls.__qualname__}.{name}: attributes of a skill are In[...], Out[...] or param(...)"
                 )
-            if isinstance(declared, Param):
+            if isinstance(declaration, Param):
                 delattr(cls, name)
         cls.params, cls.ports = params, ports
 
     def __init__(self, **values: Any) -> None:
-        """Set the given params and inputs, and all others to their defaults."""
+        """Set the params and inputs in `values`, and all other params and inputs to their defaults."""
         inputs = {name: port for name, port in self.ports.items() if port.direction is Direction.IN}
-        known: dict[str, Param | Port] = {**self.params, **inputs}
-        unknown = next((name for name in values if name not in known), None)
-        if unknown is not None:
-            raise InputError(
-                f'{type(self).__name__} has no param or input "{unknown}"; '
-                f"it has: {', '.join(known) or 'none'}"
-            )
-        for name, declared in known.items():
-            value = values.get(name, declared.default)
+        settings: dict[str, Param | Port] = {**self.params, **inputs}
+        for name in values:
+            if name not in settings:
+                raise InputError(
+                    f'{type(self).__name__} has no param or input "{name}"; '
+                    f"it has: {', '.join(settings) or 'none'}"
+                )
+        for name, setting in settings.items():
+            value = values.get(name, setting.default)
             if value is ...:
                 raise InputError(f'{type(self).__name__} needs a value for "{name}"')
             setattr(self, name, value)
 
     def run(self, cell: Cell) -> Iterator[None] | None:
-        """Execute the skill: `yield` ends a control step, `return` is success, an exception is failure."""
+        """Execute the skill: `yield` ends a control step, `return` is success, `SkillFailed` is failure."""
         raise NotImplementedError
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the minimum time in which the skill can succeed [s]; by default the duration of `waits`.
+        """Return the minimum time until success [s]; by default, the value of the param named in `waits`.
 
         Args:
             min_times: Minimum times of actions in the cell.
-            values: Params, and inputs whose values are constants of the mission.
+            values: Values of the params, and of the inputs with a constant value in the mission.
         """
         del min_times
         return float(values.get(cls.waits, 0.0))
@@ -238,17 +240,17 @@ class Skill:
 
 
 def _require_annotations(skill: type[Skill]) -> None:
-    """Check that every `param` and `port` in the class body has an annotation of its type.
+    """Check that every `param` and `port` in the class body has a type annotation.
 
     Raises:
         TypeError: A declaration has no annotation.
     """
-    for name, declared in vars(skill).items():
-        if isinstance(declared, Param) and name not in skill.__annotations__:
-            plain = isinstance(declared.default, bool | int | float | str)
-            kind = type(declared.default).__name__ if plain else "int"
+    for name, declaration in vars(skill).items():
+        if isinstance(declaration, Param) and name not in skill.__annotations__:
+            has_simple_type = isinstance(declaration.default, bool | int | float | str)
+            type_name = type(declaration.default).__name__ if has_simple_type else "int"
             raise TypeError(
-                f"{skill.__qualname__}.{name} has no annotation with its type; "
-                f'write, for instance, "{name}: {kind} = param(...)" for a param, '
+                f"{skill.__qualname__}.{name} has no type annotation; "
+                f'write, for instance, "{name}: {type_name} = param(...)" for a param, '
                 f'"{name}: In[...] = port(...)" for an input, "{name}: Out[...] = port(...)" for an output'
             )

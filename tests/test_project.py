@@ -82,7 +82,7 @@ def test_a_file_in_a_folder_that_is_everybodys_does_not_count(write: Write, mode
     ("text", "says"),
     [
         ("[project\n", "is not valid TOML: Expected ']' at the end of a table declaration (at line 1, "
-         "column 9); correct the file: it registers plugins"),
+         "column 9); the file registers plugins"),
         ("project = 3\n", ": project is not a table; begin it with a line [project]"),
         ("[project]\nentry-points = 3\n",
          ': [project.entry-points."executive.skills"] is not a table; write lines like '
@@ -91,11 +91,11 @@ def test_a_file_in_a_folder_that_is_everybodys_does_not_count(write: Write, mode
          ': [project.entry-points."executive.skills"] is not a table; write lines like '
          'Wave = "my_package.wave:Wave" below it'),
         (f'{SKILLS}Wave = "blue.wave"\n',
-         ': [project.entry-points."executive.skills"]: "Wave" names no class: \'blue.wave\'; write it as '
-         'Wave = "my_package.wave:Wave"'),
+         ': [project.entry-points."executive.skills"]: "Wave" is not the import path of a class: '
+         '\'blue.wave\'; write it as Wave = "my_package.wave:Wave"'),
         (f"{SKILLS}Wave = 3\n",
-         ': [project.entry-points."executive.skills"]: "Wave" names no class: 3; write it as '
-         'Wave = "my_package.wave:Wave"'),
+         ': [project.entry-points."executive.skills"]: "Wave" is not the import path of a class: 3; '
+         'write it as Wave = "my_package.wave:Wave"'),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_with_the_file(write: Write, text: str, says: str) -> None:
@@ -112,6 +112,4 @@ def test_a_file_that_cannot_be_read_is_refused(write: Write, monkeypatch: pytest
     monkeypatch.setattr(Path, "read_bytes", Mock(side_effect=PermissionError(13, "Permission denied")))
     with pytest.raises(InputError) as caught:
         find_project()
-    assert str(caught.value) == (
-        f"{file} cannot be read: Permission denied; the plugins of the project are registered there"
-    )
+    assert str(caught.value) == (f"{file} cannot be read: permission denied; the file registers plugins")

@@ -17,7 +17,7 @@ def test_what_is_declared_without_an_annotation_is_refused(declared: Any, kind: 
     with pytest.raises(TypeError) as raised:
         type("Knock", (Skill,), {"times": declared})
     assert str(raised.value) == (
-        "Knock.times has no annotation with its type; write, for instance, "
+        "Knock.times has no type annotation; write, for instance, "
         f'"times: {kind} = param(...)" for a param, "times: In[...] = port(...)" for an input, '
         '"times: Out[...] = port(...)" for an output'
     )
@@ -27,5 +27,5 @@ def test_a_default_that_is_changed_needs_its_annotation_again() -> None:
     class Knock(Skill):
         times: int = param(2)
 
-    with pytest.raises(TypeError, match=r"Louder\.times has no annotation"):
+    with pytest.raises(TypeError, match=r"Louder\.times has no type annotation"):
         type("Louder", (Knock,), {"times": param(3)})
