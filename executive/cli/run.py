@@ -86,8 +86,8 @@ def command(
             views = [GuardedView(view) for view in (terminal_view, page) if view is not None]
             record = RecordOptions(views, paused)
             run_options = RunOptions(
-                seed, requests or None, keyboard=page is None or has_keyboard, gui=gui, realtime=realtime,
-                scene=scene,
+                seed, requests or None, has_keyboard=page is None or has_keyboard, gui=gui,
+                is_realtime=realtime, scene=scene,
             )  # fmt: skip
             if mission is None:
                 assert resume is not None
@@ -144,13 +144,13 @@ def _resume(
 ) -> tuple[Result, RunStarted]:
     """Resume an interrupted run; return its result and the event of its start."""
     from executive.plugins import load_skills
-    from executive.record.journal import find_start, read_journal
+    from executive.record.journal import find_run_start, read_journal
     from executive.record.resumed_run import resume_run
     from executive.record.run_directory import find_run
 
     path = find_run(name, runs)
     result = resume_run(path, load_skills(), run_options, record)
-    return result, find_start(read_journal(path / "journal.jsonl"), path, "run the mission again")
+    return result, find_run_start(read_journal(path / "journal.jsonl"), path, "run the mission again")
 
 
 @contextlib.contextmanager

@@ -142,7 +142,7 @@ def read_journal(path: Path) -> list[TimedEvent]:
     return decode_events(content[: _measure_valid_length(content)].splitlines(), str(path))
 
 
-def find_start(events: Sequence[TimedEvent], path: Path, advice: str) -> RunStarted:
+def find_run_start(events: Sequence[TimedEvent], path: Path, advice: str) -> RunStarted:
     """Return the event of the start of the run in the directory `path`.
 
     Raises:
@@ -154,7 +154,7 @@ def find_start(events: Sequence[TimedEvent], path: Path, advice: str) -> RunStar
     raise InputError(f'the run in "{path}" was interrupted before its start; {advice}')
 
 
-def find_end(events: Sequence[TimedEvent]) -> RunEnded | None:
+def find_run_end(events: Sequence[TimedEvent]) -> RunEnded | None:
     """Return the last event if it is the end of the run, or None if the run was interrupted or is running.
 
     In a resumed run, an earlier end does not count.

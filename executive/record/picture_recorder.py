@@ -12,11 +12,11 @@ from executive.cell.detection import Detection
 from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawing_thread import PictureDrawer
-from executive.record.pictures.picture_scene import PictureScene
+from executive.record.pictures.picture_content import PictureContent
 from executive.record.timeline.activation import to_skill_name
 from executive.record.timeline.timeline import Timeline
 
-MAX_LOOKS = 24
+MAX_STORED_LOOKS = 24
 """Maximum number of stored looks, of 1.2 MB each at 640 x 480; a look is an image with its detections."""
 
 MAX_PICTURES = 200
@@ -77,7 +77,7 @@ class PictureRecorder:
             return
         self._looks[look.frame] = self._last_frame, look
         self._unshown_frame = look.frame
-        if len(self._looks) > MAX_LOOKS:
+        if len(self._looks) > MAX_STORED_LOOKS:
             # The look of the last selection is kept, because it is drawn again if the attempt fails.
             del self._looks[next(frame for frame in self._looks if frame != self._selected_frame)]
 
@@ -96,7 +96,7 @@ class PictureRecorder:
             self._unshown_frame = None
         look = self._looks.get(frame)
         if look is None:
-            self._missing_counts[f"of looks before the last {MAX_LOOKS}"] += 1
+            self._missing_counts[f"of looks before the last {MAX_STORED_LOOKS}"] += 1
         elif self._picture_count == MAX_PICTURES:
             self._missing_counts[f"after the first {MAX_PICTURES}"] += 1
         elif not self._drawer.queue(
@@ -112,13 +112,13 @@ class PictureRecorder:
         look: tuple[Frame, FrameSearched],
         selection: TargetSelected | None,
         failure: NodeEnded | None,
-    ) -> PictureScene:
+    ) -> PictureContent:
         frame, searched = look
         timeline = self._timeline
         item = selection.item if selection else ""
         history = timeline.items.by_name.get(item)
         position = history.last_change.position if history else None
-        return PictureScene(
+        return PictureContent(
             image=frame.image,
             visible=frame.visible,
             detections=[_to_detection(found) for found in searched.confident],
@@ -128,7 +128,9 @@ class PictureRecorder:
             camera=frame.camera,
             detector=searched.detector,
             age=timed.clock - frame.stamp,
-            phase=" + ".join(to_skill_name(last.node) for last in timeline.find_running() if last.skill),
+            phase=" + ".join(
+                to_skill_name(last.node) for last in timeline.find_running_activations() if last.skill
+            ),
             item=item,
             bin=selection.bin if selection else "",
             attempts=history.last_change.attempts if history else 0,

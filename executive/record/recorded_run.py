@@ -96,7 +96,7 @@ def record_run(
             run.control.pause()
         directory = make_run_directory(run, loaded, options, runs_folder)
         recorder = Recorder(directory, saves_pictures=record.saves_pictures)
-        recording = Recording(run, loaded, skills, directory, recorder, record.views)
+        recording = RecordedRun(run, loaded, skills, directory, recorder, record.views)
         result = recording.execute(options.seed, start_time)
     if not record.saves_pictures and result.status in FINAL_STATUSES:
         # The log of the world is needed only for a resumption and for a film.
@@ -127,7 +127,7 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, run
 
 
 @dataclass
-class Recording:
+class RecordedRun:
     """A run with its recorder and its views.
 
     Attributes:

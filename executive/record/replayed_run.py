@@ -97,10 +97,10 @@ def replay_run(
         )
     loaded = read_mission_of_run(path, run, skills, mission)
     edited = mission is not None and loaded.text != (path / "mission.yaml").read_text(encoding="utf-8")
-    return compare_replay(loaded, skills, log, run.seed, edited=edited)
+    return replay_and_compare(loaded, skills, log, run.seed, edited=edited)
 
 
-def compare_replay(
+def replay_and_compare(
     loaded: LoadedMission,
     skills: Mapping[str, type[Skill]],
     log: InputLog,

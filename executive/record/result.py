@@ -16,7 +16,7 @@ from executive.events import RunResumed, TimedEvent
 from executive.exit_codes import ExitCode
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis import Diagnosis
-from executive.record.journal import find_end
+from executive.record.journal import find_run_end
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import PlanningTotals, Timeline
 
@@ -133,7 +133,7 @@ def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result
         result = TypeAdapter(Result).validate_json(directory.result.read_bytes())
     except (OSError, ValueError):
         return None
-    end = find_end(events)
+    end = find_run_end(events)
     if end is not None:
         return result if (result.status, result.ticks) == (end.status, end.ticks) else None
     # If writing the end to the journal failed, only the result contains the end.

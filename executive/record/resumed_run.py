@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from executive.errors import InputError
 from executive.events import MotionPlanned, RequestGiven, RunStarted, TimedEvent
-from executive.record.journal import find_end, find_start, read_journal
+from executive.record.journal import find_run_end, find_run_start, read_journal
 from executive.record.recorded_mission import read_mission_of_run
-from executive.record.recorded_run import Recording, RecordOptions
+from executive.record.recorded_run import RecordedRun, RecordOptions
 from executive.record.recorder import Recorder
-from executive.record.replayed_run import compare_replay
+from executive.record.replayed_run import replay_and_compare
 from executive.record.result import FINAL_STATUSES, Result, read_result
 from executive.record.run_directory import RunDirectory
 from executive.replay.input_log import UNKNOWN_ACTION, InputLog
@@ -62,12 +62,12 @@ def resume_run(
     recorder = Recorder(directory, saves_pictures=record.saves_pictures, resume=True)
     try:
         events = read_journal(directory.journal)
-        log, start = InputLog.from_events(events), find_start(events, path, "run the mission again")
+        log, start = InputLog.from_events(events), find_run_start(events, path, "run the mission again")
         has_ended, seed = _has_ended(directory, events), start.seed
         loaded = read_mission_of_run(path, start, skills)
         # The control step of a halt or fault is not compared, so that a corrected skill can repeat the step.
         comparable = log if log.halt is None else log.select_before(log.halt.tick)
-        replay = compare_replay(loaded, skills, comparable, seed)
+        replay = replay_and_compare(loaded, skills, comparable, seed)
         if not replay.is_equal:
             raise InputError(
                 f'the run in "{path}" cannot be resumed: {replay.difference}. The executive or a '
@@ -87,7 +87,7 @@ def resume_run(
         replayed = run.replayed_cell.log
         recorder.add_to_trace(replayed.events)
         earlier = [timed for timed in replayed.events if isinstance(timed.event, UNREPEATED_EVENTS)]
-        recording = Recording(
+        recording = RecordedRun(
             run, loaded, skills, directory, recorder, record.views, earlier, _describe_gap(run.replayed_cell)
         )
         return recording.execute(seed, start_time)
@@ -99,7 +99,7 @@ def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
     Raises:
         InputError: The end of the run prevents a resumption.
     """
-    end = find_end(events)
+    end = find_run_end(events)
     if end is None:
         return False
     if end.status == "INCOMPLETE" and end.held_item:

@@ -22,11 +22,11 @@ MAX_PIXELS = 10**8
 
 
 class Codec(NamedTuple):
-    """Conversions between a value that a cell returns and a JSON value.
+    """Pair of functions that convert the values of an input to JSON and back.
 
     Attributes:
-        encode: Converts the value of the cell to a JSON value.
-        decode: Converts the JSON value to the value of the cell.
+        encode: Converts a value that the cell returned to a JSON value.
+        decode: Converts the JSON value to the type that the cell returned.
     """
 
     encode: Callable[[Any], Any]
@@ -35,13 +35,13 @@ class Codec(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """Planned motion of which only the duration [s] was recorded; implements `cell.arm.Motion`."""
+    """Planned motion without its trajectory: a replay needs only its duration [s]."""
 
     duration: float
 
 
 def decode_array(value: Any) -> Array:
-    """Return the array of nested lists of floats."""
+    """Return nested lists of floats as an array."""
     return np.array(value, dtype=np.float64)
 
 
@@ -83,13 +83,13 @@ def decode_frame(value: Any) -> Frame:
         matrix=decode_array(value["matrix"]),
         X_WC=decode_pose(value["X_WC"]),
         stamp=value["stamp"],
-        visible=_decode_mask(value["visible"], (height, width)),
+        visible=_decode_mask(value["visible"], height, width),
         epoch=value["epoch"],
     )
 
 
 def encode_detection(detection: Detection) -> list[Any]:
-    """Return class, confidence, box and confidence of the second most likely class as a list."""
+    """Return the class, its confidence, the box and the confidence of the second most likely class."""
     box = [float(edge) for edge in detection.box]
     return [detection.label, float(detection.confidence), box, float(detection.rival)]
 
@@ -120,42 +120,50 @@ def decode_answer(value: Any) -> Answer:
 
 
 def encode_observations(observations: Sequence[Observation]) -> list[Any]:
-    """Return observations as lists."""
+    """Return the attributes of each observation as a list."""
     return [
-        [encode_detection(one.detection), one.position.tolist(), one.std, one.confident, one.contradiction]
-        for one in observations
+        [
+            encode_detection(each.detection),
+            each.position.tolist(),
+            each.std,
+            each.confident,
+            each.contradiction,
+        ]
+        for each in observations
     ]
 
 
 def decode_observations(value: Any) -> list[Observation]:
     """Return the observations that `encode_observations` encoded."""
     return [
-        Observation(decode_detection(detection), decode_array(position), *others)
-        for detection, position, *others in value
+        Observation(decode_detection(detection), decode_array(position), std, confident, contradiction)
+        for detection, position, std, confident, contradiction in value
     ]
 
 
 def _encode_mask(mask: NDArray[np.bool_]) -> str:
-    """Return a compressed mask as base64, or "" for a mask without False."""
+    """Return a mask as compressed bits in base64; "" if all pixels are True, to keep the journal short."""
     if mask.all():
         return ""
     return base64.b64encode(zlib.compress(np.packbits(mask).tobytes())).decode("ascii")
 
 
-def _decode_mask(text: str, size: tuple[int, int]) -> NDArray[np.bool_]:
+def _decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
     if not text:
-        return np.ones(size, np.bool_)
-    bits = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
-    return np.unpackbits(bits, count=size[0] * size[1]).reshape(size).astype(np.bool_)
+        return np.ones((height, width), np.bool_)
+    packed_bits = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
+    return np.unpackbits(packed_bits, count=height * width).reshape(height, width).astype(np.bool_)
 
 
-def _identity(value: Any) -> Any:
+def _return_unchanged(value: Any) -> Any:
     return value
 
 
-PLAIN_CODEC = Codec(_identity, _identity)
-NOTHING_CODEC = Codec(lambda _: None, lambda _: None)
-TEXTS_CODEC = Codec(list, _identity)
+IDENTITY_CODEC = Codec(_return_unchanged, _return_unchanged)
+"""Codec of numbers, truth values, strings and None."""
+NONE_CODEC = Codec(lambda _: None, lambda _: None)
+"""Codec of the results of commands, which a replay does not need."""
+STRINGS_CODEC = Codec(list, _return_unchanged)
 BOX_CODEC = Codec(list, tuple)
 ARRAY_CODEC = Codec(np.ndarray.tolist, decode_array)
 POSE_CODEC = Codec(encode_pose, decode_pose)

@@ -20,9 +20,9 @@ from executive.events import (
 )
 
 UNKNOWN_ACTION = "unknown"
-"""Value of `Interruption.last_action` if the journal may lack the last action."""
+"""Value of `Interruption.last_action` if the journal may lack commands to arm or tool."""
 _COMMAND_EVENTS = (ToolCommanded, MotionPlanned)
-"""Kinds of events that precede the commands: each command to tool or arm follows one such event."""
+"""Kinds of events that precede commands: a `ToolCommanded` or `MotionPlanned` precedes each command."""
 
 
 class RecordedInput(NamedTuple):
@@ -42,10 +42,10 @@ class Interruption:
     """Interruption of a run between the end of one process and the resumption in another process.
 
     Attributes:
-        complete_step_count: Number of control steps before the interruption that remain valid.
-        last_action: Last action of the tool before the interruption, `open` or `close`; "" if there was none;
+        complete_step_count: Number of control steps before the interruption that the resumed run keeps.
+        last_action: Last action of the tool before the interruption, `open` or `close`; "" without an action;
             `UNKNOWN_ACTION` if the journal may lack commands to arm or tool.
-        restarts_tree: True if the run had ended as INCOMPLETE, so that the resumption restarts the tree.
+        restarts_tree: True if the run ended as INCOMPLETE; the resumption then restarts the tree.
         resume_tick: First control step after the resumption.
     """
 
@@ -60,7 +60,7 @@ class Halt(NamedTuple):
 
     Attributes:
         tick: Control step of the halt.
-        is_tree_ticked: True if the tree was ticked in this step.
+        is_tree_ticked: True if the tree was ticked in this step before the halt.
     """
 
     tick: int
@@ -72,9 +72,9 @@ class InputLog:
     """Recorded inputs and interruptions of a run.
 
     Attributes:
-        events: Events of the journal in order, without the events that a later resumption voided.
+        events: Events of the journal in order, without the control steps that a resumed run did not keep.
         inputs: Recorded values by name of the input, in order; equal consecutive values are recorded once.
-        interruptions: Earlier interruptions by `Interruption.complete_step_count`.
+        interruptions: Interruptions after which the run was resumed, by `complete_step_count`.
         halt: The last halt, or None.
     """
 
@@ -85,33 +85,31 @@ class InputLog:
 
     @staticmethod
     def from_events(events: Iterable[TimedEvent]) -> InputLog:
-        """Return the log of the events of a journal.
-
-        A resumption voids the earlier events from the first control step that was not complete.
-        """
-        valid: list[TimedEvent] = []
+        """Return the log of a journal, without the control steps that a resumed run did not keep."""
+        kept_events: list[TimedEvent] = []
         for timed in events:
             if isinstance(timed.event, RunResumed):
-                valid = _select_before(valid, timed.event.valid_ticks)
-            valid.append(timed)
-        incomplete_ends = _find_incomplete_ends(valid)
+                kept_events = _select_before(kept_events, timed.event.valid_ticks)
+            kept_events.append(timed)
+        incomplete_end_ticks = _find_incomplete_end_ticks(kept_events)
         interruptions: dict[int, Interruption] = {}
         inputs: dict[str, list[RecordedInput]] = defaultdict(list)
         halt = None
-        for timed in valid:
+        for timed in kept_events:
             tick, event = timed.tick, timed.event
             match event:
                 case RunResumed(count, action):
-                    interruptions[count] = Interruption(count, action, count - 1 in incomplete_ends, tick)
+                    restarts_tree = count - 1 in incomplete_end_ticks
+                    interruptions[count] = Interruption(count, action, restarts_tree, tick)
                 case InputRead(name):
                     inputs[name].append(RecordedInput(tick, event))
                 case RunHalted(is_tree_ticked):
                     halt = Halt(tick, is_tree_ticked)
-        return InputLog(valid, inputs, interruptions, halt)
+        return InputLog(kept_events, inputs, interruptions, halt)
 
     @property
     def start(self) -> RunStarted | None:
-        """Event of the start of the run, or None if the run had not started."""
+        """First event of the run, or None if the run was interrupted before this event."""
         return next((timed.event for timed in self.events if isinstance(timed.event, RunStarted)), None)
 
     @property
@@ -136,52 +134,50 @@ class InputLog:
     ) -> Interruption:
         """Return the interruption at the end of the log.
 
-        Control steps in which the arm only brakes, after a halt or during an interrupted resumption, do not
-        count as complete. All steps of a run that ended as INCOMPLETE are complete.
+        The resumed run does not keep control steps in which the arm only braked, after a halt or during an
+        interrupted resumption. It keeps all steps of a run that ended as INCOMPLETE.
 
         Args:
             step_count: Number of control steps that the cell has executed.
             last_command_tick: Control step of the last command to arm or tool according to the cell.
             is_complete: True if the log contains all events of its last control step.
         """
-        incomplete_ends = _find_incomplete_ends(self.events)
-        if self.last_tick in incomplete_ends:
+        incomplete_end_ticks = _find_incomplete_end_ticks(self.events)
+        if self.last_tick in incomplete_end_ticks:
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
-        end = self.last_tick + is_complete if self.halt is None else self.halt.tick
-        complete = min(step_count, end)
+        logged_count = self.last_tick + 1 if is_complete else self.last_tick
+        kept_count = min(step_count, logged_count if self.halt is None else self.halt.tick)
         is_truncated = step_count > self.last_tick and not is_complete
-        lacks_commands = self._may_lack_command(last_command_tick, is_truncated)
-        for earlier in reversed(list(self.interruptions.values())):
-            if earlier.resume_tick >= complete:
-                complete = min(complete, earlier.complete_step_count)
-                lacks_commands |= earlier.last_action == UNKNOWN_ACTION
-        action = UNKNOWN_ACTION if lacks_commands else self.last_action
-        return Interruption(complete, action, complete - 1 in incomplete_ends, step_count)
+        may_lack_commands = self._may_lack_command(last_command_tick, is_truncated)
+        for interruption in reversed(list(self.interruptions.values())):
+            if interruption.resume_tick >= kept_count:
+                kept_count = min(kept_count, interruption.complete_step_count)
+                may_lack_commands |= interruption.last_action == UNKNOWN_ACTION
+        action = UNKNOWN_ACTION if may_lack_commands else self.last_action
+        return Interruption(kept_count, action, kept_count - 1 in incomplete_end_ticks, step_count)
 
     def _may_lack_command(self, last_command_tick: int, is_truncated: bool) -> bool:
         """Return True if the log may lack the last command to arm or tool.
 
-        The log contains all commands before its last control step, because it is written in order. In the
-        last step, an event precedes each command. If the process was killed, this step may be incomplete.
-        `is_truncated` is True if the cell executed later steps than an incomplete last step of the log.
+        The log contains all commands before its last control step, because events are written in order. If
+        the process was killed in the last step, the log may lack the event that precedes a command.
+        `is_truncated` is True if this step is incomplete and the cell executed later steps.
         """
         if last_command_tick != self.last_tick:
             return last_command_tick > self.last_tick
-        ticks = (timed.tick for timed in self.events if isinstance(timed.event, _COMMAND_EVENTS))
-        return is_truncated or last_command_tick not in ticks
+        command_ticks = (timed.tick for timed in self.events if isinstance(timed.event, _COMMAND_EVENTS))
+        return is_truncated or last_command_tick not in command_ticks
 
     def has_ended_before_tick(self, tick: int) -> bool:
-        """Return True if the recorded run ended before its tree was ticked in this control step."""
-        if self.halt is None:
-            return tick > self.last_tick
-        return self.halt == (tick, False)
+        """Return True if the recorded run ended before its tree was ticked in control step `tick`."""
+        return tick > self.last_tick if self.halt is None else self.halt == (tick, False)
 
     def is_halted_after(self, tick: int) -> bool:
-        """Return True if the recorded run was halted after its tree was ticked in this control step."""
+        """Return True if the recorded run was halted after its tree was ticked in control step `tick`."""
         return self.halt == (tick, True)
 
     def select_before(self, tick: int) -> InputLog:
-        """Return the log of all events before a control step, and of the start of the run."""
+        """Return the log of the events before control step `tick`, including the start of the run."""
         return InputLog.from_events(_select_before(self.events, tick))
 
     def count_events(self, kind: type[Event]) -> int:
@@ -189,16 +185,19 @@ class InputLog:
         return sum(isinstance(timed.event, kind) for timed in self.events)
 
     def count_readings(self, name: str) -> int:
-        """Return the number of recorded values of an input."""
+        """Return the number of recorded values of the input `name`."""
         return len(self.inputs.get(name, ()))
 
 
 def _select_before(events: Iterable[TimedEvent], tick: int) -> list[TimedEvent]:
-    """Return all events before a control step, and the start of the run."""
+    """Return the events before control step `tick`, including the start of the run."""
     return [timed for timed in events if timed.tick < tick or isinstance(timed.event, RunStarted)]
 
 
-def _find_incomplete_ends(events: Iterable[TimedEvent]) -> set[int]:
+def _find_incomplete_end_ticks(events: Iterable[TimedEvent]) -> set[int]:
     """Return the control steps in which the run ended as INCOMPLETE."""
-    ends = ((timed.tick, timed.event) for timed in events if isinstance(timed.event, RunEnded))
-    return {tick for tick, end in ends if end.status == "INCOMPLETE"}
+    return {
+        timed.tick
+        for timed in events
+        if isinstance(timed.event, RunEnded) and timed.event.status == "INCOMPLETE"
+    }

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from executive.errors import Stopped
 from executive.events import Emit, InputRead
-from executive.replay.codec import PLAIN_CODEC, Codec
+from executive.replay.codec import IDENTITY_CODEC, Codec
 
 Value = TypeVar("Value")
 
@@ -21,7 +21,7 @@ class InputRecorder:
     """Emits an event for each changed value of an input; used only in the thread of the tick loop.
 
     Args:
-        emit: Emits an event.
+        emit: Function that emits an event.
     """
 
     def __init__(self, emit: Emit) -> None:
@@ -33,16 +33,16 @@ class InputRecorder:
         """Begin a control step: set the number of reads of each input to 0."""
         self._read_counts.clear()
 
-    def read(self, name: str, query: Callable[[], Value], codec: Codec = PLAIN_CODEC) -> Value:
-        """Return the value that the query returns, and record the value if it changed.
+    def read(self, name: str, query: Callable[[], Value], codec: Codec = IDENTITY_CODEC) -> Value:
+        """Read an input from the cell, record its value if the value has changed, and return the value.
 
         Args:
-            name: Name of the input; equal queries have the same name.
-            query: Reads the value from the cell.
+            name: Name of the input.
+            query: Function that reads the value from the cell.
             codec: Codec of the value.
 
         Raises:
-            Exception: The cell raised an exception, which is also recorded.
+            Exception: The cell raised an exception; the exception is recorded and raised again.
         """
         self._read_counts[name] += 1
         read_count = self._read_counts[name]

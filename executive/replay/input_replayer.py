@@ -8,7 +8,7 @@ from typing import Any
 from executive import errors
 from executive.errors import Fault
 from executive.events import InputRead
-from executive.replay.codec import PLAIN_CODEC, Codec
+from executive.replay.codec import IDENTITY_CODEC, Codec
 from executive.replay.input_log import InputLog
 
 
@@ -17,7 +17,7 @@ class InputNotRecorded(Fault):
 
 
 class InputReplayer:
-    """Returns the recorded values of inputs, in the same control steps as in the recorded run.
+    """Source of recorded values, which returns each value in the control step in which it was recorded.
 
     Args:
         log: The recorded inputs.
@@ -30,7 +30,7 @@ class InputReplayer:
         self._inputs = {name: deque(inputs) for name, inputs in log.inputs.items()}
         self._tick = 0
         self._read_counts: Counter[str] = Counter()
-        # A journal of a killed run may contain no clock value; the clock is then 0, as at the start.
+        # The journal of a killed run may contain no value of the clock; every clock starts at 0.
         self._last_values: dict[str, Any] = {"clock": 0.0}
         self.missing_input_message = ""
 
@@ -39,7 +39,7 @@ class InputReplayer:
         self._tick = tick
         self._read_counts.clear()
 
-    def read(self, name: str, codec: Codec = PLAIN_CODEC) -> Any:
+    def read(self, name: str, codec: Codec = IDENTITY_CODEC) -> Any:
         """Return the recorded value of an input.
 
         Args:
@@ -48,11 +48,13 @@ class InputReplayer:
 
         Raises:
             InputNotRecorded: The recorded run had not read this input up to this control step.
-            Exception: The cell raised an exception; the new exception has its name and message.
+            Exception: The recorded cell raised an exception with this class name and message.
         """
         self._read_counts[name] += 1
-        inputs, now = self._inputs.get(name, deque()), (self._tick, self._read_counts[name])
-        while inputs and (inputs[0].tick, inputs[0].reading.read_number) <= now:
+        inputs = self._inputs.get(name, deque())
+        # Values that the recorded run read before or in this read are due, in the order of their reads.
+        this_read = (self._tick, self._read_counts[name])
+        while inputs and (inputs[0].tick, inputs[0].reading.read_number) <= this_read:
             reading = inputs.popleft().reading
             if reading.exception:
                 raise _make_exception(reading)
@@ -65,8 +67,8 @@ class InputReplayer:
 
 
 def _make_exception(reading: InputRead) -> BaseException:
-    """Return an exception with the recorded class name and message."""
-    kind = getattr(errors, reading.exception, None) or type(reading.exception, (Exception,), {})
-    error = kind(reading.value)
+    """Return an exception with the recorded message, of the recorded class or of a new class of this name."""
+    exception_class = getattr(errors, reading.exception, None) or type(reading.exception, (Exception,), {})
+    error = exception_class(reading.value)
     assert isinstance(error, BaseException)
     return error

@@ -1,4 +1,4 @@
-"""Cell whose inputs to a run are recorded, and the names and codecs of these inputs."""
+"""Cell with a recorder of its inputs, and the name and codec of each input."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 import zlib
 from collections.abc import Mapping
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
 from pydantic import JsonValue
@@ -19,38 +20,28 @@ from executive.replay.codec import (
     ARRAY_CODEC,
     BOX_CODEC,
     FRAME_CODEC,
+    IDENTITY_CODEC,
     MOTION_CODEC,
-    NOTHING_CODEC,
+    NONE_CODEC,
     OBSERVATIONS_CODEC,
-    PLAIN_CODEC,
     POSE_CODEC,
-    TEXTS_CODEC,
+    STRINGS_CODEC,
     Codec,
 )
 from executive.replay.input_recorder import InputRecorder
 
 
 class InputFormat(NamedTuple):
-    """Name and codec of one kind of recorded input.
+    """Name and codec of a recorded input.
 
     Attributes:
-        name: Name of the input in the journal; `{detector}` stands for the name of the detector, `{0}` for
-            the first argument of the access.
+        name: Name of the input in the journal, in which `{detector}` represents the name of the detector, and
+            `{0}` the first argument of the access.
         codec: Codec of the value.
     """
 
     name: str
-    codec: Codec = PLAIN_CODEC
-
-    @staticmethod
-    def find(access: Access) -> InputFormat:
-        """Return the format of the result of an access to the cell; all commands have the same format."""
-        if access.name in COMMANDS:
-            return _COMMAND_FORMAT
-        name, codec = INPUT_FORMATS[access.name]
-        if "{" in name:
-            name = name.format(*access.all_arguments, detector=access.detector)
-        return InputFormat(name, codec)
+    codec: Codec = IDENTITY_CODEC
 
 
 INPUT_FORMATS: Mapping[str, InputFormat] = {
@@ -66,7 +57,7 @@ INPUT_FORMATS: Mapping[str, InputFormat] = {
     "tool.holding": InputFormat("tool.holding"),
     "tool.holding_force": InputFormat("tool.bears"),
     "camera.name": InputFormat("camera.name"),
-    "camera.scan_poses": InputFormat("camera.scan_poses", TEXTS_CODEC),
+    "camera.scan_poses": InputFormat("camera.scan_poses", STRINGS_CODEC),
     "camera.next_pose": InputFormat("camera.next_pose"),
     "camera.get_view_box": InputFormat("camera.area.{0}", BOX_CODEC),
     "camera.sees_table": InputFormat("camera.sees_table"),
@@ -83,23 +74,27 @@ INPUT_FORMATS: Mapping[str, InputFormat] = {
 COMMANDS = frozenset(
     {"arm.plan", "arm.plan_ahead", "arm.start", "arm.stop", "tool.close", "tool.open", "detector.request"}
 )
-"""Accesses that command the cell; a replay skips them."""
+"""Accesses that command the cell, by `Access.name`; a replay executes no command."""
 
 RECORDED_ROLES = ("arm", "tool", "camera", "detector", "operator", "localizer")
-"""Parts of a cell with recorded inputs; a replay has its own ledger, and the cell file defines the rest."""
+"""Roles of the parts of a cell with recorded inputs; a replay needs no inputs from other parts."""
 
-_COMMAND_FORMAT = InputFormat("command", NOTHING_CODEC)
-"""Format of the result of a command: None, unless the cell raises an exception."""
-
-
-_PATTERN_CODECS = [
-    (re.compile(re.sub(r"\\{.*?\\}", ".+", re.escape(input_format.name))), input_format.codec)
+_CODEC_BY_PATTERN = {
+    re.sub(r"{\w+}", "*", input_format.name): input_format.codec
     for input_format in sorted(INPUT_FORMATS.values(), key=lambda input_format: -len(input_format.name))
-]
-"""Pattern of the input names and codec of each format, by descending length of the name.
+}
+"""Codec of each input by a pattern for its name (`detector.*.ready`).
 
-The longest names are first, because the pattern of a shorter name may match a longer name, too.
+The longest patterns are first, because `detector.*` also matches `detector.yolo.ready`.
 """
+
+
+def find_input_format(access: Access) -> InputFormat:
+    """Return the format of the result of an access to the cell; all commands have the name `command`."""
+    if access.name in COMMANDS:
+        return InputFormat("command", NONE_CODEC)
+    name, codec = INPUT_FORMATS[access.name]
+    return InputFormat(name.format(*access.all_arguments, detector=access.detector), codec)
 
 
 def check_input(name: str, value: JsonValue) -> None:
@@ -108,16 +103,16 @@ def check_input(name: str, value: JsonValue) -> None:
     Raises:
         ValueError: The value does not have the format of the input.
     """
-    codec = next((codec for pattern, codec in _PATTERN_CODECS if pattern.fullmatch(name)), PLAIN_CODEC)
+    codecs = (codec for pattern, codec in _CODEC_BY_PATTERN.items() if fnmatchcase(name, pattern))
     try:
-        codec.decode(value)
+        next(codecs, IDENTITY_CODEC).decode(value)
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, zlib.error) as error:
         problem = f"{type(error).__name__}: {error}"
         raise ValueError(f'"value" does not have the format of the input "{name}" ({problem})') from error
 
 
 def make_recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
-    """Return a copy of the cell that has the clock `clock` and whose inputs are recorded.
+    """Return a copy of the cell with a recorder of its inputs, and with the clock of the run.
 
     The copy emits an event before each action of the tool.
     """
@@ -125,7 +120,7 @@ def make_recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, em
     def read_and_record(access: Access) -> Any:
         if access.role == "tool" and access.name in COMMANDS:
             emit(ToolCommanded(access.member))
-        name, codec = InputFormat.find(access)
+        name, codec = find_input_format(access)
         return recorder.read(name, access.proceed, codec)
 
     return replace(intercept(cell, read_and_record, RECORDED_ROLES), clock=clock)

@@ -15,32 +15,34 @@ from executive.cell.workcell import Workcell
 from executive.errors import Stopped
 from executive.replay.input_log import InputLog, Interruption
 from executive.replay.input_replayer import InputReplayer
-from executive.replay.recorded_cell import RECORDED_ROLES, InputFormat
+from executive.replay.recorded_cell import RECORDED_ROLES, find_input_format
 
 
 class ReplayedCell(CellWrapper):
-    """Work cell that returns recorded inputs and ignores commands; uses only the ledger of the inner cell.
+    """Work cell that returns recorded inputs and ignores commands, up to the last interruption of the run.
 
-    After the last interruption, all reads and commands go to the inner cell.
+    After the last interruption, all reads and commands go to the inner cell. The ledger of the inner cell is
+    used from the start.
 
     Args:
-        inner: Cell with the ledger of the run, and on which the run may continue.
+        inner: Cell on which the run continues after the last interruption.
         log: The recorded inputs.
-        last: Interruption at the end of the log, or None if the run is only replayed.
+        last_interruption: Interruption at the end of the log, or None if the run is only replayed.
 
     Attributes:
         log: The recorded inputs before the last interruption.
         last_interruption: Interruption at the end of the log, or None if the run is only replayed.
-        pending_interruption: Interruption before this control step until the run is resumed, else None.
+        pending_interruption: Interruption at this control step; None after `resume`, or without interruption.
         is_live: True if all reads and commands go to the inner cell.
     """
 
-    def __init__(self, inner: Workcell, log: InputLog, last: Interruption | None = None) -> None:
+    def __init__(self, inner: Workcell, log: InputLog, last_interruption: Interruption | None = None) -> None:
         super().__init__(inner)
-        self.log = log if last is None else log.select_before(last.complete_step_count)
-        self.last_interruption = last
+        step_count = None if last_interruption is None else last_interruption.complete_step_count
+        self.log = log if step_count is None else log.select_before(step_count)
+        self.last_interruption = last_interruption
         self._replayer = InputReplayer(self.log)
-        self._is_halted = False
+        self._has_raised_stop = False
         self.is_live = False
         clock = StepClock(self._read_clock, self.log.control_period)
         self._cell = replace(intercept(inner.cell, self._handle_access, RECORDED_ROLES), clock=clock)
@@ -49,7 +51,7 @@ class ReplayedCell(CellWrapper):
 
     @property
     def cell(self) -> Cell:
-        """The cell that skills see."""
+        """The cell that skills use."""
         return self._cell
 
     @property
@@ -63,20 +65,20 @@ class ReplayedCell(CellWrapper):
         return self._replayer.missing_input_message
 
     @property
-    def has_ended(self) -> bool:
+    def has_run_ended(self) -> bool:
         """True if the run is only replayed and ended before its tree was ticked in this control step."""
         return self.last_interruption is None and self.log.has_ended_before_tick(self._steps)
 
     @property
     def is_tree_restarted(self) -> bool:
-        """True if the recorded run ended as INCOMPLETE in this control step and was resumed."""
-        next_interruption = None if self.is_live else self._find_interruption(self._steps + 1)
-        return next_interruption is not None and next_interruption.restarts_tree
+        """True if the recorded run ended as INCOMPLETE in this control step, and was then resumed."""
+        interruption = None if self.is_live else self._find_interruption(self._steps + 1)
+        return interruption is not None and interruption.restarts_tree
 
     def resume(self) -> None:
         """Continue after the pending interruption; after the last interruption, continue on the inner cell.
 
-        The inner cell first executes the complete control steps that it has not executed.
+        If the inner cell has executed fewer control steps than the log contains, it first executes the others.
         """
         interruption, self.pending_interruption = self.pending_interruption, None
         assert interruption is not None, "only an interrupted run can be resumed"
@@ -89,7 +91,7 @@ class ReplayedCell(CellWrapper):
 
     @contextmanager
     def suppress_commands(self) -> Iterator[None]:
-        """Return the last recorded inputs and ignore commands in the `with` block."""
+        """Ignore commands in the `with` block, in which reads return the last recorded inputs."""
         is_live, self.is_live = self.is_live, False
         try:
             yield
@@ -105,8 +107,9 @@ class ReplayedCell(CellWrapper):
         if self.is_live:
             self.inner.advance()
             return
-        if self.last_interruption is None and not self._is_halted and self.log.is_halted_after(self._steps):
-            self._is_halted = True
+        is_halted = self.last_interruption is None and self.log.is_halted_after(self._steps)
+        if is_halted and not self._has_raised_stop:
+            self._has_raised_stop = True
             raise Stopped("the recorded run was halted in this control step")
         self._begin_step(self._steps + 1)
         self.pending_interruption = self._find_interruption(self._steps)
@@ -116,11 +119,13 @@ class ReplayedCell(CellWrapper):
         self._replayer.begin_step(steps)
 
     def _find_interruption(self, steps: int) -> Interruption | None:
+        """Return the interruption after `steps` control steps, or None."""
         if self.last_interruption is not None and steps == self.last_interruption.complete_step_count:
             return self.last_interruption
         return self.log.interruptions.get(steps)
 
     def _read_clock(self) -> float:
+        """Return the time on the clock of the cell [s]."""
         if self.is_live:
             return self.inner.cell.clock.now
         offset: float = self._replayer.read("clock")
@@ -129,5 +134,4 @@ class ReplayedCell(CellWrapper):
     def _handle_access(self, access: Access) -> Any:
         if self.is_live:
             return access.proceed()
-        name, codec = InputFormat.find(access)
-        return self._replayer.read(name, codec)
+        return self._replayer.read(*find_input_format(access))

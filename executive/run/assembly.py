@@ -32,21 +32,20 @@ class RunOptions:
 
     Attributes:
         seed: Seed of all random numbers.
-        requests: Requests of the operator; None: a person gives requests at the terminal or in a view.
-        keyboard: True if a person can type at the terminal.
+        requests: Requests of the operator, or None if a person gives requests at the terminal or in a view.
+        has_keyboard: True if a person can type at the terminal.
         gui: True to show the simulated world in a window.
-        realtime: True to pace the run by the wall clock.
-        kind: Constructor of the work cell; None: the installed kind that the cell file names.
-        substitutes: Skills that replace the skills of nodes, by a pattern of the paths of the nodes
-            (`*/Grasp`).
-        scene: Scene file, which changes the world of a simulated cell; None: the world of the cell file.
+        is_realtime: True to execute the run at the speed of the wall clock.
+        kind: Function that makes the work cell, or None to use the kind that the cell file names.
+        substitutes: Skill that replaces the skills of nodes, by a pattern for the node paths (`*/Grasp`).
+        scene: Scene file, which changes the world of a simulated cell, or None.
     """
 
     seed: int
     requests: Sequence[str] | None = None
-    keyboard: bool = True
+    has_keyboard: bool = True
     gui: bool = False
-    realtime: bool = False
+    is_realtime: bool = False
     kind: Callable[..., Workcell] | None = None
     substitutes: Mapping[str, type[Skill]] = field(default_factory=dict)
     scene: Path | None = None
@@ -64,28 +63,29 @@ def assemble(
         loaded: The mission and its cell.
         skills: Installed skills by name.
         options: Options of the run.
-        observers: Observers of the events, in the order of their calls.
+        observers: Observers of the events; each event is passed to them in this order.
 
     Raises:
-        InputError: The kind of the cell is not installed, or a request is not a class of the mission.
+        InputError: The kind of the cell is not installed, or a request names no class of the mission.
     """
     builder = _RunBuilder(loaded, skills, options, observers)
     workcell = builder.build_cell()
     builder.context.connect(workcell, LookaheadPlanner(workcell.cell))
     start = RunStarted(
-        loaded.mission.name,
-        str(loaded.path),
-        options.seed,
-        loaded.params,
-        loaded.overrides,
-        options.requests,
-        str(loaded.cell_path.parent.resolve()),
-        workcell.cell.clock.step,
-        dict(list_versions()),
+        mission=loaded.mission.name,
+        file=str(loaded.path),
+        seed=options.seed,
+        params=loaded.params,
+        overrides=loaded.overrides,
+        requests=options.requests,
+        base=str(loaded.cell_path.parent.resolve()),
+        step=workcell.cell.clock.step,
+        versions=dict(list_versions()),
     )
-    root = builder.build_tree()
-    name = loaded.mission.name
-    return Run(builder.context, root, builder.control, name, start=start, realtime=options.realtime)
+    return Run(
+        builder.context, builder.build_tree(), builder.control, loaded.mission.name,
+        start_event=start, is_realtime=options.is_realtime,
+    )  # fmt: skip
 
 
 def assemble_resumed(
@@ -98,25 +98,26 @@ def assemble_resumed(
     is_complete: bool = True,
     has_ended: bool = False,
 ) -> ResumedRun:
-    """Return a run that replays a recorded run and, if the run was interrupted, continues on its cell.
+    """Return a run that replays a recorded run and, if that run was interrupted, continues on a cell.
 
     Args:
         loaded: The mission and its cell.
         skills: Installed skills by name.
         options: Options of the interrupted run.
         log: The recorded inputs.
-        world_log: File from which the cell rebuilds its world.
+        world_log: File from which a simulated cell reconstructs its world.
         is_complete: True if the log contains all events of its last control step.
         has_ended: True if the recorded run had ended, so that it is only replayed.
 
     Raises:
-        InputError: The kind of the cell is not installed, or the world of the cell cannot be rebuilt.
+        InputError: The kind of the cell is not installed, or its world cannot be reconstructed.
     """
     builder = _RunBuilder(loaded, skills, options)
-    frames, pose_changes = (log.count_readings(f"camera.{name}") for name in ("frame", "next_pose"))
-    inner = builder.build_cell(ResumePoint(world_log, frames, pose_changes), log.count_events(RequestGiven))
-    last = log.find_interruption(inner.steps, inner.last_command, is_complete=is_complete)
-    return builder.build_resumed_run(inner, log, None if has_ended else last)
+    frame_count, pose_count = map(log.count_readings, ("camera.frame", "camera.next_pose"))
+    resume_point = ResumePoint(world_log, frame_count, pose_count)
+    workcell = builder.build_cell(resume_point, log.count_events(RequestGiven))
+    interruption = log.find_interruption(workcell.steps, workcell.last_command, is_complete=is_complete)
+    return builder.build_resumed_run(workcell, log, None if has_ended else interruption)
 
 
 def assemble_replay(
@@ -133,11 +134,11 @@ def assemble_replay(
 
 
 class _RunBuilder:
-    """Builder of the parts of a run.
+    """Builder of the parts of a run; its arguments are those of `assemble`.
 
     Attributes:
-        context: Recorded cell and events of the run; `connect` must precede `build_tree`.
-        control: Stops, pauses and steps the run.
+        context: Cell and events of the run; its method `connect` must be called before `build_tree`.
+        control: Control with which other threads stop, pause and step the run.
     """
 
     def __init__(
@@ -155,20 +156,20 @@ class _RunBuilder:
         """Return the work cell of the run.
 
         Args:
-            resume_point: State in which an interrupted run left the cell; None for a new run.
-            request_count: Number of requests that the operator gave before the interruption.
+            resume_point: State of the cell at the interruption of the run; None for a new run.
+            request_count: Number of requests that the operator had given before the interruption.
         """
         loaded, options, emit = self._loaded, self._options, self.context.emit
         operator: Operator
         if options.requests is None:
-            operator = TerminalOperator(emit, self.control, keyboard=options.keyboard)
+            operator = TerminalOperator(emit, self.control, has_keyboard=options.has_keyboard)
         else:
             operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, request_count)
         cell_options = CellOptions(
             operator, loaded.cell_path.parent, options.gui, resume=resume_point, scene=options.scene
         )
-        kind = options.kind or load_cell_kind(loaded.cell_config.kind)
-        return kind(
+        make_cell = options.kind or load_cell_kind(loaded.cell_config.kind)
+        return make_cell(
             loaded.cell_config, seed=options.seed, routes=loaded.routes, emit=emit, options=cell_options
         )
 
@@ -178,10 +179,12 @@ class _RunBuilder:
         return build_tree(self._loaded, self._skills, cell, Blackboard(), emit, self._options.substitutes)
 
     def build_resumed_run(
-        self, inner: Workcell, log: InputLog, last: Interruption | None = None
+        self, workcell: Workcell, log: InputLog, interruption: Interruption | None = None
     ) -> ResumedRun:
-        """Return a run that replays a log and continues on `inner` after the interruption `last`."""
-        replayed_cell = ReplayedCell(inner, log, last)
+        """Return a run that replays a log and, after the interruption at its end, continues on `workcell`."""
+        replayed_cell = ReplayedCell(workcell, log, interruption)
         self.context.connect(replayed_cell)
-        root, name, realtime = self.build_tree(), self._loaded.mission.name, self._options.realtime
-        return ResumedRun(self.context, replayed_cell, root, self.control, name, realtime=realtime)
+        return ResumedRun(
+            self.context, replayed_cell, self.build_tree(), self.control, self._loaded.mission.name,
+            is_realtime=self._options.is_realtime,
+        )  # fmt: skip

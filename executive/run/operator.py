@@ -14,17 +14,17 @@ from executive.run.run_control import RunControl
 RESCAN = "rescan"
 """Request for a new scan of the table."""
 KEYBOARD_POLL_PERIOD = 0.1
-"""Period at which an operator that waits for a request checks whether the run was stopped [s]."""
+"""Period at which `TerminalOperator` checks for requests in a browser and for a stop of the run [s]."""
 
 
 class ScriptedOperator:
-    """Operator that gives the requests of a list, then quits; emits an event for each request.
+    """Operator that gives the requests in a list, then quits; emits an event for each request.
 
     Args:
-        requests: The requests, in the form that `parse_request` accepts.
+        requests: The requests, each a text that `parse_request` accepts.
         choices: Classes that can be requested.
-        emit: Emits an event.
-        start: Index of the first request to give, larger than 0 in a resumed run.
+        emit: Function that emits an event.
+        start: Index in `requests` of the first request to give; larger than 0 in a resumed run.
 
     Raises:
         InputError: A request is invalid.
@@ -45,16 +45,16 @@ class ScriptedOperator:
 
 
 class TerminalOperator:
-    """Operator at the terminal; a question stops the clock of the run, and Ctrl-C stops the run.
+    """Operator at the terminal; the clock of the run stands still until the operator answers a question.
 
     Args:
-        emit: Emits an event.
-        control: Control of the run, which also gives requests from other sources, such as a browser.
-        keyboard: True if a person can type at the terminal; otherwise only `control` gives requests.
+        emit: Function that emits an event.
+        control: Control of the run, which also passes requests from other sources, such as a browser.
+        has_keyboard: True if a person can type at the terminal; otherwise all requests come from `control`.
     """
 
-    def __init__(self, emit: Emit, control: RunControl, *, keyboard: bool = True) -> None:
-        self._emit, self._control, self._keyboard = emit, control, keyboard
+    def __init__(self, emit: Emit, control: RunControl, *, has_keyboard: bool = True) -> None:
+        self._emit, self._control, self._has_keyboard = emit, control, has_keyboard
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the requested class, `rescan`, or None for `q` or the end of the input.
@@ -62,13 +62,13 @@ class TerminalOperator:
         Raises:
             Stopped: The run was stopped before a request.
         """
-        # A request from before the question, such as a second click, must have no effect.
+        # A request that was given before this question, for instance by a second click, must have no effect.
         while self._control.take_request() is not None:
             pass
         self._emit(OperatorAsked(list(choices)))
         menu = "  ".join(f"{number} {label}" for number, label in enumerate(choices))
         while True:
-            if self._keyboard:
+            if self._has_keyboard:
                 sys.stderr.write(f"pick what?  {menu}  s rescan  q quit > ")
                 sys.stderr.flush()
             line = self._read_line()
@@ -79,11 +79,13 @@ class TerminalOperator:
             sys.stderr.write(f'cannot pick "{line.strip()}"\n')
 
     def _read_line(self) -> str:
+        """Return the next request as text; "" if the input of the terminal has ended."""
         while not self._control.is_stopped:
             if (text := self._control.take_request()) is not None:
-                sys.stderr.write("\n" if self._keyboard else "")
+                sys.stderr.write("\n" if self._has_keyboard else "")
+                # An empty text would mean the end of the input.
                 return text or "?"
-            if not self._keyboard:
+            if not self._has_keyboard:
                 time.sleep(KEYBOARD_POLL_PERIOD)
             elif select.select([sys.stdin], [], [], KEYBOARD_POLL_PERIOD)[0]:
                 return sys.stdin.readline()

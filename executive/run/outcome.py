@@ -1,4 +1,4 @@
-"""End of a run: its status, the check of its items, and problems that occur at the end."""
+"""End of a run: end of its tick loop, final check of its items, and collection of error messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ class LoopEnd:
     """End of the tick loop of a run.
 
     Attributes:
-        status, reason, message, node: As in `RunEnded`.
+        status: Status of the run, before the check of its items.
+        reason: Reason of the failure, for instance `Transit.dropped`; "" on success.
+        message: Sentence that explains the status, or "".
+        node: Path of the node that determined the status, or "".
         traceback: Traceback of the exception that caused a fault, or "".
     """
 
@@ -32,14 +35,14 @@ HALTED = LoopEnd("HALTED", "halted", "halted by the user")
 
 
 def to_loop_end(failure: Failure | None) -> LoopEnd:
-    """Return the end of the tick loop for the failure of the tree, or for its success (None)."""
+    """Return the end of the tick loop of a tree that failed with `failure`, or succeeded if it is None."""
     if failure is None:
         return LoopEnd("SUCCESS")
     return LoopEnd("FAILURE", str(failure), failure.message, failure.path)
 
 
 def catch_problems(action: Callable[[], None]) -> list[str]:
-    """Call `action`, and return the message of its exception in a list, which is empty without exception."""
+    """Call `action`; return a list with the message of its exception, or an empty list."""
     try:
         action()
     except Exception as error:
@@ -48,14 +51,15 @@ def catch_problems(action: Callable[[], None]) -> list[str]:
 
 
 def check_items(accounts: Accounts) -> LoopEnd:
-    """Return the end of a run whose tree succeeded: FAILURE if items were lost, INCOMPLETE if rejected."""
+    """Return the end of a run whose tree succeeded.
+
+    The status is FAILURE if items were lost, else INCOMPLETE if items were rejected, else SUCCESS.
+    """
     items = accounts.summaries()
-    lost = [item.item for item in items if item.state == "lost"]
-    if lost:
+    if lost := [item.item for item in items if item.state == "lost"]:
         message = f"{len(lost)} object(s) were lost and not found again: {', '.join(lost)}"
         return LoopEnd("FAILURE", "lost", message)
-    rejected = [f"{item.item} ({item.reason})" for item in items if item.state == "rejected"]
-    if rejected:
+    if rejected := [f"{item.item} ({item.reason})" for item in items if item.state == "rejected"]:
         message = f"{len(rejected)} object(s) were not sorted: {', '.join(rejected)}"
         return LoopEnd("INCOMPLETE", "rejected", message)
     return LoopEnd("SUCCESS")
@@ -64,13 +68,15 @@ def check_items(accounts: Accounts) -> LoopEnd:
 def finalize_items(accounts: Accounts, *, completed: bool) -> None:
     """Let the ledger set the final state of each item, and check the sum of the counts.
 
+    `completed` is True if the tree succeeded.
+
     Raises:
         Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost items.
     """
     accounts.close(completed=completed)
     counts = accounts.count_states()
     if not is_balanced(counts):
-        listed = ", ".join(f"{count} {state}" for state, count in counts.items())
+        text = ", ".join(f"{count} {state}" for state, count in counts.items())
         raise Fault(
-            f"the item counts are inconsistent: {listed}; seen must be placed + rejected + skipped + lost"
+            f"the item counts are inconsistent: {text}; seen must be placed + rejected + skipped + lost"
         )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -28,16 +27,16 @@ from executive.tree.skill_leaf import SkillLeaf
 class ResumedRun(Run):
     """Run that replays an interrupted run, and then may continue on the real cell.
 
-    At each earlier interruption, the run repeats the actions of the earlier resumption. Observers get the
-    events of the replay and of the real cell; recorders get only the events of the real cell.
+    If the recorded run was resumed before, the run also repeats the earlier resumptions. Observers receive
+    the events of the replay and of the real cell; recorders receive only the events of the real cell.
 
     Args:
         context: Cell and events of the run.
         replayed_cell: Work cell of `context`, which replays the recorded run.
         root: The tree.
-        control: Stops, pauses and steps the run.
+        control: Control with which other threads stop, pause and step the run.
         mission: Name of the mission.
-        realtime: True to pace the run on the real cell by the wall clock.
+        is_realtime: True to execute the part on the real cell at the speed of the wall clock.
 
     Attributes:
         replayed_cell: Work cell that replays the recorded run.
@@ -51,35 +50,38 @@ class ResumedRun(Run):
         control: RunControl,
         mission: str,
         *,
-        realtime: bool = False,
+        is_realtime: bool = False,
     ) -> None:
         super().__init__(context, root, control, mission)
         self.replayed_cell = replayed_cell
-        self._paces_live_part = realtime
+        self._is_realtime_on_cell = is_realtime
         self._recorders: list[Observer] = []
         self._is_scene_known = True
         self._planner = LookaheadPlanner(replayed_cell.inner.cell)
         context.add_observer(self._planner.on_event)
-        control.call_between_ticks(self._follow_record)
+        control.call_between_ticks(self._stop_or_resume)
 
     def add_recorder(self, recorder: Observer) -> None:
         """Call `recorder` with every event of the real cell, before the observers."""
         self._recorders.append(recorder)
 
     def _execute_tree(self) -> RunEnded:
-        """Execute the tree, and again if it ended as INCOMPLETE and was then resumed; return the last end."""
+        """Execute the tree, and return its last end.
+
+        If the recorded run ended as INCOMPLETE and was then resumed, the tree is executed again.
+        """
         outcome = super()._execute_tree()
         while outcome.status == "INCOMPLETE" and self.replayed_cell.is_tree_restarted:
             self._context.advance()
             outcome = super()._execute_tree()
         return outcome
 
-    def _follow_record(self) -> None:
+    def _stop_or_resume(self) -> None:
         """Stop or resume the run in the same control step as the recorded run; called between two ticks."""
-        replayed = self.replayed_cell
-        while not replayed.is_live and not replayed.has_ended and replayed.pending_interruption is not None:
-            self._resume(replayed.pending_interruption)
-        if not replayed.is_live and replayed.has_ended:
+        cell = self.replayed_cell
+        while not cell.is_live and not cell.has_run_ended and cell.pending_interruption is not None:
+            self._resume(cell.pending_interruption)
+        if not cell.is_live and cell.has_run_ended:
             self.control.stop()
 
     def _resume(self, interruption: Interruption) -> None:
@@ -91,16 +93,16 @@ class ResumedRun(Run):
         context, replayed = self._context, self.replayed_cell
         replayed.resume()
         if replayed.is_live:
-            # No event is recorded here: if the braking is interrupted, the run resumes at the same step.
-            brake_to_rest(lambda: brake_arm(replayed.inner.cell, replayed.inner.advance))
+            # No event is recorded before this braking, so that a run that is killed now can be resumed again.
+            brake_arm(replayed.inner.cell, replayed.inner.advance)
             for recorder in self._recorders:
                 context.add_observer(recorder, first=True)
-            context.planner, self._realtime = self._planner, self._paces_live_part
+            context.planner, self._is_realtime = self._planner, self._is_realtime_on_cell
         context.begin_step(replayed.steps)
         if replayed.is_live:
             self._wall_start = time.monotonic() - context.now
-            step_count, action = interruption.complete_step_count, interruption.last_action
-            context.emit(RunResumed(step_count, action, dict(list_versions())))
+            step_count, versions = interruption.complete_step_count, dict(list_versions())
+            context.emit(RunResumed(step_count, interruption.last_action, versions))
         self._is_scene_known &= interruption.last_action != UNKNOWN_ACTION
         if self._is_scene_known:
             restart_skills(self.root)
@@ -108,7 +110,7 @@ class ResumedRun(Run):
             # A halted skill must not open the tool, because the journal may lack the last motions of the arm.
             with replayed.suppress_commands(), contextlib.suppress(Fault):
                 restart_skills(self.root)
-        brake_to_rest(context.brake_arm)
+        context.brake_arm()
         if interruption.restarts_tree:
             replayed.accounts.reopen()
         if self._is_scene_known:
@@ -118,23 +120,13 @@ class ResumedRun(Run):
 
     def _recover_scene(self) -> None:
         """Observe the scene; the scene stays unknown if an interruption or a stop ends the recovery early."""
+        cell = self.replayed_cell
         for _ in recover_scene(self._context.cell):
             self._context.advance()
-            cell = self.replayed_cell
-            is_over = not cell.is_live and (cell.has_ended or cell.pending_interruption is not None)
-            if self.control.is_stopped or is_over:
+            has_replay_ended = cell.has_run_ended or cell.pending_interruption is not None
+            if self.control.is_stopped or (not cell.is_live and has_replay_ended):
                 return
         self._is_scene_known = True
-
-
-def brake_to_rest(brake: Callable[[], str]) -> None:
-    """Call `brake`, which brakes an arm and returns a message if that failed, else "".
-
-    Raises:
-        Fault: `brake` returned a message.
-    """
-    if problem := brake():
-        raise Fault(problem)
 
 
 def restart_skills(root: Behaviour) -> None:
@@ -143,7 +135,7 @@ def restart_skills(root: Behaviour) -> None:
     Control nodes keep their state, for instance the number of attempts; variables keep their values.
 
     Raises:
-        Fault: The clean-up of a skill failed; nevertheless all other running skills were halted.
+        Fault: The clean-up of a skill failed; all other running skills are halted before the exception.
     """
     running = [
         node for node in root.iterate() if isinstance(node, SkillLeaf) and node.status is Status.RUNNING
@@ -155,8 +147,7 @@ def restart_skills(root: Behaviour) -> None:
 def reconcile_ledger(cell: Cell, last_action: str) -> None:
     """Correct the ledger by the sensor of the tool, and mark the positions of all items as invalid.
 
-    During the interruption nothing observed the cell: a person may have moved objects, and the tool may have
-    dropped its item.
+    During the interruption, a person may have moved objects, and the tool may have dropped its item.
 
     Args:
         cell: The cell, with its arm at rest.
@@ -169,5 +160,5 @@ def reconcile_ledger(cell: Cell, last_action: str) -> None:
     elif held_item is not None and not is_holding and last_action == "close":
         cell.tool.open()
         cell.ledger.record_drop(held_item)
-    # If the last action is `open`, the restarted skill records the released item.
+    # After the action `open`, the ledger still contains the grasp: the restarted skill records the release.
     cell.ledger.invalidate_positions()

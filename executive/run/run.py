@@ -33,14 +33,14 @@ class Run:
     Args:
         context: Cell and events of the run.
         root: The tree, which uses the cell and the events of `context`.
-        control: Stops, pauses and steps the run.
+        control: Control with which other threads stop, pause and step the run.
         mission: Name of the mission.
-        start: First event of the run; None if the run continues an interrupted run.
-        realtime: True to pace the run by the wall clock.
+        start_event: First event of the run; None for a run that continues an interrupted run.
+        is_realtime: True to execute the run at the speed of the wall clock.
 
     Attributes:
         root: The tree.
-        control: Stops, pauses and steps the run, from any thread.
+        control: Control with which other threads stop, pause and step the run.
         mission: Name of the mission.
     """
 
@@ -51,16 +51,17 @@ class Run:
         control: RunControl,
         mission: str,
         *,
-        start: RunStarted | None = None,
-        realtime: bool = False,
+        start_event: RunStarted | None = None,
+        is_realtime: bool = False,
     ) -> None:
         self.root, self.control, self.mission = root, control, mission
         self._context = context
-        self._start_event = start
-        self._realtime = realtime
+        self._start_event = start_event
+        self._is_realtime = is_realtime
         self._wall_start = 0.0
         """Wall time at time 0 of the run's clock [s]."""
-        self._held_item, self._is_table_empty = "", False
+        self._held_item = ""
+        self._is_table_empty = False
 
     @property
     def tick(self) -> int:
@@ -100,7 +101,7 @@ class Run:
         return self.workcell.accounts.count_states()
 
     def count_ground_truth(self) -> Mapping[str, int] | None:
-        """Return the true counts of the objects after `execute`, by a key of `PLACES`; None if unknown."""
+        """Return the number of objects by their true place (`PLACES`) after `execute`; None if unknown."""
         return self.workcell.audit()
 
     def close(self) -> None:
@@ -112,9 +113,9 @@ class Run:
         context = self._context
         with halt_on_signals(self.control):
             loop_end = self._tick_until_end()
-            problems = [*halt(self.root), *filter(None, [context.brake_arm()])]
+            problems = halt(self.root) + catch_problems(context.brake_arm)
         if loop_end.traceback:
-            # This event follows the braking, because a full disk must not prevent the braking.
+            # The arm brakes before this event is emitted, because a full disk must not prevent the braking.
             problems += catch_problems(lambda: context.emit(FaultRaised(loop_end.traceback)))
         completed = loop_end.status == "SUCCESS"
         problems += catch_problems(self._store_held_item)
@@ -145,7 +146,7 @@ class Run:
                 context.plan_ahead()
                 context.advance()
                 is_tree_ticked = False
-                if self._realtime:
+                if self._is_realtime:
                     time.sleep(max(0.0, self._wall_start + context.now - time.monotonic()))
                 control.wait_while_paused()
             loop_end = HALTED
@@ -167,11 +168,12 @@ class Run:
             self._held_item = cell.ledger.find_held_item() or "something"
 
     def _store_table_state(self) -> None:
-        """Store whether the ledger believes that the table is empty, and no look showed an unknown label."""
+        """Store whether the table is empty by the ledger, and no look showed an undeclared label."""
         ledger = self._context.cell.ledger
         self._is_table_empty = ledger.is_table_empty() and not ledger.unknown
 
     def _make_run_ended(self, loop_end: LoopEnd) -> RunEnded:
+        """Return the last event of the run; if the tree succeeded, the items determine the status."""
         if loop_end.status == "SUCCESS":
             loop_end = check_items(self.workcell.accounts)
         end = (self._is_table_empty, self._held_item, self.tick, round(self.now, 6))

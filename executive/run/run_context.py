@@ -1,4 +1,4 @@
-"""State of a run: work cell, recorder of inputs, number of control steps, and observers."""
+"""Context of a run: work cell, recorder of inputs, number of control steps, and observers."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.workcell import Workcell
+from executive.errors import Fault
 from executive.events import Event, Observer, TimedEvent
 from executive.replay.input_recorder import InputRecorder
 from executive.replay.recorded_cell import make_recorded_cell
@@ -15,19 +16,19 @@ from executive.run.lookahead_planner import LookaheadPlanner
 MAX_BRAKING_TIME = 2.0
 """Maximum time from the command to brake until the arm is at rest [s]."""
 MAX_BRAKING_ATTEMPTS = 4
-"""Maximum number of commands to brake, because each observer may fail once to record a command."""
+"""Maximum number of commands to brake; more than one, because an observer of a command may raise an error."""
 
 
 class RunContext:
-    """Recorded cell and events of a run.
+    """Cell and events of a run.
 
     The context is created before the work cell, because the work cell emits events during its creation.
 
     Attributes:
         tick: Number of control steps so far.
         workcell: The work cell.
-        cell: Cell for skills: all its inputs are recorded, and its clock shows the start of the control step.
-        planner: Planner of probable next motions, or None.
+        cell: Cell for skills; its inputs are recorded, and its clock shows the start of the control step.
+        planner: Planner of the probable next motion, or None.
     """
 
     workcell: Workcell
@@ -39,6 +40,7 @@ class RunContext:
         self._observers = list(observers)
         self._recorder = InputRecorder(self.emit)
         self._control_period = 0.0
+        """Duration of a control step [s]."""
         self._clock_offset = 0.0
         """Time of the cell's clock minus the time of all control steps [s]; 0 in simulation."""
 
@@ -83,27 +85,36 @@ class RunContext:
         if self.planner is not None:
             self.planner.plan_next_motion()
 
-    def brake_arm(self) -> str:
-        """Brake the arm until it is at rest; return a message if that failed, else ""."""
-        return brake_arm(self.cell, self.advance)
+    def brake_arm(self) -> None:
+        """Brake the arm until it is at rest.
+
+        Raises:
+            Fault: The arm is not at rest, or a command to brake failed.
+        """
+        brake_arm(self.cell, self.advance)
 
 
-def brake_arm(cell: Cell, advance: Callable[[], None]) -> str:
-    """Brake the arm of a cell until it is at rest; return a message if that failed, else "".
+def brake_arm(cell: Cell, advance: Callable[[], None]) -> None:
+    """Brake the arm of a cell until it is at rest.
 
-    `advance` executes one control step.
+    A failed command to brake is repeated. `advance` executes one control step.
+
+    Raises:
+        Fault: The arm is not at rest, or a command to brake failed.
     """
     deadline = cell.clock.now + MAX_BRAKING_TIME
     problems: list[str] = []
-    while len(problems) < MAX_BRAKING_ATTEMPTS:
+    for _ in range(MAX_BRAKING_ATTEMPTS):
         try:
             cell.arm.stop()
-            while not cell.arm.at_rest:
-                if cell.clock.now > deadline:
-                    return f"the arm is not at rest {MAX_BRAKING_TIME:.0f} s after the command to brake"
+            while not (is_at_rest := cell.arm.at_rest) and cell.clock.now <= deadline:
                 advance()
         except Exception as error:
             problems.append(str(error))
-        else:
-            return problems[0] if problems else ""
-    return f"the arm could not be braked: {problems[-1]}"
+            continue
+        if not is_at_rest:
+            raise Fault(f"the arm is not at rest {MAX_BRAKING_TIME:.0f} s after the command to brake")
+        if problems:
+            raise Fault(problems[0])
+        return
+    raise Fault(f"the arm could not be braked: {problems[-1]}")

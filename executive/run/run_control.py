@@ -7,20 +7,20 @@ from collections import deque
 from collections.abc import Callable
 
 PAUSE_POLL_PERIOD = 0.05
-"""Period at which a paused run handles signals and calls the callbacks [s]."""
+"""Period at which a paused run handles signals and calls the callbacks of `call_between_ticks` [s]."""
 
 
 class RunControl:
-    """Commands to a run, from any thread or signal handler; a command takes effect between two ticks.
+    """Commands to a run from any thread or signal handler; a command takes effect between two ticks.
 
-    A pause stops the clock of the run and a simulated world.
+    During a pause, the clock of the run and a simulated world stand still.
     """
 
     def __init__(self) -> None:
         self._is_stopped = False
         self._is_paused = False
         self._remaining_ticks = 0
-        self._change = threading.Event()
+        self._wake_up = threading.Event()
         self._requests: deque[str] = deque()
         self._callbacks: list[Callable[[], None]] = []
 
@@ -31,13 +31,13 @@ class RunControl:
 
     @property
     def is_paused(self) -> bool:
-        """True while the run is paused or ticks a given number of times, and is not stopped."""
+        """True if the run is paused or will pause after the ticks of `step`; False after `stop`."""
         return self._is_paused and not self._is_stopped
 
     def stop(self) -> None:
         """Stop the run: the run halts its tree and brakes its arm."""
         self._is_stopped = True
-        self._change.set()
+        self._wake_up.set()
 
     def pause(self) -> None:
         """Pause the run before its next tick."""
@@ -46,20 +46,21 @@ class RunControl:
     def resume(self) -> None:
         """End the pause."""
         self._is_paused, self._remaining_ticks = False, 0
-        self._change.set()
+        self._wake_up.set()
 
     def step(self, tick_count: int = 1) -> None:
         """Let the run tick `tick_count` times, and then pause the run."""
-        self._remaining_ticks = self._remaining_ticks + tick_count if self._is_paused else tick_count
+        # Outside a pause, no ticks remain: `resume` sets their number to 0.
+        self._remaining_ticks += tick_count
         self._is_paused = True
-        self._change.set()
+        self._wake_up.set()
 
     def add_request(self, text: str) -> None:
-        """Store a request of the operator; a request before the question to the operator is ignored."""
+        """Store a request of the operator; the operator object discards requests from before its question."""
         self._requests.append(text)
 
     def take_request(self) -> str | None:
-        """Remove and return the oldest request, or None without requests."""
+        """Remove and return the oldest request; return None if there is no request."""
         return self._requests.popleft() if self._requests else None
 
     def call_between_ticks(self, callback: Callable[[], None]) -> None:
@@ -77,7 +78,7 @@ class RunControl:
             if self._remaining_ticks > 0:
                 self._remaining_ticks -= 1
                 return
-            self._change.wait(PAUSE_POLL_PERIOD)
-            self._change.clear()
+            self._wake_up.wait(PAUSE_POLL_PERIOD)
+            self._wake_up.clear()
             for callback in self._callbacks:
                 callback()

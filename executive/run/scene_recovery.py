@@ -19,7 +19,7 @@ from executive.manipulation.tool_goals import DROP_HEIGHT, make_put_down_goal
 LOOKS_PER_POSE = 3
 """Number of looks from each camera pose; a look is one image with its detections."""
 MIN_LOOKS = 5
-"""Minimum number of looks from all scan poses."""
+"""Minimum number of looks from all scan poses together."""
 VACUUM_DECAY_TIME = 0.1
 """Time for the vacuum to decay after the tool opened [s]."""
 
@@ -27,8 +27,8 @@ VACUUM_DECAY_TIME = 0.1
 def recover_scene(cell: Cell) -> Steps:
     """Empty the tool, and observe the table and the bins.
 
-    A camera on the arm also observes each bin from above. Afterwards the ledger knows the place of every item
-    that was detected. The mission searches for the other items; items that it does not find are rejected.
+    A camera on the arm also observes each bin from above. Afterwards the ledger knows the place of each
+    detected item; the mission searches for the undetected items, and rejects an item that it does not find.
 
     Raises:
         Fault: The tool holds an object that cannot be put down.
@@ -39,28 +39,28 @@ def recover_scene(cell: Cell) -> Steps:
     cell.tool.open()
     yield from cell.clock.sleep(VACUUM_DECAY_TIME)
     poses = cell.camera.scan_poses
-    first_position, height = cell.camera.capture().X_WC.position, 0.0
-    is_on_arm = False
+    first_camera_position, max_tool_height = cell.camera.capture().X_WC.position, 0.0
+    is_camera_on_arm = False
     for look_index in range(max(MIN_LOOKS, LOOKS_PER_POSE * len(poses))):
         frame = yield from _look(cell, poses[look_index % len(poses)])
-        is_on_arm |= not np.allclose(first_position, frame.X_WC.position)
-        height = max(height, float(cell.arm.tool_pose.position[2]))
+        is_camera_on_arm |= not np.allclose(first_camera_position, frame.X_WC.position)
+        max_tool_height = max(max_tool_height, float(cell.arm.tool_pose.position[2]))
         if look_index == 0:
             cell.ledger.mark_unseen_as_dropped()
-    for bin in cell.bins.values() if is_on_arm else ():
+    for bin in cell.bins.values() if is_camera_on_arm else ():
         x, y, _ = map(float, bin.position)
         for _ in range(LOOKS_PER_POSE):
-            yield from _look(cell, Goal((x, y, height)))
+            yield from _look(cell, Goal((x, y, max_tool_height)))
     cell.ledger.record_bin_contents()
 
 
 def _put_down(cell: Cell) -> Steps:
     """Transport the object in the tool, whose class is unknown, to a free position on the table."""
-    tallest = max(cell.classes.values(), key=lambda each: each.height)
-    goal = make_put_down_goal(cell, tallest, DROP_HEIGHT)
+    tallest_class = max(cell.classes.values(), key=lambda object_class: object_class.height)
+    goal = make_put_down_goal(cell, tallest_class, DROP_HEIGHT)
     problems = []
-    # With the tallest class as the load, the start may seem to be in collision: then plan without a load.
-    for load in (Load(tallest, cell.tool.holding_force), None):
+    # A load that is taller than the real one may collide at the start; the second plan ignores the load.
+    for load in (Load(tallest_class, cell.tool.holding_force), None):
         try:
             yield from _move(cell, goal, Task(load, list_obstacles(cell)))
         except (Unreachable, Blocked) as error:
@@ -74,7 +74,7 @@ def _put_down(cell: Cell) -> Steps:
 
 
 def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
-    """Move to a goal if possible, observe the view `full` of the camera, and return the frame."""
+    """Move to a goal if possible, observe the whole camera image, and return the frame."""
     with suppress(Unreachable, Blocked):
         yield from _move(cell, goal, Task(obstacles=list_obstacles(cell)))
     frame = cell.camera.capture()
@@ -89,17 +89,17 @@ def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
         observations = cell.localizer.localize(detections)
     except (Unavailable, NoDepth):
         return frame
-    # If the camera is displaced, this look is ignored; a skill of the mission reports the displacement.
+    # The look of a displaced camera is ignored; a skill of the mission reports the displacement later.
     if not cell.camera.describe_displacement(frame):
         cell.ledger.observe(detections, observations)
     return frame
 
 
 def _move(cell: Cell, goal: Goal | str, task: Task) -> Steps:
-    """Move the arm to a goal; yields until the arm is at rest at the goal or after a collision.
+    """Move the arm to a goal, and yield until the arm is at rest, at the goal or after a collision.
 
     Raises:
-        Unreachable, Blocked: The arm found no motion.
+        Unreachable, Blocked: The planner found no motion.
     """
     planning = cell.arm.plan(goal, task)
     while not planning.ready:

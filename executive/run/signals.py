@@ -22,21 +22,20 @@ def handle_signals(
 ) -> Iterator[Callable[[], None]]:
     """Handle signals in the `with` block, and yield a function that restores the previous handlers.
 
-    Ignored signals stay ignored (`nohup`), except SIGINT: a worker process ignores SIGINT while it waits, but
-    SIGINT must halt a run in a worker process. In other threads than the main thread, the function handles no
-    signal, because Python does not allow it.
+    A signal that the process ignores stays ignored (`nohup`). SIGINT is handled even if it is ignored: a
+    waiting worker process ignores SIGINT, but SIGINT must halt a run in this process. Outside the main thread
+    no signal is handled, because Python does not allow it.
     """
-    previous = {}
+    previous_handlers = {}
     if threading.current_thread() is threading.main_thread():
-        previous = {number: signal.getsignal(number) for number in numbers}
-        previous = {n: old for n, old in previous.items() if n == signal.SIGINT or old is not signal.SIG_IGN}
+        for number in numbers:
+            if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN:
+                previous_handlers[number] = signal.signal(number, handler)
 
     def restore() -> None:
-        for number, handler_before in previous.items():
-            signal.signal(number, handler_before)
+        for number, previous_handler in previous_handlers.items():
+            signal.signal(number, previous_handler)
 
-    for number in previous:
-        signal.signal(number, handler)
     try:
         yield restore
     finally:
@@ -45,7 +44,7 @@ def handle_signals(
 
 @contextmanager
 def halt_on_signals(control: RunControl) -> Iterator[None]:
-    """Stop the run at the first signal; a second signal has the effect that it has outside the block."""
+    """Stop the run at the first signal; a second signal goes to the handler from before the `with` block."""
 
     def stop_run(number: int, frame: FrameType | None) -> None:
         del number, frame

@@ -25,16 +25,20 @@ def list_versions() -> Mapping[str, str]:
 
 
 def list_requirements(extra: str = "") -> tuple[str, ...]:
-    """Return the packages that this project requires on this Python; with `extra`, only those of that extra.
+    """Return the packages that this project requires on this Python; empty if the project is not installed.
 
-    The tuple is empty if the project is not installed.
+    Without `extra`, the packages of all extras are omitted; with `extra`, only its packages are returned.
     """
     try:
         requirements = [Requirement(line) for line in metadata.requires(DISTRIBUTION) or ()]
     except metadata.PackageNotFoundError:
         return ()
-    needed = [each for each in requirements if each.marker is None or each.marker.evaluate({"extra": extra})]
-    return tuple(each.name for each in needed if not extra or "extra" in str(each.marker))
+    return tuple(
+        requirement.name
+        for requirement in requirements
+        if (requirement.marker is None or requirement.marker.evaluate({"extra": extra}))
+        and (not extra or "extra" in str(requirement.marker))
+    )
 
 
 def find_version(name: str) -> str:

@@ -24,7 +24,7 @@ from executive.errors import ExecutiveError, InputError
 from executive.events import NodeEnded, RunResumed, TimedEvent
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replayed_run import compare_replay, replay_run
+from executive.record.replayed_run import replay_and_compare, replay_run
 from executive.record.result import Result, describe_disagreement
 from executive.record.resumed_run import resume_run
 from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
@@ -255,7 +255,7 @@ def _resume(subject: MissionUnderTest, path: Path, case: str) -> Figures:
             return {"agrees": True, "status": "refused", "problems": [str(error)] if has_begun else []}
         after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = find_wrong_claims(result)
-        if difference := compare_replay(subject.loaded, subject.skills, after, result.seed).difference:
+        if difference := replay_and_compare(subject.loaded, subject.skills, after, result.seed).difference:
             problems.append(f"the replay differs: {difference}")
         return {"agrees": not describe_disagreement(result), "status": result.status, "problems": problems}
 

@@ -24,10 +24,10 @@ from executive.errors import ExecutiveError
 from executive.events import ItemChanged, NodeEnded, NodeStarted, TimedEvent
 from executive.geometry import Array
 from executive.plugins import load_cell_kind
-from executive.record.journal import find_end, read_journal
+from executive.record.journal import find_run_end, read_journal
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
-from executive.record.replayed_run import compare_replay
+from executive.record.replayed_run import replay_and_compare
 from executive.record.result import Result, describe_disagreement
 from executive.record.resumed_run import resume_run
 from executive.record.run_directory import LATEST_LINK, find_run
@@ -101,7 +101,7 @@ def run_and_kill(subject: MissionUnderTest, seed: int, runs: Path, delay: float)
         entries = read_journal(find_run(LATEST_LINK, runs) / "journal.jsonl")
     except ExecutiveError:
         return False
-    return InputLog.from_events(entries).start is not None and find_end(entries) is None
+    return InputLog.from_events(entries).start is not None and find_run_end(entries) is None
 
 
 def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: str) -> Figures:
@@ -124,7 +124,7 @@ def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: 
         result = resume_run(path, subject.skills, options, RecordOptions(saves_pictures=False))
         after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = [*check_result(result, change_made=done), *find_handled_twice(after.events)]
-        difference = compare_replay(subject.loaded, subject.skills, after, seed).difference
+        difference = replay_and_compare(subject.loaded, subject.skills, after, seed).difference
         if difference:
             problems.append(f"the replay differs: {difference}")
         ending = f"{result.status} {result.reason}".strip()

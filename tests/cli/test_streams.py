@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from executive.cli.main import main
-from executive.record.journal import find_end, read_journal
+from executive.record.journal import find_run_end, read_journal
 
 EXECUTIVE = f'"{sys.executable}" -m executive.cli.main'
 OUTPUTS = ("", ">&-", ">/dev/full", "> >(true)", "> >(head -c 9 >/dev/null)", ">/dev/null")
@@ -79,7 +79,7 @@ def test_a_hangup_halts_a_run_unless_it_was_ignored_at_the_start(ignored: bool, 
             assert run.poll() is None
             run.send_signal(signal.SIGTERM)
         assert run.wait(30) == 130
-    end = find_end(read_journal(tmp_path / "latest/journal.jsonl"))
+    end = find_run_end(read_journal(tmp_path / "latest/journal.jsonl"))
     assert end is not None and end.status == "HALTED"
     assert (
         json.loads(Path(os.path.realpath(tmp_path / "latest"), "result.json").read_text())["status"]

@@ -37,7 +37,7 @@ from executive.events import (
     ToolCommanded,
 )
 from executive.record import journal_format
-from executive.record.journal import Journal, find_end, find_start, read_journal
+from executive.record.journal import Journal, find_run_end, find_run_start, read_journal
 from executive.record.journal_format import EVENT_CLASSES, encode_event, make_journal_schema
 
 NODE, END = NodeStarted("a"), run_ended()
@@ -169,7 +169,7 @@ def test_a_line_the_disk_takes_in_parts_is_whole(path, monkeypatch):
     take = os.write
     monkeypatch.setattr(os, "write", lambda file, line: take(file, line[:5]))
     write(path, at(0, run_started()), at(1, END))
-    assert find_end(read_journal(path)) == END
+    assert find_run_end(read_journal(path)) == END
 
 
 LAST = encode_event(at(2, NodeStarted("ä")))[:-1]
@@ -314,7 +314,7 @@ def test_a_journal_of_the_first_format_is_named(path, first, version):
 def test_a_run_has_ended_if_nothing_comes_after_its_end(kinds, ended):
     samples = {"run": run_started(), "node": NODE, "end": END, "resume": RunResumed(1, "", {})}
     events = [at(tick, samples[kind]) for tick, kind in enumerate(kinds.split())]
-    assert find_end(events) == (END if ended else None)
+    assert find_run_end(events) == (END if ended else None)
 
 
 def test_every_kind_of_event_comes_back_as_it_was(path):
@@ -337,7 +337,7 @@ def test_every_kind_of_event_comes_back_as_it_was(path):
 
 def test_a_text_that_is_not_unicode_is_kept_readable(path):
     write(path, at(0, run_started(file="caf\udce9.yaml")))
-    assert find_start(read_journal(path), path, "").file == "caf?.yaml"
+    assert find_run_start(read_journal(path), path, "").file == "caf?.yaml"
 
 
 @pytest.mark.parametrize("value", [float("nan"), {"a": [float("inf")]}, object(), b"", {1, 2}, {(1,): 2}])
@@ -347,7 +347,7 @@ def test_a_value_that_is_not_json_is_a_fault_and_the_journal_goes_on(path, value
         with pytest.raises(Fault, match="JSON cannot represent an event of kind InputRead: "):
             journal(at(0, read("arm.q", value)))
         journal(at(1, END))
-    assert find_end(read_journal(path)) == END
+    assert find_run_end(read_journal(path)) == END
 
 
 def test_the_schema_that_ships_describes_the_events():

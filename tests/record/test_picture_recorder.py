@@ -13,7 +13,7 @@ from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, NodeEnded, TargetSelected, TimedEvent
 from executive.geometry import Pose
 from executive.record import picture_recorder as module
-from executive.record.picture_recorder import MAX_LOOKS, PictureRecorder, find_picture
+from executive.record.picture_recorder import MAX_STORED_LOOKS, PictureRecorder, find_picture
 from executive.record.pictures.drawing_thread import PictureDrawer
 
 CUBE = detected("cube")
@@ -145,16 +145,18 @@ def test_what_fails_because_a_skill_failed_is_not_drawn_again(tmp_path, drawn):
 
 
 def test_an_earlier_look_is_found_again_and_old_ones_are_forgotten(tmp_path, drawn):
-    looks = [look(number, CUBE) for number in range(MAX_LOOKS + 1)]
+    looks = [look(number, CUBE) for number in range(MAX_STORED_LOOKS + 1)]
     frames = shown(tmp_path, *looks, decision(frame=1), decision(frame=0, tick=13))
     assert list(drawn) == ["000012_cube-1.jpg"]
-    assert frames.problem == f"missing pictures: 1 of looks before the last {MAX_LOOKS}"
+    assert frames.problem == f"missing pictures: 1 of looks before the last {MAX_STORED_LOOKS}"
 
 
 def test_what_the_last_decision_rests_on_is_kept(tmp_path, drawn):
-    looks = [look(number) for number in range(1, 2 * MAX_LOOKS)]
+    looks = [look(number) for number in range(1, 2 * MAX_STORED_LOOKS)]
     missed = failed("Grasp", "missed", "cube-1")
-    shown(tmp_path, look(0, CUBE), decision(frame=0), *looks, missed, decision(frame=MAX_LOOKS, tick=91))
+    shown(
+        tmp_path, look(0, CUBE), decision(frame=0), *looks, missed, decision(frame=MAX_STORED_LOOKS, tick=91)
+    )
     assert list(drawn) == ["000012_cube-1.jpg", "000090_cube-1_missed.jpg"]
 
 

@@ -21,7 +21,7 @@ from executive.mission.load import load_mission
 from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.replayed_run import ReplayResult, compare_replay, replay_run
+from executive.record.replayed_run import ReplayResult, replay_and_compare, replay_run
 from executive.record.run_directory import find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions
@@ -86,8 +86,8 @@ def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     file, skills = missions / "sort_overhead.yaml", load_skills()
     four_times = [during("*/Grasp", seal_fails(), nth=(1, 2, 3, 4))]
     log = InputLog.from_events(run_mission(file, seed=3, faults=four_times).events)
-    assert compare_replay(load_mission(file, skills), skills, log, 3).is_equal
-    done = compare_replay(load_mission(file, skills, {"attempts": "2"}), skills, log, 3, edited=True)
+    assert replay_and_compare(load_mission(file, skills), skills, log, 3).is_equal
+    done = replay_and_compare(load_mission(file, skills, {"attempts": "2"}), skills, log, 3, edited=True)
     assert done.replayed.event.node == "RejectTarget"
 
 
@@ -115,6 +115,6 @@ def test_a_decision_too_many_is_a_difference_in_a_run_that_was_cut_off_too(missi
     decided = NodeStarted | NodeEnded | BranchChosen | TargetSelected | ItemChanged | ToolCommanded
     without = [one for n, one in enumerate(cut) if n < missing or not isinstance(one.event, decided)]
     loaded = load_mission(file, skills)
-    assert compare_replay(loaded, skills, InputLog.from_events(cut), 3).is_equal
-    done = compare_replay(loaded, skills, InputLog.from_events(without), 3)
+    assert replay_and_compare(loaded, skills, InputLog.from_events(cut), 3).is_equal
+    done = replay_and_compare(loaded, skills, InputLog.from_events(without), 3)
     assert (done.recorded, done.replayed and type(done.replayed.event)) == (None, ToolCommanded)

@@ -116,10 +116,10 @@ def test_the_ends_of_a_node_are_counted_and_its_last_failure_is_found() -> None:
 
 def test_an_activation_is_current_until_an_ancestor_starts_again() -> None:
     timeline = folded(NodeStarted("tree"), skill_started("tree/do/Grasp"), skill_ended("tree/do/Grasp"))
-    assert timeline.find_current("tree/do/Grasp") == timeline.activation_by_path["tree/do/Grasp"]
+    assert timeline.find_current_activation("tree/do/Grasp") == timeline.activation_by_path["tree/do/Grasp"]
     timeline(at(960, NodeStarted("tree")))
-    assert timeline.find_current("tree/do/Grasp") is None
-    assert timeline.find_current("tree") == timeline.activation_by_path["tree"]
+    assert timeline.find_current_activation("tree/do/Grasp") is None
+    assert timeline.find_current_activation("tree") == timeline.activation_by_path["tree"]
 
 
 def test_the_failures_that_a_control_node_handled_are_counted_with_their_last_message() -> None:
@@ -128,7 +128,7 @@ def test_the_failures_that_a_control_node_handled_are_counted_with_their_last_me
         BranchChosen("tree/retry", "attempt 3 of 3", "Grasp.missed", "too far"),
     )  # fmt: skip
     retry = timeline.activation_by_path["tree/retry"]
-    assert (retry.choice, retry.last_handled) == ("attempt 3 of 3", "Grasp.missed")
+    assert (retry.choice, retry.last_handled_reason) == ("attempt 3 of 3", "Grasp.missed")
     assert (retry.handled_counts, retry.message_by_reason) == (
         {"Grasp.missed": 2},
         {"Grasp.missed": "too far"},
@@ -160,7 +160,7 @@ def test_skills_that_run_are_in_the_order_of_their_starts() -> None:
         skill_started("tree/Transit"), skill_started("tree/Detect"), skill_ended("tree/Transit"),
         skill_started("tree/Transit"),
     )  # fmt: skip
-    assert [one.node for one in timeline.find_running()] == ["tree/Detect", "tree/Transit"]
+    assert [one.node for one in timeline.find_running_activations()] == ["tree/Detect", "tree/Transit"]
 
 
 @pytest.mark.parametrize(

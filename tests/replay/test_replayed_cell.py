@@ -73,9 +73,9 @@ def test_a_recorded_interruption_leaves_out_the_steps_in_which_nothing_was_decid
 @pytest.mark.parametrize("ticked", [False, True])
 def test_it_ends_where_the_recorded_run_was_halted(ticked: bool) -> None:
     replayed = ReplayedCell(FakeCell(), log(at(1, RunHalted(ticked))))
-    assert not replayed.has_ended
+    assert not replayed.has_run_ended
     replayed.advance()
-    assert replayed.has_ended is not ticked
+    assert replayed.has_run_ended is not ticked
     if ticked:
         with pytest.raises(Stopped):
             replayed.advance()
@@ -86,6 +86,6 @@ def test_it_ends_where_the_recorded_run_was_halted(ticked: bool) -> None:
 def test_it_ends_where_the_record_ends() -> None:
     replayed = ReplayedCell(FakeCell(), log(sense(1, "tool.holding", True)))
     replayed.advance()
-    assert not replayed.has_ended
+    assert not replayed.has_run_ended
     replayed.advance()
-    assert replayed.has_ended
+    assert replayed.has_run_ended

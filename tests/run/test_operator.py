@@ -16,7 +16,7 @@ from executive.errors import InputError, Stopped
 from executive.events import Event, NodeEnded, NodeStarted, OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.record.replayed_run import compare_replay
+from executive.record.replayed_run import replay_and_compare
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions, assemble
 from executive.run.operator import ScriptedOperator, TerminalOperator, parse_request
@@ -121,7 +121,7 @@ def test_ctrl_c_ends_the_wait_for_an_answer(type_in: Any, keyboard: bool) -> Non
     type_in("")
     control = RunControl()
     threading.Timer(0.3, control.stop).start()
-    operator = TerminalOperator(Heard(), control, keyboard=keyboard)
+    operator = TerminalOperator(Heard(), control, has_keyboard=keyboard)
     with pytest.raises(Stopped):
         operator.ask(CHOICES)
 
@@ -139,7 +139,7 @@ def test_ctrl_c_at_the_question_halts_the_run_instead_of_ending_it_well(missions
     assert (outcome.status, outcome.message) == ("HALTED", "halted by the user")
     ends = {one.event.status for one in events if isinstance(one.event, NodeEnded)}
     assert ends == {"INVALID"}, "nothing failed, and nobody quit"
-    again = compare_replay(loaded, load_skills(), InputLog.from_events(events), 1)
+    again = replay_and_compare(loaded, load_skills(), InputLog.from_events(events), 1)
     assert again.difference == ""
     assert again.decisions == sum(isinstance(one.event, NodeStarted | NodeEnded) for one in events) > 0
 
@@ -154,6 +154,6 @@ def test_requests_from_elsewhere_are_answers(before: list[str], after: list[str]
     for word in before:
         control.add_request(word)
     threading.Timer(0.2, lambda: [control.add_request(word) for word in after]).start()
-    operator = TerminalOperator(heard, control, keyboard=False)
+    operator = TerminalOperator(heard, control, has_keyboard=False)
     assert operator.ask(CHOICES) == answer
     assert heard == [OperatorAsked(list(CHOICES)), RequestGiven(answer)]

@@ -24,7 +24,7 @@ from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
 from executive.events import FaultInjected, InputRead, NodeEnded, RunEnded, TimedEvent
 from executive.plugins import load_cell_kind
-from executive.record.recorded_run import Recording, make_run_directory
+from executive.record.recorded_run import RecordedRun, make_run_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults import FaultyCell, with_faults
@@ -55,7 +55,7 @@ def record_trial(
     trial_run = _TrialRun(mission, nominal_run, faults)
     with closing(trial_run.run):
         directory = make_run_directory(trial_run.run, loaded, trial_run.options, runs)
-        recording = Recording(trial_run.run, loaded, mission.skills, directory, Recorder(directory), ())
+        recording = RecordedRun(trial_run.run, loaded, mission.skills, directory, Recorder(directory), ())
         result = recording.execute(mission.seed, start)
         try_write_report(result.run)
         return trial_run.make_trial(trial_run.outcome), directory.path

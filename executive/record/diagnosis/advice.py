@@ -11,7 +11,7 @@ from executive.mission.model.values import Literal
 from executive.record.diagnosis.failed_run import FailedRun
 from executive.record.diagnosis.failure_path import FailurePathNode
 from executive.record.timeline.activation import Reading
-from executive.record.timeline.items import ItemTimeline
+from executive.record.timeline.items import ItemHistory
 from executive.tree.inspection import Advice
 from executive.tree.node_registry import load_control_nodes
 
@@ -21,7 +21,7 @@ REMEDY_BY_REASON: Mapping[str, str] = {
 """Advice by the reason of a failure that makes all positions from the camera wrong."""
 
 
-def give_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
+def list_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
     """Yield advice in sentences, the most urgent first.
 
     Args:
@@ -44,7 +44,7 @@ def give_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[
             yield f"make sure that {reading.name} answers again"
         elif reading.name == "arm.met":
             yield f"find what the arm collided with: {reading.value}"
-    if run.is_unrecorded:
+    if run.is_record_lost:
         yield "free some space on the disk of the run directory, or name another folder with --runs DIR"
     elif run.end.status == "FAULT":
         yield "repair the code or the cell: a fault is never retried"
@@ -56,7 +56,7 @@ def give_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[
         yield f"look for {name} by hand, {_describe_position(item)}"
 
 
-def _describe_position(item: ItemTimeline) -> str:
+def _describe_position(item: ItemHistory) -> str:
     if item.drop_time is not None and (item.sighting is None or item.sighting.clock < item.drop_time):
         return "below the place where it was dropped"
     return "around ({:.2f}, {:.2f}) m".format(*item.last_change.position)

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 from executive.events import RunEnded
 from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import Node, SkillNode
-from executive.record.diagnosis.advice import give_advice
+from executive.record.diagnosis.advice import list_advice
 from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
 from executive.record.diagnosis.failed_run import FailedRun, describe_cause
 from executive.record.picture_recorder import find_picture
 from executive.record.result import FINAL_STATUSES
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.activation import Reading, to_skill_name
-from executive.record.timeline.items import ItemTimeline, Look, Sighting
+from executive.record.timeline.items import ItemHistory, Look, Sighting
 from executive.record.timeline.timeline import Timeline
 from executive.skill import Skill
 
@@ -86,10 +86,10 @@ def diagnose(
         arm_state=arm,
         held_item=end.held_item,
         raised_at=_find_exception_place(timeline.traceback),
-        is_recorded=not run.is_unrecorded,
-        can_resume=end.status not in FINAL_STATUSES and (not run.is_unrecorded or has_begun),
+        is_recorded=not run.is_record_lost,
+        can_resume=end.status not in FINAL_STATUSES and (not run.is_record_lost or has_begun),
         picture=_find_picture_file(run, run_folder),
-        advice=list(give_advice(run, arm, reads)),
+        advice=list(list_advice(run, arm, reads)),
     )
 
 
@@ -123,7 +123,7 @@ def _find_last_look(run: FailedRun) -> Sighting | Look | None:
     return replace(item.sighting, attempts=item.last_change.attempts)
 
 
-def _make_lost_item(name: str, item: ItemTimeline) -> LostItem:
+def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
     failure, failed = item.failure, None
     if failure is not None:
         failed = ItemFailure(f"{to_skill_name(failure.node)}.{failure.reason}", failure.message, failure.end)

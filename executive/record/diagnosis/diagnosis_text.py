@@ -42,7 +42,7 @@ def format_diagnosis(diagnosis: Diagnosis, run: str, repeat: str, report: str = 
         f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}", "", "  ", max_lines=3
     )
     lines += _format_failure_path(diagnosis)
-    for label, text in list_facts(diagnosis):
+    for label, text in list_labelled_sentences(diagnosis):
         lines += wrap_lines(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, max_lines=3)
     commands = {"record": run, "report": report, "repeat": repeat}
     if diagnosis.can_resume:
@@ -50,7 +50,7 @@ def format_diagnosis(diagnosis: Diagnosis, run: str, repeat: str, report: str = 
     return lines + [f"{label:{_LABEL_WIDTH}}{command}" for label, command in commands.items() if command]
 
 
-def list_facts(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
+def list_labelled_sentences(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
     """Yield label and sentence of each fact, except the verdict and the failure path."""
     node = diagnosis.node
     if node is not None and not any(passed.explanation for passed in diagnosis.passed_nodes):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from executive.errors import RecordLost
 from executive.events import RunEnded
 from executive.mission.model.nodes import Node, SkillNode
-from executive.record.diagnosis.failure_path import find_nodes_on_path, trace_failure
+from executive.record.diagnosis.failure_path import find_failure_path, find_nodes_on_path
 from executive.record.timeline.activation import to_skill_name
 from executive.record.timeline.timeline import Timeline
 
@@ -33,13 +33,13 @@ class FailedRun:
         deciding_node: Node of the mission that determined the status, or None.
         halted_skills: Paths of the skills that the end of the run or `deciding_node` halted.
         item: Item that `deciding_node` worked on, or "".
-        is_unrecorded: True if the run ended because the journal could not be written.
+        is_record_lost: True if the run ended because the journal could not be written.
     """
 
     def __init__(self, loaded: LoadedMission, timeline: Timeline, end: RunEnded) -> None:
         self.loaded, self.timeline, self.end = loaded, timeline, end
         failed = end.status == "FAILURE"
-        self.failure_path = trace_failure(loaded.tree, timeline, end.node, end.reason) if failed else ()
+        self.failure_path = find_failure_path(loaded.tree, timeline, end.node, end.reason) if failed else ()
         self.lost_items = {
             name: item
             for name, item in timeline.items.by_name.items()
@@ -54,7 +54,7 @@ class FailedRun:
         activations = [deciding, *map(timeline.activation_by_path.get, self.halted_skills)]
         items = [activation.item for activation in activations if activation is not None and activation.item]
         self.item = next(iter([*items, *self.lost_items]), "")
-        self.is_unrecorded = f".{RecordLost.__name__}: " in timeline.traceback
+        self.is_record_lost = f".{RecordLost.__name__}: " in timeline.traceback
 
     def format_skill_name(self, path: str) -> str:
         """Return the name of a skill with the item of its last activation: `Grasp of cube-1`."""

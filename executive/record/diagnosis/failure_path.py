@@ -51,7 +51,9 @@ class FailurePathNode:
         return self.model.count_attempts(self.failure) if self.model else None
 
 
-def trace_failure(tree: Node, timeline: Timeline, origin: str, failure: str) -> tuple[FailurePathNode, ...]:
+def find_failure_path(
+    tree: Node, timeline: Timeline, origin: str, failure: str
+) -> tuple[FailurePathNode, ...]:
     """Return the nodes that a failure passed, from the root to the origin.
 
     Args:
@@ -90,7 +92,7 @@ def _make_propagated_failure(
     return PropagatedFailure(
         next((each for each in children if get_mission_node(each) is child), None),
         activation.reason, reasons, activation.handled_counts, activation.message_by_reason,
-        activation.last_handled, activation.choice, activation.end - activation.start, has_failed,
+        activation.last_handled_reason, activation.choice, activation.end - activation.start, has_failed,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from executive.cell.frame import Box
 from executive.record.pictures.palette import BACKGROUND, OUTLINE, choose_class_colour, to_bgr
-from executive.record.pictures.picture_scene import PictureScene
+from executive.record.pictures.picture_content import PictureContent
 from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT, draw_status_bar
 
 PICTURE_WIDTH = 640
@@ -28,7 +28,7 @@ TEXT_SCALE, TEXT_PADDING = 0.36, 2
 """Font scale of captions in OpenCV, and padding around captions [pixel]."""
 
 
-def draw_picture(scene: PictureScene) -> NDArray[np.uint8]:
+def draw_picture(scene: PictureContent) -> NDArray[np.uint8]:
     """Return the picture of a scene `(H, PICTURE_WIDTH, 3)`, RGB."""
     import cv2
 
@@ -74,7 +74,7 @@ def _draw_close_up(image: NDArray[np.uint8], box: Box, colour: str) -> NDArray[n
     return close_up.astype(np.uint8)
 
 
-def _draw_boxes(image: NDArray[np.uint8], scene: PictureScene, scale: float) -> NDArray[np.uint8]:
+def _draw_boxes(image: NDArray[np.uint8], scene: PictureContent, scale: float) -> NDArray[np.uint8]:
     """Return an image, which was scaled by `scale`, with all boxes; the selected box is drawn last."""
     import supervision as sv
 
@@ -104,7 +104,7 @@ def _draw_boxes(image: NDArray[np.uint8], scene: PictureScene, scale: float) -> 
     ).annotate(image, detections, make_captions(scene))
 
 
-def make_captions(scene: PictureScene) -> list[str]:
+def make_captions(scene: PictureContent) -> list[str]:
     """Return the caption of each box: name of the item or class, and confidence of the detection."""
     return [
         f"{scene.item if index == scene.selected and scene.item else found.label} {found.confidence:.2f}"

@@ -9,7 +9,7 @@ from pathlib import Path
 from executive.errors import ExecutiveError, explain_os_errors
 from executive.record.atomic_file import replace_atomically
 from executive.record.pictures.draw import draw_picture
-from executive.record.pictures.picture_scene import PictureScene
+from executive.record.pictures.picture_content import PictureContent
 
 MAX_QUEUED_PICTURES = 64
 """Maximum number of queued pictures, of about 1.2 MB each; further pictures are not drawn."""
@@ -31,7 +31,7 @@ class PictureDrawer:
         self.problem = ""
         """Message about missing pictures, or ""."""
 
-    def queue(self, name: str, scene: PictureScene) -> bool:
+    def queue(self, name: str, scene: PictureContent) -> bool:
         """Queue a picture for the file `name` in the folder; return False if the queue is full."""
         if sum(not picture.done() for picture in self._pictures) >= MAX_QUEUED_PICTURES:
             return False
@@ -45,7 +45,7 @@ class PictureDrawer:
             self.problem = f"{len(unfinished)} pictures were not drawn within {CLOSE_TIMEOUT:.0f} s"
         self._thread.shutdown(wait=False, cancel_futures=True)
 
-    def _save(self, path: Path, scene: PictureScene) -> None:
+    def _save(self, path: Path, scene: PictureContent) -> None:
         """Save a picture, and store the text of the first error: an exception would keep its scene."""
         try:
             save_picture(path, scene)
@@ -53,7 +53,7 @@ class PictureDrawer:
             self.problem = self.problem or f"not every picture was drawn: {error}"
 
 
-def save_picture(path: Path, scene: PictureScene) -> None:
+def save_picture(path: Path, scene: PictureContent) -> None:
     """Draw a picture to a file; the suffix of the file determines the image format.
 
     Raises:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.record.pictures.palette import BACKGROUND, FAILURE_TEXT, SECONDARY_TEXT, TEXT, to_bgr
-from executive.record.pictures.picture_scene import PictureScene
+from executive.record.pictures.picture_content import PictureContent
 
 STATUS_BAR_HEIGHT = 116
 """Height of the status bar [pixel]."""
@@ -45,7 +45,7 @@ class StatusBarText:
     outcomes: tuple[tuple[str, tuple[str, ...]], ...]
 
 
-def make_status_bar_text(scene: PictureScene) -> StatusBarText:
+def make_status_bar_text(scene: PictureContent) -> StatusBarText:
     """Return the text of the status bar of a scene."""
     selection = f"{scene.item} to {scene.bin}" if scene.bin else scene.item
     title = ": ".join(filter(None, (scene.failure, scene.item))) if scene.failure else selection
@@ -61,7 +61,7 @@ def make_status_bar_text(scene: PictureScene) -> StatusBarText:
     return StatusBarText(title, lines, tuple(filter(None, notes)), outcomes)
 
 
-def draw_status_bar(scene: PictureScene, width: int, left: int = 0) -> NDArray[np.uint8]:
+def draw_status_bar(scene: PictureContent, width: int, left: int = 0) -> NDArray[np.uint8]:
     """Return the status bar `(STATUS_BAR_HEIGHT, width, 3)`, BGR; its first `left` columns are empty."""
     bar = np.full((STATUS_BAR_HEIGHT, width, 3), to_bgr(BACKGROUND), np.uint8)
     text, x = make_status_bar_text(scene), left + MARGIN

@@ -44,7 +44,7 @@ class Activation:
         choice: Last decision of a control node, or "".
         handled_counts: Number of failures that a control node handled, by reason.
         message_by_reason: Message of the last handled failure, by reason.
-        last_handled: Reason of the last handled failure, or "".
+        last_handled_reason: Reason of the last handled failure, or "".
         halted: Paths of the skills that the control node halted before it ended.
         readings: Last value of each input before the failure of a skill, the latest at the end.
     """
@@ -63,7 +63,7 @@ class Activation:
     choice: str = ""
     handled_counts: Counter[str] = field(default_factory=Counter)
     message_by_reason: dict[str, str] = field(default_factory=dict)
-    last_handled: str = ""
+    last_handled_reason: str = ""
     halted: tuple[str, ...] = ()
     readings: tuple[Reading, ...] = ()
 

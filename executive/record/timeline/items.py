@@ -56,7 +56,7 @@ class Sighting:
 
 
 @dataclass
-class ItemTimeline:
+class ItemHistory:
     """History of one item.
 
     Attributes:
@@ -89,7 +89,7 @@ class ItemsTimeline:
         classes: Detected classes as keys, in the order of their first detections.
     """
 
-    by_name: dict[str, ItemTimeline] = field(default_factory=dict)
+    by_name: dict[str, ItemHistory] = field(default_factory=dict)
     look: Look | None = None
     classes: dict[str, None] = field(default_factory=dict)
     _change_count: int = 0
@@ -99,7 +99,7 @@ class ItemsTimeline:
         """Add a change of an item at the time `clock` [s], during the tree or after its end."""
         item = self.by_name.get(event.item)
         last_state, look_count = (item.last_change.state, item.last_change.looks) if item else ("", 0)
-        item = self.by_name.setdefault(event.item, ItemTimeline(event))
+        item = self.by_name.setdefault(event.item, ItemHistory(event))
         if event.looks > look_count:
             self._newly_seen.append(event.item)
         if event.state != last_state:
@@ -126,7 +126,7 @@ class ItemsTimeline:
             item.unseen_look_count = 0
         self._newly_seen.clear()
 
-    def find_in_states(self, *states: str) -> dict[str, ItemTimeline]:
+    def find_in_states(self, *states: str) -> dict[str, ItemHistory]:
         """Return the items by name that had one of the given states at the end of the tree.
 
         Items that the ledger afterwards found to be placed or phantoms are not returned.

@@ -78,7 +78,7 @@ class Timeline:
         timeline = Timeline()
         for timed in recorded:
             timeline(timed)
-        for running in timeline.find_running():
+        for running in timeline.find_running_activations():
             running.end_tick, running.end = timeline.tick, timeline.clock
         return timeline
 
@@ -121,12 +121,12 @@ class Timeline:
             case events.RunEnded():
                 self.ended = event
 
-    def find_running(self) -> list[Activation]:
+    def find_running_activations(self) -> list[Activation]:
         """Return the activations that have not ended, in the order of their starts."""
         running = (last for last in self.activation_by_path.values() if last.status == "RUNNING")
         return sorted(running, key=lambda last: last.number)
 
-    def find_current(self, path: str) -> Activation | None:
+    def find_current_activation(self, path: str) -> Activation | None:
         """Return the last activation of a node, or None if an ancestor of the node was started after it."""
         last = self.activation_by_path.get(path)
         ancestor_path = path.rpartition("/")[0]
@@ -185,7 +185,7 @@ class Timeline:
         if event.reason:
             last.handled_counts[event.reason] += 1
             last.message_by_reason[event.reason] = event.message
-            last.last_handled = event.reason
+            last.last_handled_reason = event.reason
 
     def _add_reading(self, event: events.InputRead) -> None:
         self._readings.pop(event.name, None)

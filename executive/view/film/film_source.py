@@ -5,7 +5,7 @@ from __future__ import annotations
 from executive.cells.sim.command_log import is_command_log
 from executive.errors import InputError
 from executive.events import ItemChanged
-from executive.record.journal import find_end, find_start, read_journal
+from executive.record.journal import find_run_end, find_run_start, read_journal
 from executive.record.recorded_mission import read_cell, read_tree
 from executive.record.result import read_result
 from executive.record.run_directory import RunDirectory
@@ -36,7 +36,7 @@ class FilmSource:
         _require_log(directory)
         events = read_journal(directory.journal)
         self.directory = directory
-        self.start = find_start(events, directory.path, "there is nothing to film")
+        self.start = find_run_start(events, directory.path, "there is nothing to film")
         self.events = InputLog.from_events(events).events
         self.nodes = read_tree(directory.tree)
         self.config = read_cell(directory.path)
@@ -46,7 +46,7 @@ class FilmSource:
         }
         changes = (one.event for one in self.events if isinstance(one.event, ItemChanged))
         self.item_count = len({change.item for change in changes})
-        self.result = read_result(directory, events) or find_end(events)
+        self.result = read_result(directory, events) or find_run_end(events)
 
 
 def _require_log(directory: RunDirectory) -> None:

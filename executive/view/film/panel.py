@@ -45,7 +45,7 @@ def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state:
     for row, (node, prefix) in enumerate(zip(shown, draw_line_prefixes(shown), strict=True)):
         middle = top + NODE_ROW * (row + 0.5)
         _draw_lines(draw, prefix, left, middle)
-        last = state.timeline.find_current(node.path)
+        last = state.timeline.find_current_activation(node.path)
         status = last.status if last else ""
         x = left + INDENT * (len(prefix) // _CHARACTERS_PER_LEVEL)
         style.draw_mark(image, status, (x + MARK_SIZE / 2, middle), MARK_SIZE)
@@ -70,7 +70,7 @@ def select_nodes(nodes: Sequence[OutlineNode], state: FilmRunState, max_count: i
 
     def rank(index: int) -> tuple[bool, bool, int]:
         path = shown[index].path
-        last = state.timeline.find_current(path)
+        last = state.timeline.find_current_activation(path)
         return path in active_paths, last is not None and last.status in style.STATUS_COLOURS, -index
 
     kept_indices = sorted(sorted(range(len(shown)), key=rank, reverse=True)[:max_count])

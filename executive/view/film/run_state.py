@@ -44,7 +44,7 @@ class FilmRunState:
     def active_paths(self) -> frozenset[str]:
         """Paths of the running nodes; after its end, paths of the nodes that ended with the tree."""
         timeline = self.timeline
-        if running := timeline.find_running():
+        if running := timeline.find_running_activations():
             return frozenset(activation.node for activation in running)
         end = _get_end(timeline.last_end)
         activations = timeline.activation_by_path.items()

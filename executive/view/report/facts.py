@@ -7,7 +7,7 @@ from pathlib import Path
 
 from executive.mission.text.file_search import get_shipped_folder
 from executive.record.diagnosis.diagnosis_text import make_resume_command
-from executive.record.journal import find_end, find_start, read_journal
+from executive.record.journal import find_run_end, find_run_start, read_journal
 from executive.record.recorded_mission import read_tree
 from executive.record.result import FINAL_STATUSES, list_requests, read_result
 from executive.record.run_directory import RunDirectory
@@ -50,9 +50,9 @@ class ReportFacts:
         directory = RunDirectory(path)
         events = read_journal(directory.journal)
         self.path = path
-        self.start = find_start(events, path, "there is nothing to report")
+        self.start = find_run_start(events, path, "there is nothing to report")
         self.result = read_result(directory, events)
-        self.end = self.result or find_end(events)
+        self.end = self.result or find_run_end(events)
         self.status = INTERRUPTED if self.end is None else self.end.status
         self.nodes = read_tree(directory.tree)
         self.timeline = Timeline.from_events(events)

@@ -75,7 +75,7 @@ def render_report(facts: ReportFacts) -> str:
         audit=asdict(result.audit) if result is not None and result.audit is not None else {},
         unknown=describe_unknown_labels({} if result is None else result.unknown_labels),
         diagnosis=diagnosis,
-        diagnosis_facts=[] if diagnosis is None else list(diagnosis_text.list_facts(diagnosis)),
+        diagnosis_facts=[] if diagnosis is None else list(diagnosis_text.list_labelled_sentences(diagnosis)),
         last_picture=next(
             (picture for picture in facts.pictures if diagnosis and picture.file == diagnosis.picture), None
         ),

@@ -10,7 +10,7 @@ import pytest
 from executive.cell.detection import Detection
 from executive.record.pictures.draw import PICTURE_WIDTH, draw_picture, make_captions
 from executive.record.pictures.palette import BACKGROUND, PALETTE, choose_class_colour, to_bgr
-from executive.record.pictures.picture_scene import PictureScene
+from executive.record.pictures.picture_content import PictureContent
 from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT
 
 GREY = 150
@@ -19,9 +19,9 @@ DUCK = Detection("duck", 0.7, (300.0, 100.0, 340.0, 140.0))
 CLASSES = ("cube", "duck")
 
 
-def scene(*seen: Detection, height: int = 480, width: int = 640, **more) -> PictureScene:
+def scene(*seen: Detection, height: int = 480, width: int = 640, **more) -> PictureContent:
     image = np.full((height, width, 3), GREY, np.uint8)
-    return PictureScene(image, detections=seen, classes=CLASSES, **more)
+    return PictureContent(image, detections=seen, classes=CLASSES, **more)
 
 
 def rgb(colour: str) -> tuple[int, ...]:

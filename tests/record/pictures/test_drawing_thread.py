@@ -10,9 +10,9 @@ import numpy as np
 from executive.cell.detection import Detection
 from executive.record.pictures import drawing_thread as module
 from executive.record.pictures.drawing_thread import MAX_QUEUED_PICTURES, PictureDrawer
-from executive.record.pictures.picture_scene import PictureScene
+from executive.record.pictures.picture_content import PictureContent
 
-SCENE = PictureScene(
+SCENE = PictureContent(
     np.full((480, 640, 3), 150, np.uint8),
     detections=[Detection("cube", 0.9, (100, 200, 160, 260))],
     selected=0,
@@ -21,7 +21,7 @@ SCENE = PictureScene(
 
 
 def test_a_scene_becomes_a_small_file(tmp_path):
-    noisy = PictureScene(np.random.default_rng(0).integers(120, 140, (480, 640, 3)).astype(np.uint8))
+    noisy = PictureContent(np.random.default_rng(0).integers(120, 140, (480, 640, 3)).astype(np.uint8))
     drawer = PictureDrawer(tmp_path / "frames")
     assert not (tmp_path / "frames").exists()
     assert drawer.queue("a.jpg", SCENE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from executive.record.pictures.picture_scene import PictureScene
+from executive.record.pictures.picture_content import PictureContent
 from executive.record.pictures.status_bar import (
     ROW_COUNT,
     STATUS_BAR_HEIGHT,
@@ -36,7 +36,7 @@ def at_most(count: int):
 )  # fmt: skip
 def test_a_decision_shows_its_bin_and_a_failure_its_reason(scene, title, lines):
     fates = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
-    said = make_status_bar_text(PictureScene(IMAGE, outcomes=fates, **scene))
+    said = make_status_bar_text(PictureContent(IMAGE, outcomes=fates, **scene))
     assert (said.title, said.lines) == (title, lines)
     assert said.outcomes == (("red_bin", ("cube-1", "cube-2")), ("rejected", ("duck-1",)))
 
@@ -44,9 +44,9 @@ def test_a_decision_shows_its_bin_and_a_failure_its_reason(scene, title, lines):
 def test_the_strip_says_where_and_when():
     hidden = np.zeros((48, 64), bool)
     look = {"camera": "overhead", "detector": "embedded", "age": 0.05}
-    said = make_status_bar_text(PictureScene(IMAGE, hidden, mission="sort", clock=3.4, **look))
+    said = make_status_bar_text(PictureContent(IMAGE, hidden, mission="sort", clock=3.4, **look))
     assert said.notes == ("sort   3.40 s   shaded: occluded by the arm", "overhead by embedded, 0.05 s old")
-    assert make_status_bar_text(PictureScene(IMAGE, ~hidden, camera="wrist")).notes == (
+    assert make_status_bar_text(PictureContent(IMAGE, ~hidden, camera="wrist")).notes == (
         "0.00 s",
         "wrist, 0.00 s old",
     )
@@ -71,7 +71,7 @@ def test_a_text_is_wrapped_between_words_and_cut_where_it_must():
 def test_whatever_is_said_there_is_room_for_it(width):
     many = {f"bin_{number}_with_a_long_name": [f"cube-{number}"] * 40 for number in range(ROW_COUNT + 3)}
     long = {"item": "cube-1" * 20, "bin": "red", "message": "word " * 100, "camera": "c" * 90}
-    strip = draw_status_bar(PictureScene(IMAGE, outcomes=many, **long), width)
+    strip = draw_status_bar(PictureContent(IMAGE, outcomes=many, **long), width)
     assert strip.shape == (STATUS_BAR_HEIGHT, width, 3)
     edges = (strip[:3], strip[-3:], strip[:, -3:])
     assert all(len(np.unique(edge.reshape(-1, 3), axis=0)) == 1 for edge in edges)  # Nothing is cut off.

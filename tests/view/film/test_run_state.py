@@ -28,7 +28,7 @@ EVENTS = [
 
 def statuses(state: FilmRunState) -> dict[str, str]:
     """Return the status of each node that ran in the present round."""
-    current = ((node.path, state.timeline.find_current(node.path)) for node in NODES)
+    current = ((node.path, state.timeline.find_current_activation(node.path)) for node in NODES)
     return {path: last.status for path, last in current if last is not None}
 
 
@@ -47,7 +47,7 @@ def test_what_happens_in_a_step_is_seen_in_it_and_not_before(state: FilmRunState
     state.advance_to(3, 3 / 240)
     assert statuses(state)["tree/Grasp"] == "RUNNING"
     assert state.action_text == "Grasp cube-1"
-    assert state.timeline.find_current("tree/Grasp").note == "cube-1"
+    assert state.timeline.find_current_activation("tree/Grasp").note == "cube-1"
     assert state.picture_file == Path("frames/000003_cube-1.jpg")
 
 
@@ -83,7 +83,7 @@ def test_of_a_tree_that_ended_what_ended_last_stays_open(state: FilmRunState) ->
     state.advance_to(960, 4.0)
     assert state.active_paths == {"tree", "tree/Transit"}
     assert statuses(state)["tree"] == "FAILURE"
-    assert state.timeline.find_current("tree/Transit").note == "blocked"
+    assert state.timeline.find_current_activation("tree/Transit").note == "blocked"
     # It was about no item: the tree says it, and nothing else has to.
     assert state.failure_text == ""
 

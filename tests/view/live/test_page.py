@@ -59,7 +59,7 @@ def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> 
     loaded = load_mission(file, load_skills())
     page = LivePage()
     # In real time, so that there is something to pause.
-    options = RunOptions(3, keyboard=False, realtime=True, kind=FakeCell)
+    options = RunOptions(3, has_keyboard=False, is_realtime=True, kind=FakeCell)
     run = assemble(loaded, load_skills(), options, [page])
     run.control.pause()
     page.open(run)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from page_reader import SECTIONS, Page
 
-from executive.record.journal import find_start, read_journal
+from executive.record.journal import find_run_start, read_journal
 from executive.view.report.facts import ReportFacts
 from executive.view.report.page import render_report, write_report
 
@@ -102,7 +102,7 @@ def test_params_versions_and_the_commands_that_repeat_it_are_there(failed):
     assert "attempts: 2 note: größer" in made
     assert "cell.table.objects=[2, 2]" in made
     assert "python 3." in made
-    start = find_start(read_journal(failed / "journal.jsonl"), failed, "")
+    start = find_run_start(read_journal(failed / "journal.jsonl"), failed, "")
     repeat = ["executive", "run", start.file, "--seed", "3"]
     repeat += ["--set", "cell.kind=fake", "--set", "cell.table.objects=[2, 2]"]
     assert f"repeat {shlex.join(repeat)} replay" in commands

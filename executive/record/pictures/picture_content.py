@@ -12,7 +12,7 @@ from executive.cell.detection import Detection
 
 
 @dataclass(frozen=True, eq=False)
-class PictureScene:
+class PictureContent:
     """Camera image with its detections, and the state of the run at the time of the picture.
 
     Attributes:
