@@ -196,8 +196,5 @@ def _select_before(events: Iterable[TimedEvent], tick: int) -> list[TimedEvent]:
 
 def _find_incomplete_end_ticks(events: Iterable[TimedEvent]) -> set[int]:
     """Return the control steps in which the run ended as INCOMPLETE."""
-    return {
-        timed.tick
-        for timed in events
-        if isinstance(timed.event, RunEnded) and timed.event.status == "INCOMPLETE"
-    }
+    ends = ((timed.tick, timed.event) for timed in events if isinstance(timed.event, RunEnded))
+    return {tick for tick, end in ends if end.status == "INCOMPLETE"}

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from executive.errors import Stopped
 from executive.events import Emit, InputRead
-from executive.replay.codec import IDENTITY_CODEC, Codec
+from executive.replay.codecs import IDENTITY, Codec
 
 Value = TypeVar("Value")
 
@@ -33,7 +33,7 @@ class InputRecorder:
         """Begin a control step: set the number of reads of each input to 0."""
         self._read_counts.clear()
 
-    def read(self, name: str, query: Callable[[], Value], codec: Codec = IDENTITY_CODEC) -> Value:
+    def read(self, name: str, query: Callable[[], Value], codec: Codec = IDENTITY) -> Value:
         """Read an input from the cell, record its value if the value has changed, and return the value.
 
         Args:

@@ -8,7 +8,7 @@ from typing import Any
 from executive import errors
 from executive.errors import Fault
 from executive.events import InputRead
-from executive.replay.codec import IDENTITY_CODEC, Codec
+from executive.replay.codecs import IDENTITY, Codec
 from executive.replay.input_log import InputLog
 
 
@@ -39,7 +39,7 @@ class InputReplayer:
         self._tick = tick
         self._read_counts.clear()
 
-    def read(self, name: str, codec: Codec = IDENTITY_CODEC) -> Any:
+    def read(self, name: str, codec: Codec = IDENTITY) -> Any:
         """Return the recorded value of an input.
 
         Args:

@@ -15,19 +15,8 @@ from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
 from executive.events import Emit, ToolCommanded
-from executive.replay.codec import (
-    ANSWER_CODEC,
-    ARRAY_CODEC,
-    BOX_CODEC,
-    FRAME_CODEC,
-    IDENTITY_CODEC,
-    MOTION_CODEC,
-    NONE_CODEC,
-    OBSERVATIONS_CODEC,
-    POSE_CODEC,
-    STRINGS_CODEC,
-    Codec,
-)
+from executive.replay import codecs
+from executive.replay.codecs import Codec
 from executive.replay.input_recorder import InputRecorder
 
 
@@ -41,33 +30,33 @@ class InputFormat(NamedTuple):
     """
 
     name: str
-    codec: Codec = IDENTITY_CODEC
+    codec: Codec = codecs.IDENTITY
 
 
 INPUT_FORMATS: Mapping[str, InputFormat] = {
-    "arm.q": InputFormat("arm.q", ARRAY_CODEC),
-    "arm.tool_pose": InputFormat("arm.tool_pose", POSE_CODEC),
-    "arm.tool_velocity": InputFormat("arm.tool_velocity", ARRAY_CODEC),
-    "arm.destination": InputFormat("arm.destination", ARRAY_CODEC),
+    "arm.q": InputFormat("arm.q", codecs.ARRAY),
+    "arm.tool_pose": InputFormat("arm.tool_pose", codecs.POSE),
+    "arm.tool_velocity": InputFormat("arm.tool_velocity", codecs.ARRAY),
+    "arm.destination": InputFormat("arm.destination", codecs.ARRAY),
     "arm.at_rest": InputFormat("arm.at_rest"),
     "arm.collision": InputFormat("arm.met"),
     "plan.ready": InputFormat("plan.ready"),
-    "plan.result": InputFormat("plan", MOTION_CODEC),
+    "plan.result": InputFormat("plan", codecs.MOTION),
     "tool.touching": InputFormat("tool.touching"),
     "tool.holding": InputFormat("tool.holding"),
     "tool.holding_force": InputFormat("tool.bears"),
     "camera.name": InputFormat("camera.name"),
-    "camera.scan_poses": InputFormat("camera.scan_poses", STRINGS_CODEC),
+    "camera.scan_poses": InputFormat("camera.scan_poses", codecs.STRINGS),
     "camera.next_pose": InputFormat("camera.next_pose"),
-    "camera.get_view_box": InputFormat("camera.area.{0}", BOX_CODEC),
+    "camera.get_view_box": InputFormat("camera.area.{0}", codecs.BOX),
     "camera.sees_table": InputFormat("camera.sees_table"),
-    "camera.capture": InputFormat("camera.frame", FRAME_CODEC),
+    "camera.capture": InputFormat("camera.frame", codecs.FRAME),
     "camera.describe_displacement": InputFormat("camera.displacement"),
     "request.ready": InputFormat("detector.{detector}.ready"),
-    "request.result": InputFormat("detector.{detector}", ANSWER_CODEC),
+    "request.result": InputFormat("detector.{detector}", codecs.ANSWER),
     "operator.ask": InputFormat("operator"),
-    "localizer.locate": InputFormat("localizer", ARRAY_CODEC),
-    "localizer.localize": InputFormat("observations", OBSERVATIONS_CODEC),
+    "localizer.locate": InputFormat("localizer", codecs.ARRAY),
+    "localizer.localize": InputFormat("observations", codecs.OBSERVATIONS),
 }
 """Format of the recorded input of each access that is not a command, by `Access.name`."""
 
@@ -92,7 +81,7 @@ The longest patterns are first, because `detector.*` also matches `detector.yolo
 def find_input_format(access: Access) -> InputFormat:
     """Return the format of the result of an access to the cell; all commands have the name `command`."""
     if access.name in COMMANDS:
-        return InputFormat("command", NONE_CODEC)
+        return InputFormat("command", codecs.NONE)
     name, codec = INPUT_FORMATS[access.name]
     return InputFormat(name.format(*access.all_arguments, detector=access.detector), codec)
 
@@ -103,9 +92,9 @@ def check_input(name: str, value: JsonValue) -> None:
     Raises:
         ValueError: The value does not have the format of the input.
     """
-    codecs = (codec for pattern, codec in _CODEC_BY_PATTERN.items() if fnmatchcase(name, pattern))
+    matching_codecs = (codec for pattern, codec in _CODEC_BY_PATTERN.items() if fnmatchcase(name, pattern))
     try:
-        next(codecs, IDENTITY_CODEC).decode(value)
+        next(matching_codecs, codecs.IDENTITY).decode(value)
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, zlib.error) as error:
         problem = f"{type(error).__name__}: {error}"
         raise ValueError(f'"value" does not have the format of the input "{name}" ({problem})') from error

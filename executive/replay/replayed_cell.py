@@ -78,7 +78,7 @@ class ReplayedCell(CellWrapper):
     def resume(self) -> None:
         """Continue after the pending interruption; after the last interruption, continue on the inner cell.
 
-        If the inner cell has executed fewer control steps than the log contains, it first executes the others.
+        If the inner cell has executed fewer control steps than the log contains, it first executes them.
         """
         interruption, self.pending_interruption = self.pending_interruption, None
         assert interruption is not None, "only an interrupted run can be resumed"

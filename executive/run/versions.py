@@ -33,12 +33,8 @@ def list_requirements(extra: str = "") -> tuple[str, ...]:
         requirements = [Requirement(line) for line in metadata.requires(DISTRIBUTION) or ()]
     except metadata.PackageNotFoundError:
         return ()
-    return tuple(
-        requirement.name
-        for requirement in requirements
-        if (requirement.marker is None or requirement.marker.evaluate({"extra": extra}))
-        and (not extra or "extra" in str(requirement.marker))
-    )
+    required = [r for r in requirements if r.marker is None or r.marker.evaluate({"extra": extra})]
+    return tuple(r.name for r in required if not extra or "extra" in str(r.marker))
 
 
 def find_version(name: str) -> str:

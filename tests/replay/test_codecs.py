@@ -14,17 +14,8 @@ from executive.cell.detection import Answer, Detection, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
 from executive.geometry import Pose, rotate_about_z
-from executive.replay.codec import (
-    ANSWER_CODEC,
-    ARRAY_CODEC,
-    BOX_CODEC,
-    FRAME_CODEC,
-    MOTION_CODEC,
-    OBSERVATIONS_CODEC,
-    POSE_CODEC,
-    Codec,
-    RecordedMotion,
-)
+from executive.replay import codecs
+from executive.replay.codecs import Codec, RecordedMotion
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 few = settings(max_examples=25)
@@ -38,12 +29,12 @@ def back(codec: Codec, answer: Any) -> Any:
 @few
 @given(arrays(np.float64, (3, 2), elements=finite), st.floats(-4, 4))
 def test_numbers_come_back_bit_by_bit(array: np.ndarray, angle: float) -> None:
-    assert np.array_equal(back(ARRAY_CODEC, array), array)
+    assert np.array_equal(back(codecs.ARRAY, array), array)
     pose = Pose(rotate_about_z(angle), array[:, 0])
-    assert np.array_equal(back(POSE_CODEC, pose).rotation, pose.rotation)
-    assert np.array_equal(back(POSE_CODEC, pose).position, pose.position)
-    assert back(MOTION_CODEC, RecordedMotion(angle)) == RecordedMotion(angle)
-    assert back(BOX_CODEC, (1, 2, 3.5, angle)) == (1, 2, 3.5, angle)
+    assert np.array_equal(back(codecs.POSE, pose).rotation, pose.rotation)
+    assert np.array_equal(back(codecs.POSE, pose).position, pose.position)
+    assert back(codecs.MOTION, RecordedMotion(angle)) == RecordedMotion(angle)
+    assert back(codecs.BOX, (1, 2, 3.5, angle)) == (1, 2, 3.5, angle)
 
 
 @few
@@ -54,7 +45,7 @@ def test_a_frame_comes_back_without_its_image(visible: np.ndarray, epoch: int) -
         7, "overhead", np.full((*size, 3), 9, np.uint8), np.ones(size), np.eye(3) / 3, Pose.identity(), 1 / 3,
         visible, epoch,
     )  # fmt: skip
-    read = back(FRAME_CODEC, frame)
+    read = back(codecs.FRAME, frame)
     assert (read.id, read.camera, read.stamp, read.epoch) == (7, "overhead", 1 / 3, epoch)
     assert np.array_equal(read.visible, visible)
     assert np.array_equal(read.matrix, frame.matrix)
@@ -71,7 +62,7 @@ some = st.lists(detections, max_size=4).map(tuple)
 @given(some, some, some, finite)
 def test_an_answer_comes_back(found: tuple, doubtful: tuple, unknown: tuple, misses: float) -> None:
     answer = Answer("eye", found, ErrorRates(0.5, misses, 0.1, 0.2, 0.7), doubtful, unknown)
-    assert back(ANSWER_CODEC, answer) == answer
+    assert back(codecs.ANSWER, answer) == answer
 
 
 @few
@@ -79,7 +70,7 @@ def test_an_answer_comes_back(found: tuple, doubtful: tuple, unknown: tuple, mis
 def test_observations_come_back(
     detection: Detection, position: np.ndarray, std: float, confident: bool, contradiction: str
 ) -> None:
-    (read,) = back(OBSERVATIONS_CODEC, [Observation(detection, position, std, confident, contradiction)])
+    (read,) = back(codecs.OBSERVATIONS, [Observation(detection, position, std, confident, contradiction)])
     assert np.array_equal(read.position, position)
     others = (read.detection, read.std, read.confident, read.contradiction)
     assert others == (detection, std, confident, contradiction)

@@ -1,4 +1,4 @@
-"""Codecs of recorded inputs: conversions between values that a cell returns and JSON values."""
+"""Codecs of recorded inputs: conversions between the values that a cell returns and JSON values."""
 
 from __future__ import annotations
 
@@ -159,15 +159,15 @@ def _return_unchanged(value: Any) -> Any:
     return value
 
 
-IDENTITY_CODEC = Codec(_return_unchanged, _return_unchanged)
+IDENTITY = Codec(_return_unchanged, _return_unchanged)
 """Codec of numbers, truth values, strings and None."""
-NONE_CODEC = Codec(lambda _: None, lambda _: None)
+NONE = Codec(lambda _: None, lambda _: None)
 """Codec of the results of commands, which a replay does not need."""
-STRINGS_CODEC = Codec(list, _return_unchanged)
-BOX_CODEC = Codec(list, tuple)
-ARRAY_CODEC = Codec(np.ndarray.tolist, decode_array)
-POSE_CODEC = Codec(encode_pose, decode_pose)
-FRAME_CODEC = Codec(encode_frame, decode_frame)
-ANSWER_CODEC = Codec(encode_answer, decode_answer)
-OBSERVATIONS_CODEC = Codec(encode_observations, decode_observations)
-MOTION_CODEC = Codec(attrgetter("duration"), RecordedMotion)
+STRINGS = Codec(list, _return_unchanged)
+BOX = Codec(list, tuple)
+ARRAY = Codec(np.ndarray.tolist, decode_array)
+POSE = Codec(encode_pose, decode_pose)
+FRAME = Codec(encode_frame, decode_frame)
+ANSWER = Codec(encode_answer, decode_answer)
+OBSERVATIONS = Codec(encode_observations, decode_observations)
+MOTION = Codec(attrgetter("duration"), RecordedMotion)
