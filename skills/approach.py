@@ -14,7 +14,7 @@ from executive.manipulation.tool_goals import (
     OVERTRAVEL,
     PROBE_CLEARANCE,
     SPIRAL_SPACING,
-    compute_lowest_contact,
+    compute_min_contact_height,
     make_approach,
 )
 from executive.perception.evidence import describe_touch_contradiction, may_miss_top
@@ -79,7 +79,7 @@ class Approach(Skill):
             collision = f"the tool touched something at {height * 1000:.0f} mm"
             raise self.failure("blocked", f"{collision} on its way to {item}, which was {expected}")
         contradiction = describe_touch_contradiction(self.target.label, height, cell.classes)
-        is_near_top = height >= compute_lowest_contact(kind, middle, self.overtravel)
+        is_near_top = height >= compute_min_contact_height(kind, middle, self.overtravel)
         may_have_missed = is_near_top and may_miss_top(self.target.label, height, cell.classes)
         if not cell.ledger.record_touch(item, contradiction, may_miss_top=may_have_missed):
             raise self.failure("contradicted", f"{item} may be no {self.target.label}: {contradiction}")

@@ -13,7 +13,7 @@ from executive.manipulation.obstacles import list_obstacles
 from executive.skill import Skill, SkillFailed
 
 MAX_PLANS = 3
-"""Maximum number of plans for one motion whose obstacles change while the motion is planned."""
+"""Maximum number of planning attempts for one motion, if goal or task change during each attempt."""
 
 
 def wait_for_rest(arm: Arm) -> Steps:
@@ -27,8 +27,12 @@ def plan(
 ) -> Generator[None, None, Motion]:
     """Yield until the arm is at rest and a motion is planned, and return the motion.
 
-    `find_goal` returns a goal or the name of a pose, and the task. If the values have changed at the end of
-    the planning, because a detector has updated the ledger, the motion is planned again.
+    If an update of the ledger changes goal or task during the planning, the motion is planned again.
+
+    Args:
+        skill: The skill that moves the arm.
+        arm: The arm.
+        find_goal: Function that returns the present goal, or the name of a pose, and the present task.
 
     Raises:
         SkillFailed: No motion was found; the reason is `unreachable` or `blocked`.
@@ -50,9 +54,9 @@ def plan(
 
 
 def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
-    """Yield while the arm follows `motion`, until the arm is at rest again.
+    """Yield while the arm executes `motion`, until the arm is at rest again.
 
-    The arm brakes along its path when `until` returns True, after a collision, and if the skill is halted.
+    The arm brakes along the path when `until` returns True, after a collision, and if the skill is halted.
 
     Raises:
         SkillFailed: The arm collided with an obstacle; the reason is `blocked`.
@@ -81,33 +85,30 @@ def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str
         destination: Name of the goal in error messages.
 
     Raises:
-        SkillFailed: The reason is `unreachable` or `blocked` if no motion was found or the arm collided, and
-            the tool still holds the item. The reason is `dropped` if the seal broke; then the arm is at rest,
-            the tool is open, and the ledger has recorded the drop.
+        SkillFailed: No motion was found, or the arm collided; the reason is `unreachable` or `blocked`.
+        SkillFailed: The seal broke; the reason is `dropped`. The arm is at rest, and the tool is open.
     """
     try:
         motion = yield from plan(skill, cell.arm, lambda: (goal, make_transport_task(cell, item)))
         yield from follow(skill, cell, motion, until=lambda: detect_and_record_drop(cell, item))
     except SkillFailed:
-        # The reason `dropped` replaces another reason, because a put-down is impossible without the item.
+        # `dropped` has priority over other reasons, because their handlers expect the item in the tool.
         if not detect_and_record_drop(cell, item):
             raise
     if detect_and_record_drop(cell, item):
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
-        raise skill.failure(
-            "dropped",
-            f"the seal on {item} broke on the way to {destination}, near ({x:.2f}, {y:.2f}, {z:.2f}) m",
-        )
+        place = f"on the way to {destination}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        raise skill.failure("dropped", f"the seal on {item} broke {place}")
 
 
 def release_item(
     skill: Skill, cell: Cell, item: Item, settle_time: float, record_release: Callable[[], None]
 ) -> Steps:
-    """Switch the vacuum off and yield for `settle_time` [s]; then the tool must be empty.
+    """Switch the vacuum off, and yield for `settle_time` [s] until the item lies still.
 
-    `record_release` records the new position of the item in the ledger. The function is called if the tool is
-    empty, even if the skill is halted during the wait.
+    `record_release` records the new position of the item in the ledger. If the skill is halted during the
+    wait and the tool is empty, the release is still recorded.
 
     Raises:
         SkillFailed: The item still hangs on the tool; the reason is `stuck`.
@@ -123,12 +124,12 @@ def release_item(
 
 
 def make_task(cell: Cell) -> Task:
-    """Return load and obstacles of a motion with the present content of the tool."""
-    held = cell.ledger.find_held_item()
-    return Task(obstacles=list_obstacles(cell)) if held is None else make_transport_task(cell, held)
+    """Return the task of a motion: its obstacles, and the item in the tool as its load."""
+    held_item = cell.ledger.find_held_item()
+    return Task(obstacles=list_obstacles(cell)) if held_item is None else make_transport_task(cell, held_item)
 
 
 def make_transport_task(cell: Cell, item: Item) -> Task:
-    """Return load and obstacles of a motion with `item` in the tool."""
-    kind = cell.classes[cell.ledger.get_label(item)]
-    return Task(Load(kind, cell.tool.holding_force), list_obstacles(cell, item))
+    """Return the task of a motion with `item` in the tool: its load and its obstacles."""
+    object_class = cell.classes[cell.ledger.get_label(item)]
+    return Task(Load(object_class, cell.tool.holding_force), list_obstacles(cell, item))

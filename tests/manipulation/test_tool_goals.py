@@ -82,7 +82,9 @@ def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> No
     goal = make_object_goal(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05)  # on another one
     assert goal.position == pytest.approx((0.517, 0.1, 0.013))
     assert (goal.guarded_length, goal.guarded_speed) == pytest.approx((0.003 + 0.02, 0.05))
-    further = make_object_goal(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05, attempt=1, overtravel=0.001)
+    further = make_object_goal(
+        washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05, failed_attempts=1, overtravel=0.001
+    )
     assert further.position[2] == pytest.approx(0.015)
     assert np.hypot(further.position[0] - 0.5, further.position[1] - 0.1) == pytest.approx(0.017)
 
