@@ -1,4 +1,4 @@
-"""Checks of a run after its end: the arm is at rest, and journal and tool agree with its `RunEnded`."""
+"""Checks of an ended run: the arm is at rest, and journal and tool agree with the event `RunEnded`."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def check_arm_at_rest(workcell: Workcell) -> Iterator[str]:
         yield f"the arm moved by {movement:.1e} after the run had ended"
 
 
-def check_journal(events: Sequence[TimedEvent], outcome: RunEnded) -> Iterator[str]:
-    """Yield a problem if the last event is not the only `RunEnded`, or if starts and ends of nodes differ."""
+def check_journal(events: Sequence[TimedEvent], run_end: RunEnded) -> Iterator[str]:
+    """Yield a problem if not only the last event is `RunEnded`, or if a node starts twice or does not end."""
     ends = [timed.event for timed in events if isinstance(timed.event, RunEnded)]
     if len(ends) != 1 or events[-1].event is not ends[0]:
-        yield f"the journal has {len(ends)} RunEnded in {len(events)} events; only the last may be one"
-    elif ends[0] != outcome:
-        yield f"the journal ends with {ends[0]}, but the run ended with {outcome}"
+        yield f"the journal has {len(ends)} RunEnded in {len(events)} events; only the last must be one"
+    elif ends[0] != run_end:
+        yield f"the journal ends with {ends[0]}, but the run ended with {run_end}"
     start_ticks_by_path: dict[str, int] = {}
     for timed in events:
         match timed.event:
@@ -49,10 +49,10 @@ def check_journal(events: Sequence[TimedEvent], outcome: RunEnded) -> Iterator[s
         yield f"in the journal {node} starts at tick {tick} and does not end"
 
 
-def check_held_item(outcome: RunEnded, workcell: Workcell) -> Iterator[str]:
-    """Yield a problem if tool and `RunEnded` disagree on whether an item is held at the end."""
-    holding = workcell.cell.tool.holding
-    if holding and outcome.held_item not in {item.item for item in workcell.accounts.summaries()}:
-        yield f'the tool holds an object, but the held item of the run is "{outcome.held_item}"'
-    if not holding and outcome.held_item:
-        yield f'the tool is empty, but the held item of the run is "{outcome.held_item}"'
+def check_held_item(run_end: RunEnded, workcell: Workcell) -> Iterator[str]:
+    """Yield a problem if the tool is empty and `RunEnded` names a held item, or vice versa."""
+    is_holding = workcell.cell.tool.holding
+    if is_holding and run_end.held_item not in {summary.item for summary in workcell.accounts.summaries()}:
+        yield f'the tool holds an object, but the held item of the run is "{run_end.held_item}"'
+    if not is_holding and run_end.held_item:
+        yield f'the tool is empty, but the held item of the run is "{run_end.held_item}"'

@@ -54,10 +54,10 @@ class SceneSettings:
     Attributes:
         image_count: Number of images per cell.
         seed: Random seed.
-        is_varied: True: scenes vary as in training. False: initial scenes of runs with at most
-            `MAX_OBJECT_COUNT` objects; the detector searches the same region as in a run.
+        is_varied: True for scenes that vary as in training; False for the initial scenes of runs, in which
+            the detector searches `view`.
         view: Region of the frame that is searched: `table`, or `full` for the whole frame.
-        workers: Number of processes that render.
+        workers: Number of rendering processes.
         scene: Scene file that changes the initial scenes of runs; None: no change.
     """
 
@@ -71,12 +71,12 @@ class SceneSettings:
 
 @dataclass(frozen=True, eq=False)
 class DetectorUnderTest:
-    """A detector to measure.
+    """A detector whose accuracy is measured.
 
     Attributes:
         cell: Cell of the detector; None: a detector without a cell.
-        configs: Configuration of the detector, and of other detectors that it may use, by name.
-        name: Key of the detector in `configs`.
+        configs: Configurations of the detector and of the detectors that it may use, by name.
+        name: Name of the detector, a key of `configs`.
         base: Folder to which paths in the options of the detector are relative.
     """
 
@@ -94,51 +94,50 @@ class DetectorUnderTest:
 
 
 def list_detectors(
-    cells: Mapping[Path, CellConfig], detector: str | None, weights: Path | None, labels: Path | None
+    cells: Mapping[Path, CellConfig], name: str | None, model_file: Path | None, label_file: Path | None
 ) -> Iterator[DetectorUnderTest]:
     """Yield the detectors to measure: one per cell, or one without a cell.
 
     Args:
         cells: Cells by the path of the cell file.
-        detector: Name of the detector in each cell; None: the first detector of the cell.
-        weights: Model file to measure instead of the detectors of the cells; None: no model file.
-        labels: File with the class names of the model; None: the file in the folder of the model.
+        name: Name of the detector in each cell; None: the first detector of the cell.
+        model_file: Model that is measured instead of the detectors of the cells; None: no model.
+        label_file: File with the class names of the model; None: the file in the folder of the model.
 
     Raises:
         InputError: A cell has no detector of this name.
     """
     model_configs: dict[str, DetectorConfig] = {}
-    if weights is not None:
-        model_configs = {MODEL_NAME: make_model_config(weights, labels or find_label_file(weights))}
+    if model_file is not None:
+        model_configs = {MODEL_NAME: make_model_config(model_file, label_file or find_label_file(model_file))}
     elif not cells:
         model_configs = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
     if not cells:
         yield DetectorUnderTest(None, model_configs, next(iter(model_configs)), Path())
-    for file, config in cells.items():
-        configs = model_configs or dict(config.detectors)
-        name = detector or next(iter(configs))
-        if name not in configs:
+    for cell_file, cell in cells.items():
+        configs = model_configs or dict(cell.detectors)
+        if name and name not in configs:
             hint = list_choices(name, configs, "Its detectors")
-            raise InputError(f'the cell {config.cell} has no detector "{name}". {hint}')
-        yield DetectorUnderTest(config, configs, name, file.parent)
+            raise InputError(f'the cell {cell.cell} has no detector "{name}". {hint}')
+        yield DetectorUnderTest(cell, configs, name or next(iter(configs)), cell_file.parent)
 
 
 def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: Path | None = None) -> None:
-    """Check that scenes can be rendered and the detector can be built, before minutes of rendering.
+    """Check that scenes of the cell can be rendered and that the detector can be built.
 
     Raises:
         InputError: The cell is not simulated, the scene file has errors, or a detector cannot be built.
     """
     cell = detector.cell
-    if renders_scenes and cell and cell.kind != "sim":
-        raise InputError(
-            f"scenes can be rendered only of cells of kind sim, but {cell.cell} is of kind {cell.kind}; "
-            "measure its detector on your own images with --dataset"
-        )
     if renders_scenes and cell:
+        if cell.kind != "sim":
+            raise InputError(
+                f"scenes can be rendered only of cells of kind sim, but {cell.cell} is of kind {cell.kind}; "
+                "measure its detector on your own images with --dataset"
+            )
         load_scene(scene, cell)
-    for (_, name, *_), sentence in find_detector_problems(detector.configs, detector.base):
-        raise InputError(f"detector {name}: {sentence}")
+    for key_path, problem in find_detector_problems(detector.configs, detector.base):
+        raise InputError(f"detector {key_path[1]}: {problem}")
 
 
 def measure_detector(
@@ -150,75 +149,79 @@ def measure_detector(
     worst_mistakes: WorstMistakes,
     progress: OpenProgressBar,
 ) -> Evaluation:
-    """Evaluate a detector on `dataset` or on rendered scenes of its cell; add to `worst_mistakes`."""
-    config = detector.cell
-    run_config = None if dataset is not None or scenes.is_varied else config
-    with _open_images(detector, dataset, scenes, progress) as samples:
+    """Evaluate a detector on a dataset, or on rendered scenes of its cell.
+
+    `threshold` is the minimum confidence of a detection; None: the threshold of the detector. The worst
+    mistakes are added to `worst_mistakes`.
+    """
+    # Only images of scenes of runs have the camera, the table and the localization of the cell.
+    run_cell = None if dataset is not None or scenes.is_varied else detector.cell
+    with _open_images(detector.cell, dataset, scenes, progress) as samples:
         cell_detector = CellDetector(
             detector.configs,
             detector.name,
             base=detector.base,
-            camera=next(iter(run_config.cameras.values())) if run_config else None,
+            camera=next(iter(run_cell.cameras.values())) if run_cell else None,
             view=scenes.view,
-            classes=tuple(config.objects) if config else None,
+            classes=tuple(detector.cell.objects) if detector.cell else None,
         )
         with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
             return evaluate(
                 cell_detector, _show_progress(samples, update), threshold=threshold, worst=worst_mistakes,
-                localizer=_build_localizer(run_config) if run_config else None,
-                table=run_config.table if run_config else None,
+                localizer=_build_localizer(run_cell) if run_cell else None,
+                table=run_cell.table if run_cell else None,
             )  # fmt: skip
 
 
 @contextlib.contextmanager
 def _open_images(
-    detector: DetectorUnderTest, dataset: Path | None, scenes: SceneSettings, progress: OpenProgressBar
+    cell: CellConfig | None, dataset: Path | None, scenes: SceneSettings, progress: OpenProgressBar
 ) -> Iterator[Samples | list[LabelledImage]]:
     """Open the images of the dataset, or render scenes of the cell; a context manager."""
-    config = detector.cell
-    if dataset is not None or config is None:
-        assert dataset is not None
+    if dataset is not None:
         yield Samples(dataset)
-    elif scenes.is_varied:
-        with tempfile.TemporaryDirectory() as folder:
-            with progress(f"rendering {config.cell}") as update:
+        return
+    assert cell is not None
+    with tempfile.TemporaryDirectory() as folder:
+        images: Samples | list[LabelledImage]
+        with progress(f"rendering {cell.cell}") as update:
+            if scenes.is_varied:
                 generate_dataset(
-                    {config.cell: config}, Path(folder), images=scenes.image_count, seed=scenes.seed,
+                    {cell.cell: cell}, Path(folder), images=scenes.image_count, seed=scenes.seed,
                     layout="coco", workers=scenes.workers, valid_fraction=1.0, progress=update,
                 )  # fmt: skip
-            yield Samples(Path(folder))
-    else:
-        table = {"objects": (0, find_max_object_count(config, MAX_OBJECT_COUNT))}
-        limited_config = config.model_copy(update={"table": config.table.model_copy(update=table)})
-        with progress(f"rendering {config.cell}") as update:
-            frames = render_run_frames(
-                limited_config, images=scenes.image_count, seed=scenes.seed, workers=scenes.workers,
-                progress=update, scene=load_scene(scenes.scene, config),
-            )  # fmt: skip
-        yield frames
+                images = Samples(Path(folder))
+            else:
+                object_counts = (0, find_max_object_count(cell, MAX_OBJECT_COUNT))
+                table = cell.table.model_copy(update={"objects": object_counts})
+                images = render_run_frames(
+                    cell.model_copy(update={"table": table}), images=scenes.image_count, seed=scenes.seed,
+                    workers=scenes.workers, progress=update, scene=load_scene(scenes.scene, cell),
+                )  # fmt: skip
+        yield images
 
 
 def _show_progress(
-    samples: Samples | list[LabelledImage], update_progress: Callable[[int, int], None]
+    images: Samples | list[LabelledImage], update_progress: Callable[[int, int], None]
 ) -> Iterator[LabelledImage]:
     """Yield the images; update the progress bar after each image."""
-    for done, sample in enumerate(samples, 1):
-        yield sample
-        update_progress(done, len(samples))
+    for image_count, image in enumerate(images, 1):
+        yield image
+        update_progress(image_count, len(images))
 
 
-def _build_localizer(config: CellConfig) -> Localizer | None:
+def _build_localizer(cell: CellConfig) -> Localizer | None:
     """Return the localizer of the cell; None for the method `ray`, which needs a simulated world."""
-    if config.localization == "ray":
+    if cell.localization == "ray":
         return None
-    classes = {label: build_object_class(label, kind) for label, kind in config.objects.items()}
-    return build_localizer(config.localization, classes)
+    classes = {label: build_object_class(label, config) for label, config in cell.objects.items()}
+    return build_localizer(cell.localization, classes)
 
 
 def store_evaluation(
-    detector: DetectorUnderTest, evaluation: Evaluation, out: Path | None, *, command: str, seconds: float
+    detector: DetectorUnderTest, evaluation: Evaluation, out: Path | None, *, command: str, duration: float
 ) -> Path:
-    """Write the measured errors of a detector to a file and return the path of the file.
+    """Write the measured errors of a detector to a file, and return the path of the file.
 
     Measurements of other detectors in the file are not changed.
 
@@ -227,7 +230,7 @@ def store_evaluation(
         evaluation: Measured errors of the detector.
         out: The file; None: `CELL.measured.json` in the folder of the cell file.
         command: Command line that repeats the evaluation.
-        seconds: Duration of the evaluation [s].
+        duration: Duration of the evaluation [s].
 
     Raises:
         InputError: The detector gave no usable answer to any image, or the file cannot be read or written.
@@ -235,15 +238,15 @@ def store_evaluation(
     assert detector.cell is not None
     path = out or detector.base / f"{detector.cell.cell}{MEASUREMENT_SUFFIX}"
     if evaluation.reliability is None:
-        raise InputError(
-            f"detector {detector.name} gave no usable answer: {evaluation.why}; nothing was measured"
-        )
+        problem = f"detector {detector.name} gave no usable answer: {evaluation.why}"
+        raise InputError(f"{problem}; nothing was measured")
     confusion_matrix = evaluation.confusion
+    false_detections = confusion_matrix.get(NO_OBJECT, {})
     measurement = Measurement(
         detector=detector.name,
         fingerprint=dict(compute_fingerprint(detector.cell, detector.name, detector.base)),
         command=command,
-        seconds=round(seconds, 1),
+        seconds=round(duration, 1),
         images=evaluation.images,
         rates=evaluation.reliability.rates,
         classes={
@@ -251,7 +254,7 @@ def store_evaluation(
                 objects=sum(row.values()),
                 missed=row.get(NO_OBJECT, 0),
                 confused=sum(row.values()) - row.get(NO_OBJECT, 0) - row.get(label, 0),
-                false_detections=confusion_matrix.get(NO_OBJECT, {}).get(label, 0),
+                false_detections=false_detections.get(label, 0),
             )
             for label, row in confusion_matrix.items()
             if label != NO_OBJECT

@@ -14,19 +14,19 @@ from executive.skill import Skill
 
 @dataclass(frozen=True)
 class MissionUnderTest:
-    """A loaded mission, and all that its runs need.
+    """A mission with the cell, the skills and the seed of its test runs.
 
     Attributes:
         loaded: The mission, checked together with its cell file.
         skills: Installed skills by name.
-        kind: Function that makes the work cell; None: the kind of cell in the cell file.
-        cell_description: Kind of the cell, and source of the detections.
+        make_cell: Function that makes the work cell; None: the function for the kind in the cell file.
+        cell_description: Kind of the cell, and source of the detections, for reports.
         seed: Random seed; in a series of runs, the seed of the first run.
     """
 
     loaded: LoadedMission
     skills: Mapping[str, type[Skill]]
-    kind: Callable[..., Workcell] | None
+    make_cell: Callable[..., Workcell] | None
     cell_description: str
     seed: int
 
@@ -37,27 +37,26 @@ class MissionUnderTest:
 
     @property
     def requests(self) -> list[str]:
-        """Requests of the operator: all classes of the mission, repeated as often as there may be objects."""
+        """Requests of the operator: enough for each class of the mission, if all objects have this class."""
         return [*self.loaded.routes] * self.loaded.cell_config.table.objects[1]
 
 
 def load_mission_under_test(
-    mission: str, overrides: Mapping[str, str], oracle: bool, seed: int
+    mission: str, overrides: Mapping[str, str], has_oracle: bool, seed: int
 ) -> MissionUnderTest:
-    """Load a mission; if `oracle` is True, its simulated cell gets true detections.
+    """Load a mission; if `has_oracle` is True, the detectors of its simulated cell return true detections.
 
     Raises:
-        InputError: The mission does not exist or has errors, or the cell of an `oracle` is not simulated.
+        InputError: The mission does not exist or has errors, or `has_oracle` requires a simulated cell.
     """
     skills = load_skills()
     loaded = load_mission(mission, skills, overrides, load_cell_kind)
     kind = loaded.cell_config.kind
-    if not oracle:
+    if not has_oracle:
         return MissionUnderTest(loaded, skills, None, kind, seed)
     if kind != "sim":
-        raise InputError(
-            f"--oracle requires a simulated cell, but the cell of {loaded.mission.name} is of kind {kind}"
-        )
+        name = loaded.mission.name
+        raise InputError(f"--oracle requires a simulated cell, but the cell of {name} is of kind {kind}")
     from executive.testing.oracle import make_oracle_kind
 
     return MissionUnderTest(loaded, skills, make_oracle_kind(), "sim, true detections", seed)

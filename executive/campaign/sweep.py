@@ -14,14 +14,14 @@ from executive.record.result import Audit, Result
 
 
 @dataclass(frozen=True)
-class Job:
-    """One run of a mission.
+class SweepJob:
+    """One run of a mission in a sweep.
 
     Attributes:
         mission: Mission file, or name of a shipped mission.
         seed: Random seed.
         overrides: Values of params of the mission and keys of the cell, as given with `--set`.
-        runs: Folder in which the run directory is made.
+        runs_folder: Folder in which the run directory is made.
         saves_pictures: True to save the images on which decisions are based.
         scene: Scene file that changes the objects and the camera; None: no change.
     """
@@ -29,39 +29,35 @@ class Job:
     mission: str
     seed: int
     overrides: Mapping[str, str]
-    runs: Path
+    runs_folder: Path
     saves_pictures: bool
     scene: Path | None = None
 
 
 def run_sweep(
-    jobs: Sequence[Job],
+    jobs: Sequence[SweepJob],
     *,
     workers: int = 2,
     progress: Callable[[int, int], None] | None = None,
     on_halt: Callable[[], None] | None = None,
-    work: Callable[[Job], Result] | None = None,
 ) -> list[Result]:
     """Execute all jobs and return the results in the order of the jobs.
 
-    A run whose process dies has the status `FAULT`. After Ctrl-C or SIGTERM no further run starts, running
-    runs are halted, and the results so far are returned.
+    A run whose process dies has the status `FAULT`. After Ctrl-C or SIGTERM no further run starts, current
+    runs are halted, and only the results of the ended runs are returned.
 
     Args:
         jobs: The runs.
         workers: Number of processes.
         progress: Function that is called with the number of finished runs and the number of all runs.
         on_halt: Function that is called after the first signal.
-        work: Function that executes a job in a worker process; None: `run_job`.
     """
-    results = run_jobs(
-        jobs, work or run_job, _make_failed_result, workers=workers, progress=progress, on_halt=on_halt
-    )
+    results = run_jobs(jobs, run_job, _make_fault_result, workers=workers, progress=progress, on_halt=on_halt)
     return [result for result in results if result is not None]
 
 
-def run_job(job: Job) -> Result:
-    """Execute one run, write its record and its report, and return its result."""
+def run_job(job: SweepJob) -> Result:
+    """Execute and record one run, write the report if possible, and return the result."""
     from executive.mission.load import load_mission
     from executive.plugins import load_skills
     from executive.record.recorded_run import RecordOptions, record_run
@@ -71,8 +67,8 @@ def run_job(job: Job) -> Result:
     skills = load_skills()
     loaded = load_mission(job.mission, skills, job.overrides)
     options = RunOptions(job.seed, scene=job.scene)
-    result = record_run(loaded, skills, options, job.runs, RecordOptions(saves_pictures=job.saves_pictures))
-    # If the report cannot be written, the result is still returned.
+    record_options = RecordOptions(saves_pictures=job.saves_pictures)
+    result = record_run(loaded, skills, options, job.runs_folder, record_options)
     try_write_report(result.run)
     return result
 
@@ -80,13 +76,13 @@ def run_job(job: Job) -> Result:
 def summarize_results(results: Sequence[Result], requested_count: int) -> dict[str, Any]:
     """Return the statistics of a sweep: sorted objects, disagreements, times and failures.
 
-    Halted runs are ignored, except that `cut_off` is True if fewer than `requested_count` runs are complete.
+    The statistics contain only complete runs. `asked` is `requested_count`, and `cut_off` is True if fewer
+    runs are complete.
     """
     results = [result for result in results if result.status != "HALTED"]
     audits = [result.audit for result in results if result.audit is not None]
     right_count = sum(audit.right for audit in audits)
     total_count = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
-    low, high = compute_wilson_interval(right_count, total_count)
     return {
         "asked": requested_count,
         "cut_off": len(results) < requested_count,
@@ -96,7 +92,7 @@ def summarize_results(results: Sequence[Result], requested_count: int) -> dict[s
             "right": right_count,
             "total": total_count,
             "share": round(right_count / total_count, 6) if total_count else 0.0,
-            "interval_95": [round(low, 6), round(high, 6)],
+            "interval_95": [round(limit, 6) for limit in compute_wilson_interval(right_count, total_count)],
         },
         "disagreements": [
             {"seed": result.seed, "items": asdict(result.items), "audit": asdict(audit), "run": result.run}
@@ -124,7 +120,7 @@ def compute_wilson_interval(successes: int, total: int) -> tuple[float, float]:
     """Return the 95 % Wilson score interval of the proportion successes / total; (0, 1) if total is 0."""
     if total == 0:
         return 0.0, 1.0
-    from scipy.stats import binomtest  # The import takes 0.5 s: not in the workers.
+    from scipy.stats import binomtest  # Imported here, because workers do not need the import of 0.5 s.
 
     interval = binomtest(successes, total).proportion_ci(method="wilson")
     return float(interval.low), float(interval.high)
@@ -132,12 +128,13 @@ def compute_wilson_interval(successes: int, total: int) -> tuple[float, float]:
 
 def summarize_values(values: Sequence[float]) -> dict[str, float]:
     """Return minimum (`least`), `median`, `mean` and maximum (`most`) of the values; 0 without values."""
-    functions: dict[str, Callable[[Sequence[float]], float]]
-    functions = {"least": min, "median": statistics.median, "mean": statistics.fmean, "most": max}
-    return {name: round(function(values), 3) if values else 0.0 for name, function in functions.items()}
+    values = values or [0.0]
+    median, mean = statistics.median(values), statistics.fmean(values)
+    summary = {"least": min(values), "median": median, "mean": mean, "most": max(values)}
+    return {name: round(value, 3) for name, value in summary.items()}
 
 
-def _make_failed_result(job: Job, error: BaseException) -> Result:
+def _make_fault_result(job: SweepJob, error: BaseException) -> Result:
     """Return the result of a run that raised an exception or whose process died."""
     return Result(
         mission=job.mission,

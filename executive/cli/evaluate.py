@@ -116,8 +116,8 @@ def command(
             if is_stored and detector.cell is not None:
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
                 arguments = f"--cell {detector.cell.cell} --detector {detector.name} {source}"
-                line, seconds = f"executive evaluate {arguments}", time.monotonic() - start_time
-                path = evaluation.store_evaluation(detector, result, out, command=line, seconds=seconds)
+                line, duration = f"executive evaluate {arguments}", time.monotonic() - start_time
+                path = evaluation.store_evaluation(detector, result, out, command=line, duration=duration)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
             from executive.training.dataset import save_image

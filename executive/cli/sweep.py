@@ -50,7 +50,7 @@ def command(
     Ctrl-C quits immediately.
     """
     with keep_stdout_clean():
-        from executive.campaign.sweep import Job, run_sweep, summarize_results
+        from executive.campaign.sweep import SweepJob, run_sweep, summarize_results
         from executive.cell.json_values import to_json
         from executive.cli.progress import print_halt, show_progress
         from executive.mission.load import load_mission
@@ -65,7 +65,7 @@ def command(
             load_scene(scene, loaded.cell_config)
         check_runs_folder(runs)
         with show_progress(mission) as progress:
-            jobs = [Job(mission, seed, overrides, runs, frames, scene) for seed in seeds]
+            jobs = [SweepJob(mission, seed, overrides, runs, frames, scene) for seed in seeds]
             results = run_sweep(jobs, workers=workers, progress=progress, on_halt=print_halt)
         summary = summarize_results(results, len(seeds))
         click.echo(_describe_summary(summary), err=True)

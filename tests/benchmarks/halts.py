@@ -174,7 +174,7 @@ class _RunWithHalts:
         self._halt: Figures = {}
         config = subject.loaded.cell_config
         self._limits = JointLimits.from_config(config.arm.limits)
-        kind = subject.kind or load_cell_kind(config.kind)
+        kind = subject.make_cell or load_cell_kind(config.kind)
 
         def make_cell(*args: Any, **options: Any) -> CellWrapper:
             return _WatchedCell(

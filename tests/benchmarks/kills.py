@@ -120,7 +120,7 @@ def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: 
 
     def resume() -> Figures:
         done = change_world(subject, seed, path, past, change) if change else ""
-        options = RunOptions(seed, kind=subject.kind)
+        options = RunOptions(seed, kind=subject.make_cell)
         result = resume_run(path, subject.skills, options, RecordOptions(saves_pictures=False))
         after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = [*check_result(result, change_made=done), *find_handled_twice(after.events)]
@@ -160,7 +160,9 @@ def change_world(subject: MissionUnderTest, seed: int, path: Path, past: InputLo
 
     assert past.start is not None
     loaded = read_mission_of_run(path, past.start, subject.skills)
-    meanwhile(path / "world.log", loaded, seed, act, subject.kind or load_cell_kind(loaded.cell_config.kind))
+    meanwhile(
+        path / "world.log", loaded, seed, act, subject.make_cell or load_cell_kind(loaded.cell_config.kind)
+    )
     return "".join(done)
 
 

@@ -37,13 +37,13 @@ START = np.radians([0.0, 20.0, 0.0, -80.0, 0.0, 60.0, 0.0])
 
 
 def load(mission: str = "sort_overhead", kind: Any = None, **overrides: str) -> MissionUnderTest:
-    loaded = load_mission_under_test(mission, {**FAKE, **overrides}, oracle=False, seed=7)
+    loaded = load_mission_under_test(mission, {**FAKE, **overrides}, has_oracle=False, seed=7)
     return MissionUnderTest(loaded.loaded, loaded.skills, kind, "fake", 7)
 
 
 @pytest.fixture(scope="module")
 def cell() -> CellConfig:
-    return load_mission_under_test("sort_overhead", {}, oracle=False, seed=0).loaded.cell_config
+    return load_mission_under_test("sort_overhead", {}, has_oracle=False, seed=0).loaded.cell_config
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ class TestHalts:
     @pytest.mark.slow
     def test_the_simulated_arm_brakes_within_its_limits(self) -> None:
         figures = halts.measure(
-            load_mission_under_test("sort_overhead", {}, oracle=True, seed=1), period_steps=60
+            load_mission_under_test("sort_overhead", {}, has_oracle=True, seed=1), period_steps=60
         )
         assert figures["problems"] == []
         assert figures["moving"] >= 20
@@ -157,7 +157,7 @@ class TestKills:
     @pytest.mark.slow
     @pytest.mark.parametrize("simulated", [False, True])
     def test_a_killed_run_resumes(self, tmp_path: Path, simulated: bool) -> None:
-        subject = load_mission_under_test("sort_wrist", {}, oracle=True, seed=7) if simulated else load()
+        subject = load_mission_under_test("sort_wrist", {}, has_oracle=True, seed=7) if simulated else load()
         count = 2 if simulated else 4
         figures = kills.measure(subject, tmp_path, kills=count, changed=count // 2)
         assert (figures["problems"], figures["kills"], len(figures["ended"])) == ([], count, count)
@@ -185,7 +185,9 @@ class TestDamagedRecords:
     def test_a_damaged_record_is_read_replayed_resumed_and_filmed_or_refused(
         self, tmp_path: Path, simulated: bool
     ) -> None:
-        subject = load_mission_under_test("sort_overhead", {}, oracle=True, seed=7) if simulated else load()
+        subject = (
+            load_mission_under_test("sort_overhead", {}, has_oracle=True, seed=7) if simulated else load()
+        )
         figures = damaged_records.measure(
             subject, tmp_path, reports=12, others=6, films=2 * simulated, truncations=6, kills=2
         )

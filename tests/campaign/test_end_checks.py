@@ -57,7 +57,7 @@ def test_every_node_of_a_journal_begins_once_and_ends(
 def test_a_journal_without_exactly_one_end_is_reported(journal: list[TimedEvent]) -> None:
     (problem,) = check_journal(journal, HALTED)
     ends = sum(isinstance(timed.event, RunEnded) for timed in journal)
-    assert problem == f"the journal has {ends} RunEnded in {len(journal)} events; only the last may be one"
+    assert problem == f"the journal has {ends} RunEnded in {len(journal)} events; only the last must be one"
 
 
 def test_a_journal_with_another_end_than_the_run_is_reported() -> None:

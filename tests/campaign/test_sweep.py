@@ -8,11 +8,12 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
 from executive.campaign.sweep import (
-    Job,
+    SweepJob,
     compute_wilson_interval,
     run_job,
     run_sweep,
@@ -36,11 +37,12 @@ def result(seed: int, status: str = "SUCCESS", right: int = 4, left: int = 0, **
 
 def swept(seeds: range, work, **options) -> list:
     """Sweep without a mission: `work` says what comes of it."""
-    jobs = [Job("sort", seed, {"a": "1"}, Path("runs"), False) for seed in seeds]
-    return run_sweep(jobs, work=work, **options)
+    jobs = [SweepJob("sort", seed, {"a": "1"}, Path("runs"), False) for seed in seeds]
+    with patch("executive.campaign.sweep.run_job", work):
+        return run_sweep(jobs, **options)
 
 
-def work(job: Job) -> Result:
+def work(job: SweepJob) -> Result:
     """Do a run in another process, in a way that the seed says."""
     if job.seed == 3:
         raise ValueError("seed three")
@@ -61,7 +63,7 @@ def test_every_seed_is_run_once_in_another_process():
     assert reported == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
 
-def interrupt(job: Job) -> Result:
+def interrupt(job: SweepJob) -> Result:
     """Do a run during which somebody presses Ctrl-C."""
     os.kill(os.getppid(), signal.SIGINT)
     time.sleep(0.2)
@@ -79,7 +81,7 @@ def sigint():
 @pytest.mark.slow
 def test_every_run_leaves_its_record_and_its_report(tmp_path):
     few = {"cell.kind": "fake", "cell.table.objects": "[1, 1]"}
-    result = run_job(Job("sort_fruit", 3, few, tmp_path, saves_pictures=False))
+    result = run_job(SweepJob("sort_fruit", 3, few, tmp_path, saves_pictures=False))
     assert result.status == "SUCCESS"
     assert (Path(result.run) / "report.html").is_file()
 
@@ -92,7 +94,7 @@ def test_after_ctrl_c_no_further_run_begins_and_the_results_so_far_are_kept():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def die(job: Job) -> Result:
+def die(job: SweepJob) -> Result:
     """Take the process down with the run, if the seed says so."""
     if job.seed == 0:
         os._exit(1)

@@ -131,7 +131,7 @@ class _TrialRun:
         )
 
     def _make_cell(self, *args: Any, **options: Any) -> Workcell:
-        make_inner_cell = self._mission.kind or load_cell_kind(self._mission.loaded.cell_config.kind)
+        make_inner_cell = self._mission.make_cell or load_cell_kind(self._mission.loaded.cell_config.kind)
         return CellWrapper(make_inner_cell(*args, **options), after_step=self._stop_run_if_due)
 
     def _on_event(self, timed: TimedEvent) -> None:

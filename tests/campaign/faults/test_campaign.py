@@ -156,7 +156,7 @@ def test_a_mission_that_does_not_succeed_by_itself_or_with_wrong_books_is_not_tr
     small: MissionUnderTest, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=r"without a fault, small with seed 0 ends as FAULT .* another seed"):
-        Campaign(replace(small, kind=Empty))
+        Campaign(replace(small, make_cell=Empty))
     file = tmp_path / "blind.yaml"
     shutil.copytree(small.loaded.path.parent / "cells", tmp_path / "cells")
     file.write_text(

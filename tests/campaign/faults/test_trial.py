@@ -130,7 +130,7 @@ class Restless(FakeCell):
     [(Liar, "1 objects in wrong bins; the ledger says seen 6"), (Restless, "the arm is not at rest")],
 )
 def test_what_is_not_as_it_has_to_be_is_found(campaign: Campaign, kind: type[FakeCell], problem: str) -> None:
-    subject = replace(campaign.mission, kind=kind)
+    subject = replace(campaign.mission, make_cell=kind)
     number = number_of(campaign, "Grasp", "missed")
     trial = run_trial(subject, campaign.nominal_run, campaign.select_faults((number,)))
     assert trial.verdict == "!!"
