@@ -65,6 +65,7 @@ class SelectTarget(Skill):
         name = self.same or self.wanted or "object to sort"
         if self.same is None and cell.ledger.is_table_empty(self.wanted):
             empty = f"no {name} is left on the table, except rejected objects"
-            message = "; ".join(filter(None, (empty, describe_unknown_labels(cell.ledger.unknown))))
+            unknown = describe_unknown_labels(cell.ledger.unknown_labels)
+            message = "; ".join(filter(None, (empty, unknown)))
             return self.failure("no_candidate", message)
         return self.failure("unseen", f"no {name} is in sight, but it is not certain that the table is empty")

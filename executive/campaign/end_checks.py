@@ -52,7 +52,7 @@ def check_journal(events: Sequence[TimedEvent], run_end: RunEnded) -> Iterator[s
 def check_held_item(run_end: RunEnded, workcell: Workcell) -> Iterator[str]:
     """Yield a problem if the tool is empty and `RunEnded` names a held item, or vice versa."""
     is_holding = workcell.cell.tool.holding
-    if is_holding and run_end.held_item not in {summary.item for summary in workcell.accounts.summaries()}:
+    if is_holding and run_end.held_item not in {summary.item for summary in workcell.accounts.list_items()}:
         yield f'the tool holds an object, but the held item of the run is "{run_end.held_item}"'
     if not is_holding and run_end.held_item:
         yield f'the tool is empty, but the held item of the run is "{run_end.held_item}"'

@@ -33,7 +33,7 @@ class Frame:
         X_WC: Camera pose in the world at capture, OpenCV convention (z forward, y down).
         stamp: Capture time on the clock of the run [s].
         visible: `(H, W)` bool, False for pixels in which the arm may occlude the scene, from its kinematics.
-        epoch: Version of the scene at capture: how often the robot had changed the objects on the table.
+        change_count: Number of changes of the table by the robot before the capture (`Ledger.change_count`).
     """
 
     id: int
@@ -44,7 +44,7 @@ class Frame:
     X_WC: Pose
     stamp: float
     visible: NDArray[np.bool_]
-    epoch: int
+    change_count: int
 
     def compute_visible_fraction(self, box: Box) -> float:
         """Return the fraction of a box (0 to 1) that the arm does not occlude."""

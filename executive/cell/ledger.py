@@ -15,11 +15,11 @@ class Ledger(Protocol):
     """Tracker of the items of a run; it alone decides on identity, state and position of each object."""
 
     @property
-    def epoch(self) -> int:
-        """Version of the scene: how often the robot has changed the objects on the table."""
+    def change_count(self) -> int:
+        """Number of actions of the robot so far that may have moved objects on the table."""
 
     @property
-    def unknown(self) -> Mapping[str, int]:
+    def unknown_labels(self) -> Mapping[str, int]:
         """Maximum number of boxes in one look, by label, for labels that the cell file does not declare."""
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:

@@ -21,7 +21,7 @@ class Target:
         position: Centre of the object `(3,)` [m] in the world, at half the height of its class.
         confidence: Confidence of the last detection, 0 to 1.
         frame: Id of the last frame that showed the item.
-        epoch: Version of the scene at the capture of this frame (`Frame.epoch`).
+        change_count: Number of changes of the table by the robot before the capture.
         stamp: Capture time of this frame [s].
     """
 
@@ -30,7 +30,7 @@ class Target:
     position: Array
     confidence: float
     frame: int
-    epoch: int
+    change_count: int
     stamp: float
 
 

@@ -31,14 +31,14 @@ class Accounts(Protocol):
         """
 
     @property
-    def unknown(self) -> Mapping[str, int]:
+    def unknown_labels(self) -> Mapping[str, int]:
         """Maximum number of boxes in one look, by label, for labels that the cell file does not declare."""
 
     @property
     def assumption_reasons(self) -> Sequence[str]:
         """Reasons why error rates of detectors were assumed instead of measured."""
 
-    def summaries(self) -> Sequence[ItemChanged]:
+    def list_items(self) -> Sequence[ItemChanged]:
         """Return the current state of each item, in the order of the first detection."""
 
 

@@ -1,7 +1,7 @@
 """Bayesian update of the existence and the class of one item, in log odds.
 
 A look is an image with its detections. Looks from one viewpoint are not independent, because a detector
-repeats a fraction of its errors.
+repeats a fraction of its errors in similar images.
 """
 
 from __future__ import annotations
@@ -10,33 +10,33 @@ import math
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 
+from scipy.special import bdtrc, expit
+
 from executive.cell.detection import Detections
 from executive.cell.error_rates import ErrorRates
 
 VIEWPOINT_GRID_SPACING = 0.02
 """Spacing of the grid to which camera positions are rounded [m]; equal grid points are one viewpoint."""
 ITEM_AREA_FRACTION = 0.02
-"""Probability that a false detection is assigned to a given item: its area as a fraction of the image."""
+"""Area of an item in an image, as a fraction: probability that a false detection is assigned to the item."""
 MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM = math.log(0.1)
-"""Maximum log odds of existence of a new item that may be a known item, detected at a wrong position."""
+"""Maximum log odds of existence of a new item that may be a known item at a wrongly measured position."""
 LOG_ODDS_OF_PROOF = math.log(1e4)
-"""Minimum log odds of existence of a proved item; two agreeing looks of a good detector reach them."""
-MIN_LOG_ODDS = -100.0
-"""Lower log odds are raised to this value before their conversion to a probability, which would overflow."""
+"""Minimum log odds of existence of a proved item; two agreeing looks of a good detector reach this value."""
 
 
 def make_viewpoint_key(look: Detections) -> str:
-    """Return a key of the detector and camera position of a look; looks with equal keys may repeat errors."""
+    """Return a key of the detector and the rounded camera position of a look."""
     x, y, z = (round(float(value) / VIEWPOINT_GRID_SPACING) for value in look.frame.X_WC.position)
     return f"{look.detector} {x} {y} {z}"
 
 
 def compute_repeat_probability(independent_probability: float, copy_probability: float) -> float:
-    """Return the probability that a look gives the same answer as an earlier look from the same viewpoint.
+    """Return the probability that a detector repeats its answer to an earlier look from the same viewpoint.
 
     Args:
-        independent_probability: Probability of this answer in an independent look.
-        copy_probability: Probability that the look is a copy of the earlier look.
+        independent_probability: Probability of the answer (a class, or no detection) in an independent look.
+        copy_probability: Probability that the detector copies its earlier answer.
     """
     return copy_probability + (1.0 - copy_probability) * independent_probability
 
@@ -47,13 +47,13 @@ class Belief:
 
     Attributes:
         first_label: Class in the first detection.
-        log_odds: Posterior log odds that the item exists and is no false detection.
-        is_proved: True if the item certainly exists: enough looks agree, or the tool has touched the item.
+        log_odds: Posterior log odds that the item exists.
+        is_proved: True if the item certainly exists: enough looks agree, or the tool touched the item.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
         uncertain_look_count: Number of looks with a low-confidence detection since the last confident one.
-        last_label_by_viewpoint: Last detected class by viewpoint, since the item may last have been moved.
+        last_label_by_viewpoint: Last detected class by viewpoint key, since the last possible move.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
-        log_likelihoods: Log likelihood of each detected class, up to a common constant.
+        log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
         label_counts: Number of looks by detected class.
         max_confusion_rate: Largest rate of wrong classes of the detectors that detected the item, 0 to 1.
     """
@@ -85,14 +85,14 @@ class Belief:
     def class_error(self) -> float:
         """Probability that the item does not belong to the class `label`, 0 to 1.
 
-        The hypotheses of Bayes' rule are each detected class, and one class for all others.
+        The hypotheses of Bayes' rule are the detected classes, and one class that was never detected.
         """
         if not self.label_counts:
             return 1.0
         best = self.log_likelihoods[self.label]
         others = (value for label, value in self.log_likelihoods.items() if label != self.label)
-        odds = sum(math.exp(value - best) for value in (0.0, *others))  # odds of any other class
-        return odds / (1.0 + odds)
+        odds_of_other_class = sum(math.exp(value - best) for value in (0.0, *others))
+        return odds_of_other_class / (1.0 + odds_of_other_class)
 
     @property
     def p_value(self) -> float:
@@ -100,69 +100,63 @@ class Belief:
 
         A small value shows that the detector confuses classes more often than its error rates state.
         """
-        n, p = self.look_count, self.max_confusion_rate
-        wrong_count = n - self.label_counts[self.label]
-        return 1.0 - sum(math.comb(n, k) * p**k * (1.0 - p) ** (n - k) for k in range(wrong_count))
+        wrong_count = self.look_count - self.label_counts[self.label]
+        return float(bdtrc(wrong_count - 1, self.look_count, self.max_confusion_rate))
 
     @property
     def existence_probability(self) -> float:
         """Probability that the item exists, 0 to 1."""
-        return 1.0 if self.is_proved else _to_probability(self.log_odds)
+        return 1.0 if self.is_proved else float(expit(self.log_odds))
 
     @property
     def probability_at_last_detection(self) -> float:
-        """Probability that the item exists, without the looks since the last detection, 0 to 1."""
-        return 1.0 if self.is_proved else _to_probability(self.log_odds - math.log(self.miss_probability))
+        """Probability that the item exists, 0 to 1, without the evidence since the last detection."""
+        return 1.0 if self.is_proved else float(expit(self.log_odds - math.log(self.miss_probability)))
 
     def add_detection(
         self, label: str, rates: ErrorRates, viewpoint: str = "", *, is_ambiguous: bool = False
     ) -> None:
-        """Update class and existence with a detection.
-
-        If the detector repeats the class of an earlier look from a viewpoint, the evidence is weaker.
+        """Update class and existence with a detection, which is weak evidence if it repeats an earlier class.
 
         Args:
             label: Detected class.
             rates: Error rates of the detector.
-            viewpoint: Viewpoint of the look (`make_viewpoint_key`).
-            is_ambiguous: True if the detection may show another item; then it is no evidence of existence.
+            viewpoint: Key of detector and camera position (`make_viewpoint_key`).
+            is_ambiguous: True if the detection may show another item, and is no evidence of existence.
         """
-        copied = rates.repeated if self.last_label_by_viewpoint.get(viewpoint) == label else 0.0
-        self.repeat_count += copied > 0.0
+        copy_probability = rates.repeated if self.last_label_by_viewpoint.get(viewpoint) == label else 0.0
+        self.repeat_count += copy_probability > 0.0
         self.last_label_by_viewpoint[viewpoint] = label
         confusion_rate = rates.confusion_rate
-        self.log_likelihoods[label] += _compute_log_ratio(1.0 - confusion_rate, confusion_rate, copied)
+        class_evidence = _compute_log_ratio(1.0 - confusion_rate, confusion_rate, copy_probability)
+        self.log_likelihoods[label] += class_evidence
         self.max_confusion_rate = max(self.max_confusion_rate, confusion_rate)
         if is_ambiguous and not self.look_count:
             self.log_odds = min(self.log_odds, MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM)
         elif not is_ambiguous and (self.look_count or self.uncertain_look_count):
             false_positive_rate = min(rates.false_detections * ITEM_AREA_FRACTION, 1.0)
-            self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, copied)
+            self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, copy_probability)
         self.label_counts[label] += 1
         self.uncertain_look_count = 0
         self.is_proved = self.is_proved or self.log_odds >= LOG_ODDS_OF_PROOF
 
     def add_miss(self, rates: ErrorRates) -> None:
-        """Update the existence with a look that shows the item's position without a detection of the item."""
+        """Update the existence with a look that shows the item's position, but does not detect the item."""
         self.miss_probability *= rates.miss_rate
         self.log_odds += math.log(rates.miss_rate)
 
-    def merge(self, other: Belief) -> None:
-        """Add the detections of an item that is the same object."""
-        for label, value in other.log_likelihoods.items():
+    def merge(self, duplicate: Belief) -> None:
+        """Add the detections of a duplicate item, which is the same object."""
+        for label, value in duplicate.log_likelihoods.items():
             self.log_likelihoods[label] += value
-        self.label_counts += other.label_counts
+        self.label_counts += duplicate.label_counts
         self.miss_probability = 1.0
 
 
-def _to_probability(log_odds: float) -> float:
-    return 1.0 / (1.0 + math.exp(-max(log_odds, MIN_LOG_ODDS)))
-
-
 def _compute_log_ratio(probability: float, alternative: float, copy_probability: float) -> float:
-    """Return the log likelihood ratio of an answer with these probabilities under two hypotheses.
+    """Return the log likelihood ratio of an answer, which may be a copy of an earlier answer.
 
-    `copy_probability` is the probability that the answer is a copy of an earlier answer.
+    `probability` and `alternative` are the probabilities of an independent answer under both hypotheses.
     """
     p, p_alternative = (compute_repeat_probability(p, copy_probability) for p in (probability, alternative))
     return math.log(p / p_alternative)

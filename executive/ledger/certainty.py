@@ -1,4 +1,4 @@
-"""Rules for items that are certain enough to be sorted, and for items that are rejected as uncertain.
+"""Thresholds of the evidence with which an item is sorted, and with which it is rejected as uncertain.
 
 A look is an image with its detections.
 """
@@ -18,19 +18,19 @@ MIN_P_VALUE = 0.01
 REJECTION_P_VALUE = 0.001
 """p-value of the class-consistency test below which an item is rejected after `MIN_LOOKS_TO_REJECT` looks."""
 RETRY_STANDARD_ERROR_FACTOR = 2 / 3
-"""Factor on the maximum standard error of an item's position after a failed grasp."""
-MIN_MISS_PROBABILITY = 0.1
-"""Minimum probability, for a pick, that all looks since the last detection missed the item by chance."""
+"""Maximum standard error of an item's position after a failed grasp, as a fraction of the usual maximum."""
+MIN_MISS_PROBABILITY_OF_PICK = 0.1
+"""Minimum miss probability (`Belief.miss_probability`) of an item that is picked."""
 MIN_LOOKS_TO_REJECT = 40
-"""Minimum number of looks before an item is rejected because they disagree about its class."""
+"""Minimum number of looks at an item that is rejected because the looks disagree about its class."""
 MIN_CONTRADICTIONS_TO_REJECT = 3
-"""Minimum number of looks with evidence against the class of an item before the item is rejected."""
+"""Minimum number of contradicted looks (`Record.contradiction_count`) at a rejected item."""
 MIN_REPEATS_FOR_SATURATION = 2
-"""Number of repeated answers from a viewpoint after which more looks from it add hardly any evidence."""
+"""Number of repeated classes after which more looks from a viewpoint add hardly any evidence."""
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
-"""Maximum class error of an item that may be touched to determine its class by its height."""
-MAX_UNCERTAIN_LOOKS = 10
-"""Number of looks with a low-confidence detection, since the last confident one, to reject an item."""
+"""Maximum class error of an item that the tool may touch to determine the class by the height."""
+UNCERTAIN_LOOKS_TO_REJECT = 10
+"""Number of looks with low-confidence detections only after which an item is rejected."""
 
 
 @dataclass(frozen=True)
@@ -48,23 +48,22 @@ class Certainty:
     def is_certain(self, record: Record) -> bool:
         """Return True if an item's existence, class and position are certain enough to touch the item.
 
-        After a failed grasp, the position must be known more precisely. If more looks from the same viewpoint
-        cannot prove the class, but the height of a touch can, a larger class error is permitted.
+        After a failed grasp, the position must be known more precisely. A larger class error is permitted if
+        the height of a touch can prove the class, and more looks from the same viewpoint cannot.
         """
         belief, max_class_error = record.belief, self.config.max_class_error
         is_saturated = belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
         if is_saturated and record.label in self.labels_with_unique_height:
             max_class_error = MAX_CLASS_ERROR_FOR_TOUCH
-        max_error = self.config.max_position_std * (
-            RETRY_STANDARD_ERROR_FACTOR if record.attempt_count else 1.0
-        )
+        error_factor = RETRY_STANDARD_ERROR_FACTOR if record.attempt_count else 1.0
         return (
             belief.existence_probability >= MIN_EXISTENCE_PROBABILITY
             and record.contradiction_count <= belief.look_count
-            and belief.miss_probability >= MIN_MISS_PROBABILITY
+            and belief.miss_probability >= MIN_MISS_PROBABILITY_OF_PICK
             and belief.class_error <= max_class_error
             and belief.p_value >= MIN_P_VALUE
-            and math.hypot(record.standard_error, record.bias_std) <= max_error
+            and math.hypot(record.standard_error, record.bias_std)
+            <= error_factor * self.config.max_position_std
         )
 
     def may_be_on_table(self, record: Record) -> bool:
@@ -73,7 +72,7 @@ class Certainty:
         return record.state is State.SEEN and may_exist and not self.is_position_empty(record)
 
     def is_position_empty(self, record: Record) -> bool:
-        """Return True if looks have missed an item so often that its position is almost certainly empty."""
+        """Return True if an item's position is almost certainly empty, because looks have missed the item."""
         return record.belief.miss_probability <= self.config.max_miss_probability
 
     def reject_if_uncertain(self, record: Record, *, is_settled: bool) -> None:
@@ -92,12 +91,13 @@ class Certainty:
         if belief.look_count >= MIN_LOOKS_TO_REJECT and belief.p_value < REJECTION_P_VALUE:
             counts = ", ".join(f"{count} {label}" for label, count in belief.label_counts.most_common())
             record.set_state(State.REJECTED, f"looks disagree about its class: {counts}")
-        elif self._cannot_prove_class(record):
-            error = f"leave a probability of {belief.class_error:.1%} that it is no {record.label}"
+        elif self._needs_other_viewpoint(record):
+            error = f"a probability of {belief.class_error:.1%} that it is no {record.label}"
+            reason = f"{belief.look_count} looks from one pose leave {error}"
             limit = f"at most {self.config.max_class_error:.1%} is allowed"
-            record.set_state(State.REJECTED, f"{belief.look_count} looks from one pose {error}; {limit}")
+            record.set_state(State.REJECTED, f"{reason}; {limit}")
         elif not is_certain and (
-            belief.uncertain_look_count >= MAX_UNCERTAIN_LOOKS
+            belief.uncertain_look_count >= UNCERTAIN_LOOKS_TO_REJECT
             or record.contradiction_count >= max(MIN_CONTRADICTIONS_TO_REJECT, belief.look_count + 1)
         ):
             details = f": {record.last_contradiction}" if record.last_contradiction else ""
@@ -105,15 +105,15 @@ class Certainty:
             belief.log_odds = max(belief.log_odds, 0.0)
 
     def register_low_touch(self, record: Record) -> bool:
-        """Count a touch below the height of the class; return True if the touch may have missed the top.
+        """Count a touch below the height of the class; return False if the touch contradicts the class.
 
-        Only the first low touch may have missed the top, and only if looks alone prove the class.
+        The first low touch may have missed the top of the object, if the looks prove the class.
         """
         record.low_touch_count += 1
         return record.low_touch_count == 1 and record.belief.class_error <= self.config.max_class_error
 
-    def _cannot_prove_class(self, record: Record) -> bool:
-        """Return True if neither more looks from the only viewpoint so far nor a touch prove the class."""
+    def _needs_other_viewpoint(self, record: Record) -> bool:
+        """Return True if only looks from a second viewpoint can prove the class of an item."""
         belief = record.belief
         return (
             belief.class_error > self.config.max_class_error

@@ -20,11 +20,11 @@ from executive.ledger.belief import Belief
 SAME_POSITION_TOLERANCE = 0.01
 """Maximum distance between two measurements of the same position [m]."""
 REASON_NOT_FOUND = "more looks missed it than saw it"
-"""Reason of the state PHANTOM of an item that looks (images with their detections) missed."""
+"""Reason of the state PHANTOM of an item whose position was empty in most looks."""
 REASON_UNTRACKED = "its position is unknown: the journal lacks actions of the tool; no look showed it since"
 """Reason for the rejection of an item that the tool may have moved while the journal was incomplete."""
 REASON_UNCERTAIN = "no look is certain of it"
-"""Reason for the rejection of an item that looks detect with low confidence or contradict."""
+"""Reason for the rejection of an item with low-confidence or contradicted detections only."""
 
 
 class State(Enum):
@@ -58,7 +58,7 @@ class Record:
     """Record of one item.
 
     A look is an image with its detections. A change of the table is an action of the robot that may have
-    moved objects; the changes are counted from 0 (`Ledger.epoch`).
+    moved objects (`Ledger.change_count` is the number of changes so far).
 
     Attributes:
         item: Name of the item, unique in the run.
@@ -66,26 +66,25 @@ class Record:
         first_position: Position before the first possible move of the item `(3,)` [m].
         first_change_count: Number of changes of the table before the first detection.
         first_stamp: Capture time of the first detection [s].
-        appeared_during_run: True if earlier looks had found the position of the first detection empty.
+        has_appeared: True if the position of the first detection was empty in earlier looks.
         position: Mean of the measured positions since the last possible move `(3,)` [m].
         standard_error: Standard error of `position` along each axis [m].
         bias_std: Standard deviation of the systematic error of `position` along each axis [m].
         was_moved: True if the item was detected after a possible move.
         change_count: Number of changes of the table before the last detection.
-        frame: Id of the frame of the last detection.
+        frame_id: Number of the frame of the last detection.
         stamp: Capture time of the last detection [s].
         confidence: Confidence of the last detection, 0 to 1.
         state: State of the item.
         bin: Name of the bin that contains the item, or "".
         reason: Reason of the state, or "".
         attempt_count: Number of failed attempts to pick the item.
-        empty_probe_count: Number of descents to the position of the item that touched nothing above the
-            table, since its last move or touch.
-        had_contact: True if the tool has touched the item, at any height.
-        touched_label: Class at whose height the tool has last touched the item, or "".
-        low_touch_count: Number of touches below the height of its class since the last touch at this height.
-        contradiction_count: Number of looks with evidence against its class, since the last possible move.
-        last_contradiction: Last evidence against the class besides the detector's confidence, or "".
+        empty_probe_count: Number of descents that touched only the table, since the last move or touch.
+        had_contact: True if the tool has touched the item at any height.
+        touched_label: Class whose height the last touch confirmed, or "".
+        low_touch_count: Number of touches below the height of the class, since the last confirmed height.
+        contradiction_count: Number of looks that contradict the class, since the last possible move.
+        last_contradiction: Sentence with the last evidence of size or height against the class, or "".
         bin_log_odds: Log odds, by bin, that the dropped item lies in the bin.
         is_untracked: True if the tool may have moved the item while the journal was incomplete.
     """
@@ -95,13 +94,13 @@ class Record:
     first_position: Array
     first_change_count: int
     first_stamp: float
-    appeared_during_run: bool
+    has_appeared: bool
     position: Array = field(init=False)
     standard_error: float = math.inf
     bias_std: float = 0.0
     was_moved: bool = False
     change_count: int = 0
-    frame: int = 0
+    frame_id: int = 0
     stamp: float = 0.0
     confidence: float = 0.0
     state: State = State.SEEN
@@ -129,32 +128,38 @@ class Record:
     def target(self) -> Target:
         """The item as the target that skills receive."""
         return Target(
-            self.item, self.label, self.position, self.confidence, self.frame, self.change_count, self.stamp
+            self.item,
+            self.label,
+            self.position,
+            self.confidence,
+            self.frame_id,
+            self.change_count,
+            self.stamp,
         )
 
     @property
-    def summary(self) -> ItemChanged:
-        """Event with the present state of the item; its position is rounded to 0.1 mm."""
+    def event(self) -> ItemChanged:
+        """Event with the current state of the item, and with the position rounded to 0.1 mm."""
         return ItemChanged(
             self.item, self.label, self.state.value, round_values(self.position, 4),
             self.belief.look_count, self.attempt_count, self.bin, self.reason,
         )  # fmt: skip
 
     def distance_to(self, position: Array) -> float:
-        """Return the distance [m] between the item and a position `(3,)` [m]."""
+        """Return the distance [m] of the item from a position `(3,)` [m]."""
         return float(np.linalg.norm(self.position - position))
 
     def set_state(self, state: State, reason: str) -> None:
         """Set the state and its reason."""
         self.state, self.reason = state, reason
 
-    def discard_answers(self) -> None:
-        """Discard the classes that earlier looks detected, because a moved item gets independent errors."""
+    def forget_viewpoints(self) -> None:
+        """Forget the viewpoints of earlier looks: looks at a moved item do not repeat their errors."""
         self.belief.last_label_by_viewpoint.clear()
         self.belief.repeat_count = self.contradiction_count = 0
 
     def update_position(self, position: Array, std: float, *, is_settled: bool) -> None:
-        """Update the position: average the measurement with earlier ones, or replace them after a move.
+        """Update the position with a measurement, which replaces earlier measurements after a move.
 
         Args:
             position: Measured position `(3,)` [m].
@@ -176,22 +181,22 @@ class Record:
         self.belief.miss_probability = 1.0
 
     def observe(self, observation: Observation, frame: Frame, bias_std: float, *, is_settled: bool) -> None:
-        """Update the position with an observation, and record the frame of the last detection.
+        """Update the position with an observation, and the data of the last detection with its frame.
 
         `bias_std` is the standard deviation of the systematic error along each axis [m]; `is_settled` is True
         if the item cannot have moved since its last detection.
         """
         self.update_position(observation.position, observation.std, is_settled=is_settled)
         self.bias_std, self.confidence = bias_std, observation.detection.confidence
-        self.change_count, self.frame, self.stamp = frame.epoch, frame.id, frame.stamp
+        self.change_count, self.frame_id, self.stamp = frame.change_count, frame.id, frame.stamp
 
     def merge(self, new: Record) -> None:
-        """Add the evidence and the position of `new`, an added item that is this item after a move."""
+        """Add the evidence and the position of `new`, which is the same object after a move."""
         self.belief.merge(new.belief)
         self.empty_probe_count = 0
         self.position, self.standard_error = new.position, new.standard_error
-        self.change_count, self.frame, self.stamp = new.change_count, new.frame, new.stamp
-        # `first_position` remains the position before the fall or the push.
+        self.change_count, self.frame_id, self.stamp = new.change_count, new.frame_id, new.stamp
+        # `first_position` stays the position before the move.
         self.was_moved, self.confidence = True, new.confidence
         if self.state is State.PHANTOM:
             self.belief.log_odds, self.reason = new.belief.log_odds, ""

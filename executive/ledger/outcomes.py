@@ -1,4 +1,4 @@
-"""Final states of the items at the end of a run, and a check that their counts add up."""
+"""Final states of the items at the end of a run, and their counts."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from executive.ledger.item import (
 )
 
 MIN_EMPTY_PROBES = 3
-"""Minimum number of descents that touch only the table at an item's position before it is a phantom."""
+"""Minimum number of descents that touched only the table (`Record.empty_probe_count`) at a phantom."""
 FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
-"""Final states of real objects; an item without an object of its own ends as PHANTOM."""
+"""Final states of items that exist; other items end as PHANTOM."""
 
 
 def find_final_state(
@@ -30,22 +30,22 @@ def find_final_state(
 
     1. An item in the tool is rejected.
     2. An item with low-confidence detections only, which no look has missed, is rejected.
-    3. An item whose probability of existence is below 0.5 is a phantom. So is an item if the tool reached the
-       table at the item's position without a contact at least `MIN_EMPTY_PROBES` times, never touched the
-       item, and touched another item.
-    4. A dropped item that the tool may have moved while the journal was incomplete is rejected. Any other
-       dropped item, and an item that looks have missed repeatedly, is lost.
-    5. An item without a route is skipped.
-    6. If the mission was completed, a certain item without contradiction and failed attempt is skipped: a
-       quota was reached, or the operator quit.
-    7. Any other item is rejected.
+    3. An item whose probability of existence is below 0.5 is a phantom.
+    4. An item that the tool never touched in at least `MIN_EMPTY_PROBES` descents to the table is a phantom,
+       if the tool has touched another item at the expected height.
+    5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
+    6. Any other dropped item, and an item on the table whose position is empty, is lost.
+    7. An item without a route is skipped.
+    8. If the mission was completed, a certain item without a failed attempt or a contradiction is skipped,
+       because a quota was reached or the operator quit.
+    9. Any other item is rejected.
 
     Args:
         record: The item.
-        certainty: Rules for certain items.
+        certainty: Thresholds of the evidence for a certain item.
         has_route: True if the mission has a bin for the item's class.
         is_completed: True if the behaviour tree succeeded.
-        has_touched_item: True if the tool has touched any item at the height of the item's class.
+        has_touched_item: True if the tool has touched any item at the height of its class.
     """
     belief = record.belief
     if record.state is State.HELD:
@@ -57,8 +57,8 @@ def find_final_state(
     if belief.existence_probability < 0.5:
         return State.PHANTOM, REASON_NOT_FOUND
     if record.empty_probe_count >= MIN_EMPTY_PROBES and has_touched_item and not record.had_contact:
-        reason = f"the tool found only the table at its position, {record.empty_probe_count} times"
-        return State.PHANTOM, reason
+        count = record.empty_probe_count
+        return State.PHANTOM, f"the tool found only the table at its position, {count} times"
     if record.state is State.DROPPED and record.is_untracked:
         return State.REJECTED, REASON_UNTRACKED
     if record.state is State.DROPPED or certainty.is_position_empty(record):
@@ -74,33 +74,28 @@ def find_final_state(
 
 
 def discard_moved_items(records: Collection[Record], dropped: Collection[Record]) -> list[Record]:
-    """Set each lost item that a person moved, and that is another item now, to PHANTOM; return the phantoms.
+    """Set lost items that a person has moved elsewhere to PHANTOM, and return the phantoms.
 
-    The other item certainly exists, has the same class, and appeared at an empty position after the last
-    detection of the lost item. Each other item explains one lost item. Items in `dropped` never count as
-    moved: the tool held them after their last detection, so that the other item may have appeared before.
+    A lost item counts as moved if a new item of the same class appeared at an empty position after the last
+    detection of the lost item. A new item must certainly exist, and explains one lost item. An item in
+    `dropped` is never moved by a person, because the tool held the item after its last detection.
     """
-    appeared = [
-        record
-        for record in records
-        if record.appeared_during_run and record.belief.is_proved and record.state in FINAL_STATES
-    ]
+    proved = (record for record in records if record.belief.is_proved and record.state in FINAL_STATES)
+    new_items = [record for record in proved if record.has_appeared]
     phantoms = []
-    for old in records:
-        if old.state is State.LOST and old not in dropped:
-            matches = (new for new in appeared if new.label == old.label and new.first_stamp > old.stamp)
-            if new := next(matches, None):
-                old.set_state(State.PHANTOM, f"it is {new.item}")
-                appeared.remove(new)
-                phantoms.append(old)
+    for lost in (record for record in records if record.state is State.LOST and record not in dropped):
+        matches = (new for new in new_items if new.label == lost.label and new.first_stamp > lost.stamp)
+        if new := next(matches, None):
+            lost.set_state(State.PHANTOM, f"it is {new.item}")
+            new_items.remove(new)
+            phantoms.append(lost)
     return phantoms
 
 
 def discard_rejected_items(records: Iterable[Record]) -> list[Record]:
     """Set each rejected or skipped item to PHANTOM, and return these items.
 
-    A person may have moved the objects before the run is resumed. The next look adds new items for them,
-    without the earlier evidence.
+    The next look adds a new item, without evidence, for each object that is still on the table.
     """
     phantoms = [record for record in records if record.state in (State.REJECTED, State.SKIPPED)]
     for record in phantoms:
@@ -109,7 +104,7 @@ def discard_rejected_items(records: Iterable[Record]) -> list[Record]:
 
 
 def count_states(records: Iterable[Record]) -> dict[str, int]:
-    """Return item counts: `seen` (no phantoms), `placed`, `rejected`, `skipped`, `lost` and `phantom`."""
+    """Return the number of items in each final state, and of all items except phantoms (`seen`)."""
     counts = Counter(record.state for record in records)
     return {
         "seen": sum(counts.values()) - counts[State.PHANTOM],

@@ -42,40 +42,40 @@ class Records:
             raise Fault(f'the ledger knows no item "{item}"; it knows: {known}') from None
 
     def add(
-        self, belief: Belief, position: Array, change_count: int, stamp: float, *, appeared_during_run: bool
+        self, belief: Belief, position: Array, change_count: int, stamp: float, *, has_appeared: bool
     ) -> Record:
-        """Add an item with the name `<class>-<number>` at a position `(3,)` [m], and return its record.
+        """Add an item with the name `<class>-<number>` and return its record.
 
-        `change_count` is the number of changes of the table before the first detection, `stamp` the time of
-        the detection [s]; `appeared_during_run` is True if earlier looks had found the position empty.
+        `position` `(3,)` [m], `change_count` and `stamp` [s] are values of the first detection.
         """
         label = belief.first_label
         self._name_counts[label] += 1
         name = f"{label}-{self._name_counts[label]}"
-        record = Record(name, belief, position, change_count, stamp, appeared_during_run)
+        record = Record(name, belief, position, change_count, stamp, has_appeared)
         self._records[name] = record
         return record
 
     def remove(self, record: Record) -> None:
-        """Remove an item; no event may have reported the item before."""
+        """Remove an item that no event has reported yet."""
         del self._records[record.item]
 
-    def emit_item(self, record: Record) -> None:
-        """Emit the present state of an item as an event."""
-        self._emit(record.summary)
+    def emit(self, *records: Record) -> None:
+        """Emit the current state of each given item as an event."""
+        for record in records:
+            self._emit(record.event)
 
     def change_state(self, record: Record, state: State) -> None:
         """Set the state of an item, and emit the item."""
         record.state = state
-        self.emit_item(record)
+        self.emit(record)
 
-    def set_placed(self, record: Record, bin: str) -> None:
-        """Set the state of an item to PLACED in the bin with the name `bin`."""
-        record.bin = bin
+    def set_placed(self, record: Record, bin_name: str) -> None:
+        """Set the state of an item to PLACED in a bin, and emit the item."""
+        record.bin = bin_name
         self.change_state(record, State.PLACED)
 
     def reject(self, record: Record, reason: str) -> None:
-        """Reject an item; a held or dropped item keeps its state until it lies on the table again."""
+        """Reject an item; a held or dropped item keeps its state until a look shows the item on the table."""
         record.reason = f"{reason}: {record.last_contradiction}" if record.last_contradiction else reason
         is_off_table = record.state in (State.HELD, State.DROPPED)
         self.change_state(record, record.state if is_off_table else State.REJECTED)

@@ -14,7 +14,7 @@ from executive.ledger.records import Records
 
 
 class Recovery:
-    """Search, on the table and in the bins, for items that the tool may have moved without a record.
+    """Search for items on the table and in the bins after actions of the tool that the journal lacks.
 
     Args:
         records: All items.
@@ -23,7 +23,7 @@ class Recovery:
 
     def __init__(self, records: Records, bins: BinContents) -> None:
         self._records, self._bins = records, bins
-        self._label_counts_by_bin: dict[str, list[Counter[str]]] = defaultdict(list)
+        self._counts_by_bin: dict[str, list[Counter[str]]] = defaultdict(list)
         """Number of visible objects of each class, by bin, in each look that shows the whole bin."""
 
     def mark_as_dropped(self, records: Collection[Record], change_count: int) -> None:
@@ -36,48 +36,49 @@ class Recovery:
             record.bin_log_odds.clear()
             self._records.change_state(record, State.DROPPED)
 
-    def add_look(self, look: Detections, bin_by_observation: Mapping[Observation, str | None]) -> None:
+    def add_look(self, look: Detections, bin_names: Mapping[Observation, str | None]) -> None:
         """Count the objects in each bin whose whole floor is visible in a look.
 
         Args:
             look: Detections in a whole image.
-            bin_by_observation: Name of the bin in which each observed object lies, or None.
+            bin_names: Name of the bin in which each observed object lies, or None.
         """
         for name in self._bins.bins:
             if self._bins.is_floor_visible(name, look):
-                inside = (seen for seen, bin in bin_by_observation.items() if bin == name and seen.confident)
-                self._label_counts_by_bin[name].append(Counter(seen.detection.label for seen in inside))
+                in_bin = [observation for observation in bin_names if bin_names[observation] == name]
+                labels = (observation.detection.label for observation in in_bin if observation.confident)
+                self._counts_by_bin[name].append(Counter(labels))
 
     def record_bin_contents(self, change_count: int) -> None:
-        """Record a placed or rejected item for each object in a bin that is no known item of the bin.
+        """Record a placed or rejected item for each unknown object in a bin.
 
         `change_count` is the number of changes of the table so far.
         """
-        for label, bin in self._find_unknown_objects():
-            untracked = (item for item in self._records if item.state is State.DROPPED and item.is_untracked)
-            record = next((item for item in untracked if item.label == label), None)
+        for label, bin_name in self._find_unknown_objects():
+            untracked = (record for record in self._records if record.is_untracked and record.label == label)
+            record = next((record for record in untracked if record.state is State.DROPPED), None)
             if record is None:
                 belief = Belief(label, LOG_ODDS_OF_PROOF, is_proved=True)
-                position = self._bins.bins[bin].position
-                record = self._records.add(belief, position, change_count, 0.0, appeared_during_run=True)
-            if bin in self._bins.routes.get(label, ()):
+                position = self._bins.bins[bin_name].position
+                record = self._records.add(belief, position, change_count, 0.0, has_appeared=True)
+            if bin_name in self._bins.routes.get(label, ()):
                 record.reason = "found in the bin when the run was resumed"
-                self._records.set_placed(record, bin)
+                self._records.set_placed(record, bin_name)
             else:
-                self._records.reject(record, f"found in {bin} when the run was resumed")
+                self._records.reject(record, f"found in {bin_name} when the run was resumed")
 
     def _find_unknown_objects(self) -> Iterator[tuple[str, str]]:
-        """Yield class and bin of each object in a bin that is no known item of the bin.
+        """Yield class and bin name of each object in a bin that is not an item of the ledger.
 
-        The number of visible objects is the median over the looks. Classes with a route to the bin come
-        first, because a look may show a known item with a wrong class.
+        The number of visible objects is the median over the looks. If known items were detected with wrong
+        classes, the objects of permitted classes are the unknown objects.
         """
-        for bin, looks in self._label_counts_by_bin.items():
+        for bin_name, looks in self._counts_by_bin.items():
             counts = {label: median_low(look[label] for look in looks) for label in set().union(*looks)}
-            unknown_count = sum(counts.values()) - self._bins.count_objects_in(bin, self._records)
-            permitted = {label for label in counts if bin in self._bins.routes.get(label, ())}
-            for label in [*sorted(permitted), *sorted(counts.keys() - permitted)]:
-                known_count = sum(item.bin == bin and item.label == label for item in self._records)
+            unknown_count = sum(counts.values()) - self._bins.count_objects_in(bin_name, self._records)
+            forbidden = {label for label in counts if bin_name not in self._bins.routes.get(label, ())}
+            for label in sorted(counts, key=lambda label: (label in forbidden, label)):
+                known_count = sum((item.label, item.bin) == (label, bin_name) for item in self._records)
                 count = max(min(counts[label] - known_count, unknown_count), 0)
                 unknown_count -= count
-                yield from [(label, bin)] * count
+                yield from [(label, bin_name)] * count

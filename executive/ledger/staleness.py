@@ -1,4 +1,4 @@
-"""Staleness of positions: record of the robot's changes of the table, which may have moved objects."""
+"""Staleness of positions: record of the actions of the robot that may have moved objects on the table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.ledger.item import Record
 class Staleness:
     """Changes of the table in chronological order, numbered from 1.
 
-    The methods ignore the first `change_count` changes, which happened before a given look.
+    The parameter `change_count` is the number of changes before a look; later changes may have moved objects.
     """
 
     def __init__(self) -> None:
@@ -35,9 +35,9 @@ class Staleness:
 
     def is_unchanged(self, position: Array, change_count: int) -> bool:
         """Return True if no change after `change_count` may have moved an object at `position` `(3,)` [m]."""
-        return self.find_change(position, change_count) is None
+        return self.find_change_number(position, change_count) is None
 
-    def find_change(self, position: Array, change_count: int) -> int | None:
+    def find_change_number(self, position: Array, change_count: int) -> int | None:
         """Return the number of the first change after `change_count` near `position` `(3,)` [m], or None."""
         for number, (centre, radius) in enumerate(self._changes[change_count:], change_count + 1):
             if float(np.linalg.norm(centre[:2] - position[:2])) <= radius:

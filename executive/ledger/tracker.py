@@ -1,4 +1,4 @@
-"""Tracker of all items: it records looks and actions of the robot, and answers the queries of skills."""
+"""Tracker of all items: record of looks and actions of the robot, and answers to queries of skills."""
 
 from __future__ import annotations
 
@@ -17,17 +17,12 @@ from executive.cell.protocols import Routes
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
+from executive.ledger import outcomes
 from executive.ledger.bin_contents import BinContents, find_probable_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, Record, State
 from executive.ledger.look import LookUpdate, make_look_event
-from executive.ledger.outcomes import (
-    count_states,
-    discard_moved_items,
-    discard_rejected_items,
-    find_final_state,
-)
 from executive.ledger.records import Records
 from executive.ledger.recovery import Recovery
 from executive.ledger.staleness import Staleness
@@ -48,28 +43,23 @@ class Tracker:
         labels_with_unique_height: Classes whose height distinguishes them from all others.
 
     Attributes:
-        unknown: Largest number of boxes in one look for each label that is not in the cell file.
-        assumption_reasons: Reasons for assumed (not measured) error rates of detectors, one of each kind.
+        unknown_labels: Maximum number of boxes in one look, by label that is not in the cell file.
+        assumption_reasons: Reasons for which error rates of detectors are assumed instead of measured.
     """
 
     def __init__(
-        self,
-        config: LedgerConfig,
-        table: TableConfig,
-        bins: Mapping[str, Bin],
-        routes: Routes,
-        emit: Emit,
+        self, config: LedgerConfig, table: TableConfig, bins: Mapping[str, Bin], routes: Routes, emit: Emit,
         labels_with_unique_height: Collection[str] = (),
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._config, self._routes, self._emit = config, routes, emit
         self._records = Records(emit)
         self._certainty = Certainty(config, labels_with_unique_height)
         self._bins = BinContents(config, bins, routes)
         self._coverage, self._staleness = Coverage(table), Staleness()
         self._recovery: Recovery | None = None
-        """Search for untracked items, from `lose_track` to `record_bin_contents`, or None."""
+        """Search for untracked items between `lose_track` and `record_bin_contents`, otherwise None."""
         self._last_frame_id = 0
-        self.unknown: Counter[str] = Counter()
+        self.unknown_labels: Counter[str] = Counter()
         self.assumption_reasons: list[str] = []
 
     @property
@@ -78,18 +68,19 @@ class Tracker:
         return list(self._records)
 
     @property
-    def epoch(self) -> int:
-        """Number of changes of the table by the robot."""
+    def change_count(self) -> int:
+        """Number of actions of the robot so far that may have moved objects on the table."""
         return self._staleness.change_count
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
         """Update all items with the detections in one frame, and return the targets."""
         frame = detections.frame
-        self.unknown |= Counter(detection.label for detection in detections.unknown)
-        # The numbers after the colon of a message differ between frames, so one message per kind is kept.
-        kind = detections.error_rates.assumption_reason.partition(":")[0]
-        if kind and not any(reason.startswith(kind) for reason in self.assumption_reasons):
-            self.assumption_reasons.append(detections.error_rates.assumption_reason)
+        self.unknown_labels |= Counter(detection.label for detection in detections.unknown)
+        # A reason is stored once, although the numbers after its colon differ between frames.
+        reason = detections.error_rates.assumption_reason
+        reason_start = reason.partition(":")[0]
+        if reason and not any(known.startswith(reason_start) for known in self.assumption_reasons):
+            self.assumption_reasons.append(reason)
         if frame.id != self._last_frame_id:
             self._last_frame_id = frame.id
             self._update(detections, observations)
@@ -99,46 +90,37 @@ class Tracker:
 
     def find_targets(self) -> Sequence[Target]:
         """Return a target for each item in the state SEEN that cannot have moved since its last detection."""
-        return [
-            record.target
-            for record in self.records
-            if record.state is State.SEEN and self._staleness.is_settled(record)
-        ]
+        settled = [record for record in self.records if self._staleness.is_settled(record)]
+        return [record.target for record in settled if record.state is State.SEEN]
 
     def find_objects_on_table(self) -> Sequence[Target]:
         """Return all items that lie on the table with a probability of at least 0.5."""
-        return [
-            record.target
-            for record in self.records
-            if record.state in ON_TABLE
-            and record.belief.existence_probability >= 0.5
-            and not self._certainty.is_position_empty(record)
-        ]
+        on_table = [record for record in self.records if record.state in ON_TABLE]
+        probable = [record for record in on_table if record.belief.existence_probability >= 0.5]
+        return [record.target for record in probable if not self._certainty.is_position_empty(record)]
 
     def find_uncertain_items(self) -> Sequence[Item]:
-        """Return the unsorted items in the workspace that need another look to become certain."""
-        return [
-            record.item
-            for record in self.records
-            if self._certainty.may_be_on_table(record)
-            and self._coverage.is_in_workspace(record.position)
-            and not (self._certainty.is_certain(record) and self._staleness.is_settled(record))
-        ]
+        """Return the items to be sorted in the workspace that another look may confirm or refute."""
+        on_table = [record for record in self.records if self._certainty.may_be_on_table(record)]
+        in_workspace = [record for record in on_table if self._coverage.is_in_workspace(record.position)]
+        settled = [record for record in in_workspace if self._staleness.is_settled(record)]
+        certain = [record for record in settled if self._certainty.is_certain(record)]
+        return [record.item for record in in_workspace if record not in certain]
 
     def find_held_item(self) -> Item | None:
         """Return the item in the tool, or None."""
         return next((record.item for record in self.records if record.state is State.HELD), None)
 
     def is_current(self, frame: Frame) -> bool:
-        """Return True if no change after the capture of a frame may have moved objects on the whole table."""
-        return self._staleness.is_table_unchanged(frame.epoch)
+        """Return True if the robot cannot have moved all objects since the capture of a frame."""
+        return self._staleness.is_table_unchanged(frame.change_count)
 
     def is_fresh(self, target: Target) -> bool:
-        """Return True if no change after the last detection of a target may have moved it."""
-        return self._staleness.is_unchanged(target.position, target.epoch)
+        """Return True if the robot cannot have moved a target since its last detection."""
+        return self._staleness.is_unchanged(target.position, target.change_count)
 
     def is_open(self, item: Item) -> bool:
-        """Return True if an item is on the table or dropped, and not rejected."""
+        """Return True if an item is still to be sorted: on the table or dropped, and not rejected."""
         record = self._records.find(item)
         return record.state in (State.SEEN, State.DROPPED) and not record.reason
 
@@ -147,12 +129,12 @@ class Tracker:
         return self._certainty.is_certain(self._records.find(item))
 
     def is_table_empty(self, label: str | None = None) -> bool:
-        """Return True if the visible table is almost certainly empty, except for objects without a route.
+        """Return True if almost certainly no object with a route is visible on the table.
 
-        If `label` is given, only objects of this class count.
+        `label` is the class of the counted objects; None: all classes with a route.
         """
         return self._coverage.max_object_probability <= self._config.max_miss_probability and not any(
-            # An item without a confident detection counts for every class, because its class is uncertain.
+            # An item without a confident detection counts as an object of every class.
             ((record.label in self._routes and label in (None, record.label)) or not record.belief.look_count)
             and self._certainty.may_be_on_table(record)
             and self._coverage.is_visible(record.position)
@@ -174,8 +156,8 @@ class Tracker:
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
         """Record a touch, which proves that an item exists; return False if the touch contradicts its class.
 
-        After a touch at the height of the class, no other height contradicts the class, because the item may
-        have fallen over. If `may_miss_top` is True, the tool may have touched the item below its top.
+        An item that has been touched at the height of its class may fall over later, so that a touch at
+        another height is no contradiction. `may_miss_top` is True if the tool may have missed the top.
         """
         record = self._records.find(item)
         record.belief.is_proved, record.had_contact, record.empty_probe_count = True, True, 0
@@ -186,26 +168,26 @@ class Tracker:
                 return True
             record.last_contradiction = contradiction
             self._invalidate_near(record.position, self._config.neighbourhood)
-            self._records.emit_item(record)
+            self._records.emit(record)
             return False
         return True
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
         """Record a failed attempt to pick an item, which may have moved any object.
 
-        `found_table` is True if the tool descended almost to the table at the item without a contact.
+        `found_table` is True if the descent to the item touched nothing above the table.
         """
         record = self._records.find(item)
         record.attempt_count += 1
         record.empty_probe_count += found_table
         self.invalidate_positions()
-        self._records.emit_item(record)
+        self._records.emit(record)
 
     def record_grasp(self, item: Item) -> None:
         """Record that the tool holds an item, and that the grasp may have moved neighbouring objects.
 
         Raises:
-            Fault: The tool holds another item, because no skill has recorded the release of that item.
+            Fault: By the ledger, the tool still holds another item.
         """
         if (other := self.find_held_item()) not in (None, item):
             raise Fault(
@@ -224,7 +206,7 @@ class Tracker:
         self._records.change_state(record, State.DROPPED)
         self._bins.set_prior_log_odds(record, landing)
         record.attempt_count += 1
-        record.change_count = self.epoch
+        record.change_count = self.change_count
         self.invalidate_positions()
 
     def record_placement(self, item: Item, bin: str) -> None:
@@ -238,14 +220,14 @@ class Tracker:
         """Record that an item was put down at `position` `(3,)` [m]; a look must confirm the position."""
         record = self._records.find(item)
         record.update_position(position, self._config.gate, is_settled=False)
-        record.change_count = self.epoch
+        record.change_count = self.change_count
         self._records.change_state(record, State.REJECTED if record.reason else State.SEEN)
         self.invalidate_positions()
 
     def reject(self, item: Item, reason: str) -> None:
-        """Reject an item: no skill selects the item again.
+        """Reject an item, so that no skill selects the item again.
 
-        A held item stays HELD until its release, and a dropped item stays DROPPED until a look detects it.
+        A held item stays HELD until its release, a dropped item DROPPED until its detection.
         """
         self._records.reject(self._records.find(item), reason)
 
@@ -254,34 +236,28 @@ class Tracker:
         self._invalidate_near(np.zeros(3), math.inf)
 
     def lose_track(self) -> None:
-        """Record that the tool may have moved any item that is not in a bin."""
+        """Record that the tool may have moved any item outside of the bins."""
         self._recovery = Recovery(self._records, self._bins)
         self._mark_as_dropped([item for item in self._records if item.state in (State.HELD, State.DROPPED)])
 
     def mark_unseen_as_dropped(self) -> None:
         """Set each item on the table that no look has detected since `lose_track` to DROPPED."""
-        self._mark_as_dropped(
-            [
-                record
-                for record in self.records
-                if record.state is State.SEEN
-                and record.belief.existence_probability >= 0.5
-                and not self._staleness.is_settled(record)
-            ]
-        )
+        seen = [record for record in self.records if record.state is State.SEEN]
+        probable = [record for record in seen if record.belief.existence_probability >= 0.5]
+        self._mark_as_dropped([record for record in probable if not self._staleness.is_settled(record)])
 
     def record_bin_contents(self) -> None:
         """Record an item for each unknown object in a bin, according to the looks since `lose_track`."""
         recovery, self._recovery = self._recovery, None
         assert recovery is not None, "the contents of bins are recorded after `lose_track`"
-        recovery.record_bin_contents(self.epoch)
+        recovery.record_bin_contents(self.change_count)
 
     def close(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the behaviour tree succeeded."""
         has_touched_item = any(record.touched_label for record in self.records)
         dropped = [record for record in self.records if record.state is State.DROPPED]
         for record in self.records:
-            final_state = find_final_state(
+            final_state = outcomes.find_final_state(
                 record, self._certainty, has_route=record.label in self._routes, is_completed=completed,
                 has_touched_item=has_touched_item,
             )  # fmt: skip
@@ -289,43 +265,41 @@ class Tracker:
                 record.bin, final_state = bin, (State.PLACED, "it probably fell into the bin")
             if final_state is not None:
                 record.set_state(*final_state)
-                self._records.emit_item(record)
-        for record in discard_moved_items(self.records, dropped):
-            self._records.emit_item(record)
+                self._records.emit(record)
+        self._records.emit(*outcomes.discard_moved_items(self.records, dropped))
 
     def reopen(self) -> None:
-        """Discard the items that were left on the table; the next look adds their objects again."""
-        for record in discard_rejected_items(self.records):
-            self._records.emit_item(record)
+        """Discard the items on the table; the next look adds a new item for each visible object."""
+        self._records.emit(*outcomes.discard_rejected_items(self.records))
 
     def count_states(self) -> dict[str, int]:
-        """Return item counts: `seen` (no phantoms), `placed`, `rejected`, `skipped`, `lost` and `phantom`."""
-        return count_states(self.records)
+        """Return the number of items in each final state, and of all items except phantoms (`seen`)."""
+        return outcomes.count_states(self.records)
 
-    def summaries(self) -> Sequence[ItemChanged]:
-        """Return the present state of each item, in the order of the first detection."""
-        return [record.summary for record in self.records]
+    def list_items(self) -> Sequence[ItemChanged]:
+        """Return the current state of each item, in the order of the first detection."""
+        return [record.event for record in self.records]
 
     def _update(self, detections: Detections, observations: Sequence[Observation]) -> None:
         """Update the items on the table and the dropped items with the observations of a look."""
         bias_std = detections.error_rates.bias
-        bin_by_observation = {key: self._bins.find_bin(key, bias_std, self.records) for key in observations}
+        bin_names = {entry: self._bins.find_bin_name(entry, bias_std, self.records) for entry in observations}
         update = LookUpdate(self._config, self._records, self._coverage, self._staleness, detections)
-        for record in update.apply([key for key, bin in bin_by_observation.items() if bin is None]):
+        for record in update.apply([entry for entry, bin_name in bin_names.items() if bin_name is None]):
             self._certainty.reject_if_uncertain(record, is_settled=self._staleness.is_settled(record))
-            self._records.emit_item(record)
+            self._records.emit(record)
         if detections.view == "full" and self._recovery is not None:
-            self._recovery.add_look(detections, bin_by_observation)
+            self._recovery.add_look(detections, bin_names)
         elif detections.view == "full":
-            for record in self._bins.place_dropped_items(detections, bin_by_observation, self.records):
-                self._records.emit_item(record)
+            self._records.emit(*self._bins.place_dropped_items(detections, bin_names, self.records))
 
     def _mark_as_dropped(self, records: Collection[Record]) -> None:
+        """Set items to DROPPED, so that later looks search for them on the table and in the bins."""
         assert self._recovery is not None, "items are marked as dropped after `lose_track`"
-        self._recovery.mark_as_dropped(records, self.epoch)
+        self._recovery.mark_as_dropped(records, self.change_count)
         self.invalidate_positions()
 
     def _invalidate_near(self, centre: Array, radius: float) -> None:
         """Record that any object within `radius` [m] of `centre` `(3,)` [m] may have been moved."""
         self._staleness.record_change(centre, radius)
-        self._coverage.reset_near(centre, radius, self.epoch)
+        self._coverage.reset_near(centre, radius, self.change_count)

@@ -22,7 +22,7 @@ class MountedCamera:
         config: Section of the camera in the cell file.
         get_flange_pose: Function that returns the pose `X_WF` of the flange, the mount of a wrist camera.
         clock: Clock of the run, for the capture times of frames.
-        get_epoch: Function that returns the version of the scene (`Ledger.epoch`).
+        get_change_count: Function that returns the number of changes of the table (`Ledger`).
 
     Attributes:
         name: Name of the camera in the cell file.
@@ -36,9 +36,9 @@ class MountedCamera:
         config: CameraConfig,
         get_flange_pose: Callable[[], Pose],
         clock: Clock,
-        get_epoch: Callable[[], int] = lambda: 0,
+        get_change_count: Callable[[], int] = lambda: 0,
     ) -> None:
-        self.name, self.config, self._clock, self._get_epoch = name, config, clock, get_epoch
+        self.name, self.config, self._clock, self._get_change_count = name, config, clock, get_change_count
         self.matrix, self._X_MC = compute_calibration(config)
         self._get_flange_pose = get_flange_pose
         self._frame_count = self._pose_count = 0
@@ -71,7 +71,7 @@ class MountedCamera:
             X_WC=X_WC,
             stamp=self._clock.now,
             visible=self._compute_visibility_mask(X_WC),
-            epoch=self._get_epoch(),
+            change_count=self._get_change_count(),
         )
 
     def _capture_images(self) -> tuple[NDArray[np.uint8], Array | None]:

@@ -191,7 +191,7 @@ class RecordedRun:
             held_item=outcome.held_item,
             seed=seed,
             items=ItemCounts(**item_counts),
-            unknown_labels=accounts.unknown,
+            unknown_labels=accounts.unknown_labels,
             assumption_reasons=accounts.assumption_reasons,
             is_table_empty=outcome.is_table_empty,
             audit=None if audit is None else make_audit(item_counts, audit, outcome.is_table_empty),

@@ -64,7 +64,7 @@ def encode_frame(frame: Frame) -> dict[str, Any]:
         "matrix": frame.matrix.tolist(),
         "X_WC": encode_pose(frame.X_WC),
         "stamp": frame.stamp,
-        "epoch": frame.epoch,
+        "change_count": frame.change_count,
         "visible": _encode_mask(frame.visible),
         "size": list(frame.visible.shape),
     }
@@ -84,7 +84,7 @@ def decode_frame(value: Any) -> Frame:
         X_WC=decode_pose(value["X_WC"]),
         stamp=value["stamp"],
         visible=_decode_mask(value["visible"], height, width),
-        epoch=value["epoch"],
+        change_count=value["change_count"],
     )
 
 

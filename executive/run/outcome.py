@@ -55,7 +55,7 @@ def check_items(accounts: Accounts) -> LoopEnd:
 
     The status is FAILURE if items were lost, else INCOMPLETE if items were rejected, else SUCCESS.
     """
-    items = accounts.summaries()
+    items = accounts.list_items()
     if lost := [item.item for item in items if item.state == "lost"]:
         message = f"{len(lost)} object(s) were lost and not found again: {', '.join(lost)}"
         return LoopEnd("FAILURE", "lost", message)

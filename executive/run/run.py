@@ -163,7 +163,7 @@ class Run:
     def _store_table_state(self) -> None:
         """Store whether the table is empty by the ledger, and no look showed an undeclared label."""
         ledger = self._context.cell.ledger
-        self._is_table_empty = ledger.is_table_empty() and not ledger.unknown
+        self._is_table_empty = ledger.is_table_empty() and not ledger.unknown_labels
 
     def _make_run_ended(self, loop_end: LoopEnd) -> RunEnded:
         """Return the last event of the run; if the tree succeeded, the items determine the status."""

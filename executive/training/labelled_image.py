@@ -56,7 +56,7 @@ class LabelledImage:
             X_WC=Pose.of(self.truth["X_WC"][:3], self.truth["X_WC"][3:]) if is_known else Pose.identity(),
             stamp=0.0,
             visible=np.ones(self.image.shape[:2], np.bool_),
-            epoch=0,
+            change_count=0,
         )
 
     def is_fully_inside(self, index: int) -> bool:

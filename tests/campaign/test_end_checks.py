@@ -78,6 +78,6 @@ def test_a_journal_with_another_end_than_the_run_is_reported() -> None:
 def test_the_held_item_must_be_named(holding: bool, statuses: str, problem: list[str]) -> None:
     workcell: Any = SimpleNamespace(
         cell=SimpleNamespace(tool=SimpleNamespace(holding=holding)),
-        accounts=SimpleNamespace(summaries=lambda: [item_changed("cube_1")]),
+        accounts=SimpleNamespace(list_items=lambda: [item_changed("cube_1")]),
     )
     assert list(check_held_item(replace(HALTED, held_item=statuses), workcell)) == problem

@@ -21,7 +21,7 @@ EYE = ErrorRates(threshold=0.5, miss_rate=0.03, confusion_rate=0.004, false_dete
 Thing = tuple[str, float, float]
 
 
-def take_frame(number: int = 1, epoch: int = 0, hidden: slice = slice(0, 0)) -> Frame:
+def take_frame(number: int = 1, change_count: int = 0, hidden: slice = slice(0, 0)) -> Frame:
     """A frame from above; the columns `hidden` of the image are behind the arm."""
     visible = np.ones((480, 640), bool)
     visible[:, hidden] = False
@@ -30,7 +30,7 @@ def take_frame(number: int = 1, epoch: int = 0, hidden: slice = slice(0, 0)) -> 
         np.zeros((1, 1, 3), np.uint8),
     )
     X_WC = looking_down((0.5, 0.0, 1.2))
-    return Frame(number, "camera", image, None, matrix, X_WC, float(number), visible, epoch)
+    return Frame(number, "camera", image, None, matrix, X_WC, float(number), visible, change_count)
 
 
 def area_of(view: str) -> tuple[float, float, float, float]:
@@ -64,7 +64,7 @@ class Bench:
         self,
         *things: Thing,
         view: str = "table",
-        epoch: int | None = None,
+        change_count: int | None = None,
         by: ErrorRates = EYE,
         hidden: slice = slice(0, 0),
         unsure: Sequence[Thing] = (),
@@ -77,7 +77,9 @@ class Bench:
         `contradiction` is the reason for that, and `unknown` are labels that the cell does not know.
         """
         self.frames += 1
-        frame = take_frame(self.frames, self.ledger.epoch if epoch is None else epoch, hidden)
+        frame = take_frame(
+            self.frames, self.ledger.change_count if change_count is None else change_count, hidden
+        )
         found = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label, _, _ in things)
         strange = tuple(Detection(label, 0.9, (0, 0, 1, 1)) for label in unknown)
         return self.ledger.observe(

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from executive.cell.detection import Detection, Observation
 from executive.cell.error_rates import ErrorRates
-from executive.ledger.association import find_max_distance
+from executive.ledger.association import compute_association_distance
 from executive.ledger.belief import Belief
 from executive.ledger.bin_contents import update_bin_log_odds
 from executive.ledger.item import Record
@@ -126,4 +127,5 @@ def test_measurements_count_by_how_good_they_are() -> None:
 def test_the_gate_is_as_wide_as_the_measurements_scatter(spread: float, new: float, allowed: float) -> None:
     item = record()
     item.standard_error = spread
-    assert find_max_distance(item, new, 0.025) == pytest.approx(allowed)
+    observation = Observation(Detection("cube", 0.9, (0, 0, 1, 1)), HERE, new)
+    assert compute_association_distance(item, observation, 0.025) == pytest.approx(allowed)

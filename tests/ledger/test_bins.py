@@ -37,7 +37,7 @@ def test_what_came_down_in_its_bin_is_there_though_no_look_shows_it(
         bench.look()
     assert bench.end() == {"cube-1": final}
     why = "it probably fell into the bin" if final[0] == "placed" else final[1]
-    assert bench.ledger.summaries()[0].reason == why
+    assert bench.ledger.list_items()[0].reason == why
     assert bench.ledger.count_attempts("cube-1") == 1
 
 
@@ -61,7 +61,7 @@ def test_what_must_have_fallen_into_a_bin_takes_a_place_there_until_a_look_shows
     assert (bench.ledger.count_objects_in("red_bin"), bench.states()["cube-1"][0]) == (0, "dropped")
     bench.look(IN_RED, view="full")
     assert bench.ledger.count_objects_in("red_bin") == 1
-    (row,) = bench.ledger.summaries()
+    (row,) = bench.ledger.list_items()
     assert (row.state, row.bin, row.reason) == ("placed", "red_bin", "")
 
 
@@ -96,7 +96,7 @@ def test_given_up_and_found_on_the_table_it_stays_given_up_and_never_found_it_is
         one.ledger.reject("cube-1", "12 attempts failed")
     assert bench.look(("cube", 0.55, 0.1)) == []
     assert bench.states() == {"cube-1": ("rejected", "12 attempts failed")}
-    assert bench.ledger.summaries()[0].position == [0.55, 0.1, 0.025]
+    assert bench.ledger.list_items()[0].position == [0.55, 0.1, 0.025]
     for _ in range(2):
         other.look(view="full")
     assert other.end() == {"cube-1": LOST}
@@ -123,7 +123,7 @@ def test_no_name_is_given_out_twice(bench: Bench) -> None:
     bench.drop("cube-1")
     bench.look(("cube", 0.45, 0.1), ("cube", 0.60, 0.1))
     bench.look(("cube", 0.45, 0.1), ("cube", 0.60, 0.1), ("cube", 0.55, -0.2))
-    rows = bench.ledger.summaries()
+    rows = bench.ledger.list_items()
     assert len({row.item for row in rows}) == len(rows) == 3
     assert sorted(row.position[0] for row in rows) == [0.45, 0.55, 0.60]  # type: ignore[index]
 

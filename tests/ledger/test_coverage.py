@@ -24,9 +24,11 @@ MIDDLE, CORNER = np.array([0.53, 0.0, 0.025]), np.array([0.43, 0.21, 0.025])
 EYE = ErrorRates(threshold=0.5, miss_rate=0.2, confusion_rate=0.1, false_detections=0.5, jitter=1.0)
 
 
-def look(*, view: str = "full", epoch: int = 0, hidden: slice = slice(0, 0)) -> Detections:
+def look(*, view: str = "full", change_count: int = 0, hidden: slice = slice(0, 0)) -> Detections:
     """An empty look from above; the columns `hidden` of the image are behind the arm."""
-    return Detections("eye", (), EYE, frame=take_frame(1, epoch, hidden), view=view, area=area_of(view))
+    return Detections(
+        "eye", (), EYE, frame=take_frame(1, change_count, hidden), view=view, area=area_of(view)
+    )
 
 
 @pytest.fixture
@@ -44,7 +46,7 @@ def test_every_look_leaves_as_much_doubt_as_its_detector_misses(coverage: Covera
 def test_before_anything_was_dropped_hardly_anything_lies_beside_the_workspace(coverage: Coverage) -> None:
     beside = np.array([0.53, 0.40, 0.025])
     assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE
-    coverage.reset_near(MIDDLE, math.inf, change=1)
+    coverage.reset_near(MIDDLE, math.inf, change_number=1)
     assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE_AFTER_CHANGE
 
 
@@ -71,8 +73,8 @@ def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage:
 
 def test_a_change_brings_the_doubt_back_whatever_a_frame_from_before_shows(coverage: Coverage) -> None:
     for _ in range(2):
-        coverage.reset_near(CORNER, 0.07, change=1)
-        coverage.update(look(epoch=0))
+        coverage.reset_near(CORNER, 0.07, change_number=1)
+        coverage.update(look(change_count=0))
     assert coverage.find_miss_probability(CORNER) == 1.0
     assert coverage.find_miss_probability(MIDDLE) == pytest.approx(0.2**2)
 
@@ -91,11 +93,11 @@ def test_a_place_beside_the_workspace_that_no_pose_shows_any_more_is_not_waited_
     coverage: Coverage,
 ) -> None:
     coverage.update(look())
-    coverage.reset_near(MIDDLE, math.inf, change=1)
+    coverage.reset_near(MIDDLE, math.inf, change_number=1)
     # The workspace is in the middle columns; on the left the arm stays in the way from now on.
     worst = []
     for _ in range(8):
-        coverage.update(look(epoch=1, hidden=slice(0, 180)))
+        coverage.update(look(change_count=1, hidden=slice(0, 180)))
         worst.append(coverage.max_object_probability)
     assert worst[2] == PRIOR_OUTSIDE_AFTER_CHANGE, "hidden on the left"
     assert worst[4] <= 0.2**5 * 1.01

@@ -6,7 +6,7 @@ import pytest
 from ledger_bench import Bench
 
 from executive.events import FrameSearched, ItemChanged
-from executive.ledger.certainty import MAX_UNCERTAIN_LOOKS
+from executive.ledger.certainty import UNCERTAIN_LOOKS_TO_REJECT
 
 THERE = ("cube", 0.5, 0.0)
 UNSURE = ("rejected", "no look is certain of it")
@@ -15,7 +15,7 @@ PHANTOM = ("phantom", "more looks missed it than saw it")
 
 def test_an_object_with_uncertain_detections_only_is_an_item_in_doubt(bench: Bench) -> None:
     assert [target.item for target in bench.look(unsure=[THERE])] == ["cube-1"]
-    assert (bench.ledger.summaries()[0].looks, bench.ledger.is_certain("cube-1")) == (0, False)
+    assert (bench.ledger.list_items()[0].looks, bench.ledger.is_certain("cube-1")) == (0, False)
     assert bench.ledger.find_uncertain_items() == ["cube-1"]
     look = next(event for event in bench.events if isinstance(event, FrameSearched))
     assert (look.confident, [one.label for one in look.doubtful]) == ([], ["cube"])
@@ -34,10 +34,10 @@ def test_a_table_with_something_in_doubt_is_not_believed_to_be_empty(bench: Benc
         (1, 2, False, PHANTOM),
         (1, 1, True, PHANTOM),
         (1, 0, True, UNSURE),
-        (MAX_UNCERTAIN_LOOKS - 1, 0, False, ("seen", "")),
-        (MAX_UNCERTAIN_LOOKS, 0, False, UNSURE),
-        (MAX_UNCERTAIN_LOOKS, 0, True, UNSURE),
-        (MAX_UNCERTAIN_LOOKS, 3, True, PHANTOM),
+        (UNCERTAIN_LOOKS_TO_REJECT - 1, 0, False, ("seen", "")),
+        (UNCERTAIN_LOOKS_TO_REJECT, 0, False, UNSURE),
+        (UNCERTAIN_LOOKS_TO_REJECT, 0, True, UNSURE),
+        (UNCERTAIN_LOOKS_TO_REJECT, 3, True, PHANTOM),
     ],
 )
 def test_what_no_look_is_sure_of_is_given_up_and_what_looks_miss_was_nothing(
@@ -52,7 +52,7 @@ def test_what_no_look_is_sure_of_is_given_up_and_what_looks_miss_was_nothing(
 
 
 def test_given_up_too_early_it_is_open_again_when_a_look_is_sure(bench: Bench) -> None:
-    for _ in range(MAX_UNCERTAIN_LOOKS):
+    for _ in range(UNCERTAIN_LOOKS_TO_REJECT):
         bench.look(unsure=[THERE])
     bench.look(THERE)
     assert bench.states() == {"cube-1": ("seen", "")}
@@ -65,7 +65,7 @@ def test_an_uncertain_detection_where_nothing_can_have_been_overlooked_or_in_a_b
     for _ in range(3):
         bench.look()
     bench.look(unsure=[THERE])
-    assert bench.ledger.summaries() == []
+    assert bench.ledger.list_items() == []
 
 
 def test_a_sure_look_makes_an_item_of_an_uncertain_detection_as_good_as_any(bench: Bench) -> None:
@@ -81,7 +81,7 @@ def test_a_sure_look_makes_an_item_of_an_uncertain_detection_as_good_as_any(benc
 
 def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) -> None:
     bench.look(THERE, unsure=[("duck", 0.51, 0.01)])
-    assert (len(bench.ledger.summaries()), bench.ledger.records[0].belief.uncertain_look_count) == (1, 0), (
+    assert (len(bench.ledger.list_items()), bench.ledger.records[0].belief.uncertain_look_count) == (1, 0), (
         "a second, weaker box"
     )
     for _ in range(5):
@@ -98,7 +98,7 @@ def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) ->
 def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
     bench.look(THERE)
     bench.ledger.record_miss("cube-1")
-    for _ in range(MAX_UNCERTAIN_LOOKS):
+    for _ in range(UNCERTAIN_LOOKS_TO_REJECT):
         bench.look(unsure=[THERE])
     bench.look(THERE)
     assert bench.states() == {"cube-1": UNSURE}
@@ -107,7 +107,7 @@ def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
 def test_a_known_item_that_waits_its_turn_is_not_rejected_for_uncertain_looks(bench: Bench) -> None:
     for _ in range(3):
         bench.look(THERE, ("cube", 0.55, 0.0))
-    for _ in range(MAX_UNCERTAIN_LOOKS + 5):
+    for _ in range(UNCERTAIN_LOOKS_TO_REJECT + 5):
         bench.look(("cube", 0.55, 0.0), unsure=[THERE])
     assert bench.ledger.is_certain("cube-1")
     bench.ledger.record_grasp("cube-2")  # its neighbour

@@ -27,7 +27,13 @@ def test_two_close_objects_stay_two_items_whatever_the_order_of_detections(bench
     first, second = bench.look(("cube", 0.551, 0.0), ("cube", 0.501, 0.0))
     assert (first.item, second.item) == ("cube-1", "cube-2")
     assert first.position[0] == pytest.approx(0.5005), "the mean of both looks"
-    assert (first.label, first.confidence, first.frame, first.epoch, first.stamp) == ("cube", 0.9, 2, 0, 2.0)
+    assert (first.label, first.confidence, first.frame, first.change_count, first.stamp) == (
+        "cube",
+        0.9,
+        2,
+        0,
+        2.0,
+    )
 
 
 def test_the_class_is_evidence_and_not_identity(bench: Bench) -> None:
@@ -69,7 +75,7 @@ def test_an_empty_table_needs_looks_that_agree_since_the_last_change(bench: Benc
     bench.look(CUBE)
     bench.ledger.record_grasp("cube-1")
     for _ in range(3):
-        bench.look(view="full", epoch=0)  # frames from before the change say nothing
+        bench.look(view="full", change_count=0)  # frames from before the change say nothing
     bench.look(view="full")
     assert not bench.ledger.is_table_empty()
     bench.ledger.record_placement("cube-1", "red_bin")
@@ -115,7 +121,7 @@ def test_an_item_that_was_still_in_doubt_or_contradicted_is_not_skipped(bench: B
 def test_labels_that_the_cell_does_not_know_are_counted_by_the_look_with_most_of_them(bench: Bench) -> None:
     bench.look(CUBE, unknown=("rubber-duck", "mug", "rubber-duck"))
     bench.look(CUBE, unknown=("rubber-duck",))
-    assert bench.ledger.unknown == {"rubber-duck": 2, "mug": 1}
+    assert bench.ledger.unknown_labels == {"rubber-duck": 2, "mug": 1}
 
 
 def test_a_rejection_after_a_contradiction_contains_it(bench: Bench) -> None:
@@ -151,7 +157,7 @@ def test_three_looks_that_contradict_the_class_of_an_item_reject_it(bench: Bench
 def test_a_frame_from_before_a_pick_brings_nothing_back(bench: Bench) -> None:
     bench.look(CUBE, FAR)
     bench.ledger.record_grasp("cube-1")
-    assert names(bench.look(CUBE, FAR, epoch=0)) == ["cube-2"]
+    assert names(bench.look(CUBE, FAR, change_count=0)) == ["cube-2"]
     assert bench.ledger.count_states()["seen"] == 2
 
 
@@ -185,7 +191,7 @@ def test_an_item_that_is_given_up_in_the_tool_stays_there_until_it_is_released(b
     bench.ledger.reject("cube-1", "slippery")
     assert bench.ledger.find_held_item() == "cube-1"
     bench.ledger.record_placement("cube-1", "red_bin")
-    (row,) = bench.ledger.summaries()
+    (row,) = bench.ledger.list_items()
     assert (row.state, row.bin, row.reason) == ("placed", "red_bin", "")
 
 
@@ -266,7 +272,7 @@ def test_a_misread_object_is_nobody_who_is_missed_before_its_class_is_sure(bench
     for label in ("cube", "cube", "duck", "duck", "duck", "duck", "duck"):
         bench.look((label, 0.60, 0.10), by=bad)
     bench.look(("duck", 0.60, 0.10), CUBE, by=bad)
-    rows = {row.item: row for row in bench.ledger.summaries() if row.state == "seen"}
+    rows = {row.item: row for row in bench.ledger.list_items() if row.state == "seen"}
     assert rows["duck-1"].position == pytest.approx([0.60, 0.10, 0.025])
     assert rows["cube-1"].position == pytest.approx([0.50, 0.0, 0.025])
 

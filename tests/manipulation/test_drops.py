@@ -52,7 +52,7 @@ def test_a_drop_is_recorded_once(fake: FakeCell, held: str) -> None:
     fake.tool.break_seal()
     assert detect_and_record_drop(fake.cell, held)
     assert detect_and_record_drop(fake.cell, held)
-    (row,) = fake.ledger.summaries()
+    (row,) = fake.ledger.list_items()
     assert (row.state, row.attempts) == ("dropped", 1)
 
 
@@ -68,4 +68,4 @@ def test_what_slips_away_over_its_bin_is_believed_there_unless_it_was_thrown(
     fake.tool.break_seal()
     assert detect_and_record_drop(fake.cell, held)
     fake.ledger.close(completed=True)
-    assert [row.state for row in fake.ledger.summaries()] == [state]
+    assert [row.state for row in fake.ledger.list_items()] == [state]

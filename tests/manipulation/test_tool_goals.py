@@ -48,7 +48,7 @@ def test_what_is_put_down_one_after_another_stands_side_by_side(fake: FakeCell, 
     item = held
     for _ in range(4):
         run_skill(PutDown(held=item), fake)
-        places.append(tuple(next(row for row in fake.ledger.summaries() if row.item == item).position[:2]))
+        places.append(tuple(next(row for row in fake.ledger.list_items() if row.item == item).position[:2]))
         fake.world.put("cube", 0.5, 0.1)
         item = picked(fake, "cube")
     assert places[0] == pytest.approx(SAFE)

@@ -93,7 +93,7 @@ KINDS = (
 
 
 def names_rejected_and_lost_items(result: MissionResult) -> bool:
-    rows = [row for row in result.accounts.summaries() if row.state in ("rejected", "lost")]
+    rows = [row for row in result.accounts.list_items() if row.state in ("rejected", "lost")]
     return result.status == "INCOMPLETE" and all(row.item in result.message for row in rows)
 
 

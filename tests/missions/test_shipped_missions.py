@@ -62,7 +62,7 @@ def execute(mission: LoadedMission, seed: int, kind: Callable[..., Workcell] = F
         return Done(
             outcome,
             run.count_items(),
-            run.workcell.accounts.summaries(),
+            run.workcell.accounts.list_items(),
             dict(run.count_ground_truth() or {}),
             ahead,
         )

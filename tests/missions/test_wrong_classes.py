@@ -35,7 +35,7 @@ def test_a_class_that_is_always_mistaken_is_in_no_wrong_bin_and_rejected_by_its_
     result = sorted_with(mission, {"cube": "sphere"})
     assert (result.status, result.items["placed"], result.items["rejected"]) == ("INCOMPLETE", 2, 2)
     assert (result.audit["wrong_bin"], result.agrees) == (0, True)
-    reasons = [row.reason for row in result.accounts.summaries() if row.state == "rejected"]
+    reasons = [row.reason for row in result.accounts.list_items() if row.state == "rejected"]
     # The fake tool feels a surface from 2 mm above it.
     height = "it was touched 52 mm above the table, and a sphere is 60 mm high"
     assert reasons == [f"could not be picked: {height}"] * 2
@@ -45,7 +45,7 @@ def test_a_class_that_is_always_mistaken_is_in_no_wrong_bin_and_rejected_by_its_
 
 def test_labels_that_the_cell_does_not_know_are_reported_and_the_table_is_not_empty() -> None:
     result = sorted_with("sort_overhead", {"cube": "box", "duck": "rubber-duck"})
-    assert (result.status, result.items["placed"], result.accounts.unknown) == (
+    assert (result.status, result.items["placed"], result.accounts.unknown_labels) == (
         "SUCCESS", 1, {"box": 2, "rubber-duck": 1},
     )  # fmt: skip
     assert (result.is_table_empty, result.audit["unseen"]) == (False, 3)

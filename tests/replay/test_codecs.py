@@ -39,14 +39,14 @@ def test_numbers_come_back_bit_by_bit(array: np.ndarray, angle: float) -> None:
 
 @few
 @given(arrays(np.bool_, st.tuples(st.integers(1, 40), st.integers(1, 40))), st.integers(0, 9))
-def test_a_frame_comes_back_without_its_image(visible: np.ndarray, epoch: int) -> None:
+def test_a_frame_comes_back_without_its_image(visible: np.ndarray, change_count: int) -> None:
     size = visible.shape
     frame = Frame(
         7, "overhead", np.full((*size, 3), 9, np.uint8), np.ones(size), np.eye(3) / 3, Pose.identity(), 1 / 3,
-        visible, epoch,
+        visible, change_count,
     )  # fmt: skip
     read = back(codecs.FRAME, frame)
-    assert (read.id, read.camera, read.stamp, read.epoch) == (7, "overhead", 1 / 3, epoch)
+    assert (read.id, read.camera, read.stamp, read.change_count) == (7, "overhead", 1 / 3, change_count)
     assert np.array_equal(read.visible, visible)
     assert np.array_equal(read.matrix, frame.matrix)
     assert (read.image.shape, read.image.any(), read.depth) == ((*size, 3), False, None)

@@ -89,9 +89,9 @@ def items_of(workcell: Workcell) -> dict[str, object]:
     """Return the counts and the final states of the items, and the labels and doubts of the ledger."""
     accounts = workcell.accounts
     details = {
-        "unknown": accounts.unknown,
+        "unknown": accounts.unknown_labels,
         "reasons": accounts.assumption_reasons,
-        "rows": accounts.summaries(),
+        "rows": accounts.list_items(),
     }
     return {**accounts.count_states(), **details}
 

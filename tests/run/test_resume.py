@@ -38,7 +38,7 @@ def test_tool_and_ledger_agree_afterwards(
     if known:
         fake.ledger.record_grasp(item)
     reconcile_ledger(fake.cell, intent)
-    (row,) = fake.ledger.summaries()
+    (row,) = fake.ledger.list_items()
     assert (fake.tool.holding, fake.ledger.find_held_item() == item, row.state) == left
     assert row.attempts == (row.state == "dropped")
 

@@ -43,12 +43,12 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
     fake.tool.can_seal = lambda: fake.world.find_touched_object(fake.arm.tool_pose.position) is not stubborn
     outcome, items, audit = run.execute(), run.count_items(), run.count_ground_truth()
     assert (outcome.status, outcome.reason) == ("INCOMPLETE", "rejected")
-    named = next(row.item for row in run.workcell.accounts.summaries() if row.state == "rejected")
+    named = next(row.item for row in run.workcell.accounts.list_items() if row.state == "rejected")
     why = "could not be picked (6 failed attempts)"
     assert outcome.message == f"1 object(s) were not sorted: {named} ({why})"
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
-    rejected = next(row for row in run.workcell.accounts.summaries() if row.state == "rejected")
+    rejected = next(row for row in run.workcell.accounts.list_items() if row.state == "rejected")
     assert rejected.reason == "could not be picked (6 failed attempts)"
 
 
@@ -147,7 +147,7 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
     assert outcome.status == "INCOMPLETE", outcome
     assert (items["rejected"], audit["left"]) == (1, 1)
     assert items["placed"] == audit["right"] == items["seen"] - 1
-    assert next(row for row in run.workcell.accounts.summaries() if row.state == "rejected").attempts == 12
+    assert next(row for row in run.workcell.accounts.list_items() if row.state == "rejected").attempts == 12
 
 
 def test_books_that_do_not_balance_are_a_fault(missions: Path) -> None:

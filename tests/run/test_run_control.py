@@ -55,7 +55,7 @@ def test_the_held_item_is_reported_at_the_end(missions: Path) -> None:
 
     run = make(missions, stop)
     held = run.execute().held_item
-    assert held in {row.item for row in run.workcell.accounts.summaries()}
+    assert held in {row.item for row in run.workcell.accounts.list_items()}
 
 
 @pytest.mark.parametrize("kind", [ItemChanged, RunEnded, FaultRaised])

@@ -23,7 +23,7 @@ def move_into_bin(fake: FakeCell, label: str, bin: str) -> None:
 
 
 def states(fake: FakeCell) -> dict[str, str]:
-    return {one.item: one.state for one in fake.ledger.summaries()}
+    return {one.item: one.state for one in fake.ledger.list_items()}
 
 
 def test_items_are_recognized_in_their_bins_and_on_the_table(fake: FakeCell, targets: list[Target]) -> None:
@@ -38,7 +38,7 @@ def test_an_item_whose_place_stays_unknown_is_rejected(fake: FakeCell, targets: 
     fake.world.remove(fake.world.objects[0])
     recover(fake)
     fake.ledger.close(completed=True)
-    (cube,) = (one for one in fake.ledger.summaries() if one.item == "cube-1")
+    (cube,) = (one for one in fake.ledger.list_items() if one.item == "cube-1")
     assert (cube.state, cube.reason) == ("rejected", REASON_UNTRACKED)
 
 

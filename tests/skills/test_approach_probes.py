@@ -21,7 +21,7 @@ def test_the_fourth_attempt_searches_for_an_object_almost_down_to_the_table(
     fake.world.objects.clear()
     messages = []
     for _ in range(4):
-        current = replace(target, epoch=fake.ledger.epoch)
+        current = replace(target, change_count=fake.ledger.change_count)
         messages.append(run_skill(Approach(target=current), fake).message)
     heights = [message.removeprefix("no contact down to ").split(" mm")[0] for message in messages]
     assert heights == ["35", "35", "35", "5"]
@@ -38,7 +38,9 @@ def test_a_probe_far_beside_the_middle_proves_nothing(
     for offset, empty_probe_count in ((0.02, 0), (0.0025, 1)):
         for _ in range(3):
             fake.ledger.record_miss(target.item)
-        run_skill(Approach(target=replace(target, epoch=fake.ledger.epoch), offset=offset), fake)
+        run_skill(
+            Approach(target=replace(target, change_count=fake.ledger.change_count), offset=offset), fake
+        )
         assert fake.ledger.records[1].empty_probe_count == empty_probe_count
 
 
@@ -60,6 +62,6 @@ def test_a_touch_that_only_the_fourth_attempt_can_make_is_no_touch_of_the_target
     for _ in range(3):
         fake.ledger.record_miss(target.item)
     thing.position[2] = -0.005
-    result = run_skill(Approach(target=replace(target, epoch=fake.ledger.epoch)), fake)
+    result = run_skill(Approach(target=replace(target, change_count=fake.ledger.change_count)), fake)
     assert (result.reason, result.message[: len(message)]) == (reason, message)
     assert fake.ledger.count_attempts(target.item) == (4 if is_touched else 3)

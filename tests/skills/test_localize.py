@@ -58,7 +58,7 @@ def look_in_depth(fake: FakeCell, height: float, *, times: int = 1) -> None:
 def test_an_object_too_high_for_its_class_in_the_depth_image_contradicts_it(fake: FakeCell) -> None:
     fake.world.put("cube", 0.5, 0.0)
     look_in_depth(fake, 0.08, times=3)
-    (row,) = fake.ledger.summaries()
+    (row,) = fake.ledger.list_items()
     assert (row.state, row.reason) == (
         "rejected",
         "no look is certain of it: its top is 80 mm above the table, "
@@ -95,7 +95,7 @@ def unsure(fake: FakeCell):
 
 def test_what_the_detector_is_unsure_of_is_an_item_in_doubt_where_it_seems_to_be(fake: FakeCell) -> None:
     run_skill(Localize(detections=unsure(fake)), fake)
-    (row,) = fake.ledger.summaries()
+    (row,) = fake.ledger.list_items()
     assert (row.item, row.position, fake.ledger.find_uncertain_items()) == (
         "cube-1",
         [0.5, 0.0, 0.025],
@@ -113,4 +113,4 @@ def test_a_box_in_doubt_without_a_place_is_not_passed_over(
     monkeypatch.setattr(type(fake.cell.localizer), "locate", staticmethod(locate))
     result = run_skill(Localize(detections=detections), fake)
     assert (result.reason, result.message) == ("no_depth", "no depth at the cube")
-    assert fake.ledger.summaries() == []
+    assert fake.ledger.list_items() == []

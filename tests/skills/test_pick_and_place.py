@@ -183,7 +183,7 @@ def test_an_item_is_given_up_with_its_reason_after_the_failures_the_mission_gran
         fake.ledger.record_miss("cube-1")
         run_skill(RejectTarget(item="cube-1", after=2), fake)
         assert fake.ledger.is_open("cube-1") is is_open, failures
-    assert fake.ledger.summaries()[0].reason == "could not be picked (2 failed attempts)"
+    assert fake.ledger.list_items()[0].reason == "could not be picked (2 failed attempts)"
 
 
 def test_move_to_scan_goes_to_the_cameras_first_pose_only_if_the_table_is_out_of_view(fake: FakeCell) -> None:
@@ -210,7 +210,7 @@ def test_taken_away_while_it_puts_down_it_has_returned_what_lies_there(fake: Fak
         next(steps)
         fake.advance()
     steps.close()
-    (row,) = fake.ledger.summaries()
+    (row,) = fake.ledger.list_items()
     assert (fake.ledger.find_held_item(), row.state) == (None, "seen")
     assert row.position[:2] == list(fake.cell.safe_place[:2])
 
@@ -224,5 +224,5 @@ def test_while_an_arm_brakes_after_a_drop_the_ledger_knows_of_it(fake: FakeCell,
     # An arm that needs a while to stop.
     fake.arm.stop = lambda: None  # type: ignore[method-assign]
     next(steps)
-    (row,) = fake.ledger.summaries()
+    (row,) = fake.ledger.list_items()
     assert (fake.arm.at_rest, row.state, row.attempts) == (False, "dropped", 1)

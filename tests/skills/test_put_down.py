@@ -98,7 +98,7 @@ def test_what_cannot_be_carried_away_and_was_not_lifted_is_left_where_it_stood(
     nowhere(Blocked("bolt-2 is too near"))
     result = run_skill(PutDown(held=held), fake)
     assert (result.status, fake.tool.holding, fake.ledger.find_held_item()) == ("SUCCESS", False, None)
-    (row,) = fake.ledger.summaries()
+    (row,) = fake.ledger.list_items()
     assert (row.state, row.position[:2]) == ("seen", [0.5, 0.0])
 
 

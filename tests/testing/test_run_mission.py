@@ -61,7 +61,7 @@ def test_the_cell_is_arranged_before_the_run(look: Path) -> None:
 
     seen: list[TimedEvent] = []
     result = run_mission(look, arrange=arrange, observers=[seen.append])
-    assert (list(result.events), [row.item for row in result.accounts.summaries()]) == (seen, ["duck-1"])
+    assert (list(result.events), [row.item for row in result.accounts.list_items()]) == (seen, ["duck-1"])
 
 
 def test_entered_and_failed_nodes_are_listed_in_order() -> None:

@@ -39,9 +39,9 @@ class FakeCamera(MountedCamera):
         table: TableConfig,
         get_flange_pose: Callable[[], Pose],
         clock: Clock,
-        get_epoch: Callable[[], int],
+        get_change_count: Callable[[], int],
     ) -> None:
-        super().__init__(name, config, get_flange_pose, clock, get_epoch)
+        super().__init__(name, config, get_flange_pose, clock, get_change_count)
         self.is_table_visible: Callable[[], bool] = self._is_table_in_image
         self.occluded_regions: list[Box] = []
         self.displacement_message = ""

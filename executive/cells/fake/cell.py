@@ -100,7 +100,7 @@ class FakeCell(CellWithoutHardware):
             config.table,
             get_flange_pose=lambda: self.arm.tool_pose @ X_TF,
             clock=clock,
-            get_epoch=lambda: self.ledger.epoch,
+            get_change_count=lambda: self.ledger.change_count,
         )
         self.detectors = {
             name: FakeDetector(name, detector, self.world, clock, self.camera.get_view_box)

@@ -170,7 +170,7 @@ class SimCamera(MountedCamera):
         seed: int,
         *,
         occlusion: ArmOcclusion | None = None,
-        get_epoch: Callable[[], int] = lambda: 0,
+        get_change_count: Callable[[], int] = lambda: 0,
         light: Light = CELL_LIGHT,
         true_config: CameraConfig | None = None,
         bins: Sequence[Bin] = (),
@@ -184,13 +184,13 @@ class SimCamera(MountedCamera):
             clock: Clock for the time stamps of the frames.
             seed: Seed of the noise.
             occlusion: Occlusion by the arm; None: nothing is occluded, and the table is always visible.
-            get_epoch: Function that returns the version of the scene (`Ledger.epoch`).
+            get_change_count: Function that returns the number of changes of the table (`Ledger`).
             light: Light of the scene.
             true_config: Pose, lens and noise with which images are rendered if they differ from `config`.
                 The frames contain the matrix and the pose of `config`.
             bins: Bins whose positions in a frame show a displacement of the camera.
         """
-        super().__init__(name, config, world.get_flange_pose, clock, get_epoch)
+        super().__init__(name, config, world.get_flange_pose, clock, get_change_count)
         self._true_config = true_config or config
         self._world = world
         self._seed = seed

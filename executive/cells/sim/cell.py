@@ -84,7 +84,7 @@ class SimCell(CellWithoutHardware):
             clock,
             seeds.camera,
             occlusion=ArmOcclusion(self._arm, planner.kinematics, config, lambda: self._tool.holding),
-            get_epoch=lambda: self.accounts.epoch,
+            get_change_count=lambda: self.accounts.change_count,
             light=build_light(scene.light),
             true_config=self._world.config.cameras[name],
             bins=tuple(bins),

@@ -74,7 +74,7 @@ class FaultScene:
             return next(iter(self.world.objects[choice - 1 : choice]), None)
         if choice == "nearest" or not item:
             return self._find_nearest(self.cell.arm.tool_pose.position, np.inf)
-        summary = next((row for row in self._workcell.accounts.summaries() if row.item == item), None)
+        summary = next((row for row in self._workcell.accounts.list_items() if row.item == item), None)
         if summary is None or summary.state == "placed":
             return None
         if summary.state == "held":

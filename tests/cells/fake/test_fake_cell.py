@@ -175,7 +175,7 @@ def test_a_mission_is_rehearsed_in_a_cell_of_kind_fake_and_its_trays_fill_evenly
     assert isinstance(run.workcell, FakeCell)
     outcome = run.execute()
     assert outcome.status == "SUCCESS", outcome
-    bins = [row.bin for row in run.workcell.accounts.summaries() if row.bin]
+    bins = [row.bin for row in run.workcell.accounts.list_items() if row.bin]
     assert (sorted(bins), dict(run.count_ground_truth() or {})["right"]) == (
         ["tray_1", "tray_1", "tray_2", "tray_2"],
         4,

@@ -118,9 +118,9 @@ def test_a_frame_carries_what_is_needed_to_use_it_later(build: Build, overhead: 
 
     world, name = at_scan_pose(build, overhead)
     config = overhead.cameras[name].model_copy(update={"noise": NoiseConfig(gain=0, read=0)})
-    camera = SimCamera(world, name, config, StoppedClock(), 1, occlusion=Half(), get_epoch=lambda: 4)
+    camera = SimCamera(world, name, config, StoppedClock(), 1, occlusion=Half(), get_change_count=lambda: 4)
     frame = camera.capture()
-    assert (frame.camera, frame.stamp, frame.epoch, frame.depth) == (name, 1.5, 4, None)
+    assert (frame.camera, frame.stamp, frame.change_count, frame.depth) == (name, 1.5, 4, None)
     assert frame.image.shape == (480, 640, 3)
     assert (frame.visible.sum(), frame.visible.shape) == (240 * 640, (480, 640))
     assert frame.X_WC.position == pytest.approx(config.position)

@@ -170,7 +170,7 @@ class LoopsWithoutYield(Pause):
 
     def run(self, cell: Cell) -> Steps:
         yield
-        while cell.ledger.epoch > 0:
+        while cell.ledger.change_count > 0:
             try:
                 cell.camera.get_view_box("table")
             except Exception:

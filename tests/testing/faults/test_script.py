@@ -146,7 +146,7 @@ def test_a_kind_of_cell_has_faults_in_one_run_after_the_other() -> None:
     for _ in range(2):
         cell = kind(load_empty_cell(), seed=0, routes={}, emit=discard_event, options=options)
         cell.advance()
-        assert cell.cell.ledger.epoch == 1
+        assert cell.cell.ledger.change_count == 1
 
 
 def test_the_world_of_a_wrapped_cell_is_opened_and_that_of_an_unknown_cell_is_refused() -> None:
