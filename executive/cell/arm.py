@@ -26,9 +26,9 @@ class Goal:
 
     Attributes:
         position: Position of the tool centre point `(x, y, z)` [m].
-        yaw: Rotation about the vertical axis [rad]; None: any rotation.
-        guarded_length: Length of the guarded descent at the end [m]: slow and vertical, until a skill stops
-            the arm at the first contact; 0 for none.
+        yaw: Rotation about the vertical axis [rad]; None: the planner chooses the rotation.
+        guarded_length: Length of the guarded descent [m], a slow vertical motion to the position that a skill
+            stops at the first contact; 0: no guarded descent.
         guarded_speed: Maximum tool speed of the guarded descent [m/s].
     """
 
@@ -45,7 +45,7 @@ class Task:
     Attributes:
         load: Object in the tool, or None.
         obstacles: Obstacles that are not in the cell file: objects on the table and in the bins.
-        target: Obstacle that the tool may touch, only during the guarded descent; None for none.
+        target: Obstacle that the tool may touch during the guarded descent, or None.
     """
 
     load: Load | None = None
@@ -54,7 +54,7 @@ class Task:
 
 
 class Planning(Protocol):
-    """Planning of a motion, in progress or finished."""
+    """Running or finished planning of a motion."""
 
     @property
     def ready(self) -> bool:
@@ -86,7 +86,7 @@ class Arm(Protocol):
 
     @property
     def destination(self) -> Array:
-        """Tool position `(3,)` [m] at the end of the current motion; without one, the current position."""
+        """Tool position `(3,)` [m] at the end of the current motion; at rest, the current position."""
 
     @property
     def at_rest(self) -> bool:
@@ -99,7 +99,8 @@ class Arm(Protocol):
     def plan(self, goal: Goal | str, task: Task = Task()) -> Planning:
         """Start to plan a motion from the current position to a goal, or to a named pose of the cell file.
 
-        The motion is available at once if `plan_ahead` planned it: same arguments, same start position.
+        The motion is available at once if `plan_ahead` was called with equal arguments, and the arm is at the
+        start position of the planned motion.
         """
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:

@@ -18,9 +18,9 @@ class Bin:
 
     Attributes:
         name: Name in the cell file.
-        position: Centre of its floor `(3,)` [m].
+        position: Centre of the floor `(3,)` [m].
         size: Inner length, width and wall height `(3,)` [m].
-        slots: Drop positions over the floor `(N, 2)` [m], used one after the other.
+        slots: Drop positions over the floor `(N, 2)` [m], in the order of their use.
     """
 
     name: str
@@ -29,5 +29,5 @@ class Bin:
     slots: Array
 
     def contains(self, position: Array, margin: float = 0.0) -> bool:
-        """Return True if a point `(3,)` [m] is over the floor, or horizontally at most `margin` [m] away."""
+        """Return True if `position` `(3,)` [m] is above the floor, enlarged by `margin` [m] on each side."""
         return bool(np.all(np.abs(position[:2] - self.position[:2]) <= self.size[:2] / 2 + margin))

@@ -11,10 +11,6 @@ from executive.cell.visuals import Visuals
 from executive.cell.workcell import Accounts, Workcell
 
 
-def _do_nothing() -> None:
-    """Do nothing after a control step."""
-
-
 @dataclass(eq=False)
 class CellWrapper:
     """Forwards everything to another work cell, unless a subclass overrides it; implements `Workcell`.
@@ -25,7 +21,7 @@ class CellWrapper:
     """
 
     inner: Workcell
-    after_step: Callable[[], None] = _do_nothing
+    after_step: Callable[[], None] = lambda: None
 
     @property
     def cell(self) -> Cell:
@@ -34,17 +30,17 @@ class CellWrapper:
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger; at its end, the run closes the ledger and reads its counts and rows."""
+        """The ledger, which the run closes when it ends."""
         return self.inner.accounts
 
     @property
     def steps(self) -> int:
-        """Number of control steps since the run began."""
+        """Number of control steps since the start of the run."""
         return self.inner.steps
 
     @property
     def last_command(self) -> int:
-        """Control step of the last command to arm or tool."""
+        """Control step of the last command to the arm or the tool."""
         return self.inner.last_command
 
     def log_to(self, path: Path) -> None:
@@ -61,7 +57,7 @@ class CellWrapper:
         return self.inner.visuals()
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return the true final counts of the objects, or None if they are unknown."""
+        """Return the true object counts at the end, or None if they are unknown."""
         return self.inner.audit()
 
     def close(self) -> None:

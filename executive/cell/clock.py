@@ -1,11 +1,11 @@
-"""Duration of a control step, and a clock that reads its time from a function."""
+"""Clock that reads its time from a function, and the duration of a control step."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
 STEP = 1 / 240
-"""Length of one control step, and of one physics step of the simulation [s]."""
+"""Duration of one control step, and of one physics step of the simulation [s]."""
 
 
 class StepClock:
@@ -13,7 +13,7 @@ class StepClock:
 
     Args:
         get_time: Function that returns the time since the start of the run [s].
-        step: Length of one control step [s].
+        step: Duration of one control step [s].
     """
 
     def __init__(self, get_time: Callable[[], float], step: float = STEP) -> None:

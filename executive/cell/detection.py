@@ -20,13 +20,13 @@ class Detection:
         label: Class name.
         confidence: Confidence, 0 to 1.
         box: Bounding box of the whole object in the image [pixel].
-        rival: Confidence of the second most likely class for this box, 0 to 1; 0 if unknown.
+        second_confidence: Confidence of the second most probable class of the box, 0 to 1; 0 if unknown.
     """
 
     label: str
     confidence: float
     box: Box
-    rival: float = 0.0
+    second_confidence: float = 0.0
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -37,17 +37,17 @@ class Detection:
 
 @dataclass(frozen=True)
 class Answer:
-    """Detections of a detector in a frame, maybe none.
+    """Detections of a detector in a frame.
 
-    A detector puts all detections into `found`. Before a skill reads the answer, the cell moves some
-    of them to `doubtful` and `unknown` (`executive.perception.detectors.screening`).
+    A detector puts all detections into `found`. The cell moves doubtful and unknown detections to the other
+    attributes before a skill reads the answer (`executive.perception.detectors.screening`).
 
     Attributes:
         detector: Name of the detector in the cell file.
         found: Confident detections of known classes, most confident first.
         error_rates: Error rates of the detector.
-        doubtful: Detections below the threshold, or with a second class that is more than half as likely.
-        unknown: Detections at or above the threshold with labels that the cell file does not declare.
+        doubtful: Detections below the threshold, or whose second class has more than half the confidence.
+        unknown: Detections above the threshold with labels that the cell file does not declare.
     """
 
     detector: str
@@ -57,14 +57,12 @@ class Answer:
     unknown: tuple[Detection, ...] = ()
 
     def describe_doubt(self, detection: Detection) -> str:
-        """Return a message: nothing certain was found, and why `detection`, the best one, is doubtful."""
-        threshold = self.error_rates.threshold
-        second_class = f"with another class at {detection.rival:.2f}"
-        limit = f"< {threshold:.2f}" if detection.confidence < threshold else second_class
-        return (
-            f"detector {self.detector} found nothing certain: at best a {detection.label} "
-            f"at {detection.confidence:.2f} {limit}"
-        )
+        """Return the message that all detections are doubtful, for the detection with the best confidence."""
+        threshold, second = self.error_rates.threshold, detection.second_confidence
+        is_below_threshold = detection.confidence < threshold
+        limit = f"< {threshold:.2f}" if is_below_threshold else f"with another class at {second:.2f}"
+        best = f"at best a {detection.label} at {detection.confidence:.2f} {limit}"
+        return f"detector {self.detector} found nothing certain: {best}"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,14 +80,14 @@ class Detections(Answer):
     area: Box
 
     def is_in_area(self, points: Array, margin: float = 0.0) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the points `(N, 3)` [m] in the world that the searched region shows.
+        """Return a mask `(N,)` of the world points `(N, 3)` [m] in the searched region of the image.
 
-        `margin` is the minimum distance of an image point to the border of the region [pixel].
+        `margin` is the minimum distance of a pixel from the border of the region [pixel].
         """
         return self.frame.is_in_area(points, self.area, margin)
 
     def is_searched(self, points: Array) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the points `(N, 3)` [m] at which an object would be completely visible."""
+        """Return a mask `(N,)` of the world points `(N, 3)` [m] at which an object is visible as a whole."""
         return self.is_in_area(points) & self.frame.is_unoccluded(points)
 
 
@@ -101,12 +99,12 @@ class Observation:
         detection: The detection.
         position: Centre of the object `(3,)` [m] in the world.
         std: Standard deviation of the random error of the position along each axis [m].
-        confident: False if the detection is doubtful or contradicted.
-        contradiction: Sentence with the evidence against the detected class, or "".
+        is_confident: False if the detection is doubtful or contradicted.
+        contradiction: Sentence with evidence of size or height against the detected class, or "".
     """
 
     detection: Detection
     position: Array
     std: float
-    confident: bool = True
+    is_confident: bool = True
     contradiction: str = ""

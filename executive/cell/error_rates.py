@@ -1,4 +1,4 @@
-"""Error rates of a detector, by which the ledger weights its detections."""
+"""Error rates of a detector, with which the ledger weights the detections."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ class ErrorRates:
 
     Attributes:
         threshold: Minimum confidence of a detection that is not doubtful, 0 to 1.
-        miss_rate: Fraction of the completely visible objects that one look (search of a frame) misses.
+        miss_rate: Fraction of the completely visible objects that the search of a frame misses.
         confusion_rate: Fraction of the found objects that get a wrong class.
-        false_detections: Mean number of false detections per look.
+        false_detections: Mean number of false detections per frame.
         jitter: Standard deviation of the random error of the centre of a box, along each axis [pixel].
-        repeated: Fraction of the errors that a second look from the same camera pose repeats.
+        repeated: Fraction of the errors that are repeated in a second frame from the same camera pose.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
         assumption_reason: Reason why the rates are assumed; "" if they are measured.
     """
@@ -30,19 +30,13 @@ class ErrorRates:
     assumption_reason: str = ""
 
 
-def assume_rates(threshold: float, doubt: str) -> ErrorRates:
+def assume_rates(threshold: float, reason: str) -> ErrorRates:
     """Return conservative error rates for a detector without a measurement under the current conditions.
 
-    On 26 kinds of unusual scenes, the first embedded detector missed 4 % and confused 5 % of the objects on
-    average, and repeated most errors in every look. The rates below are at least as high.
+    No rate is lower than in a measurement of the embedded detector in unusual scenes: the detector missed 4 %
+    and confused 5 % of the objects, and repeated most errors in each frame.
     """
     return ErrorRates(
-        threshold,
-        miss_rate=0.15,
-        confusion_rate=0.05,
-        false_detections=0.2,
-        jitter=2.0,
-        repeated=0.8,
-        bias=0.002,
-        assumption_reason=doubt,
-    )
+        threshold, miss_rate=0.15, confusion_rate=0.05, false_detections=0.2, jitter=2.0, repeated=0.8,
+        bias=0.002, assumption_reason=reason,
+    )  # fmt: skip

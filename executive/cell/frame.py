@@ -14,9 +14,9 @@ Box = tuple[float, float, float, float]
 """Left, top, right and bottom side [pixel] of a box in an image; pixel i covers [i, i + 1)."""
 
 OBJECT_RADIUS = 0.03
-"""Typical distance from the centre of an object to its outline [m]."""
+"""Typical distance from the centre of an object to the outline [m]."""
 OBJECT_POINTS = OBJECT_RADIUS * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], float)
-"""Points `(5, 3)` [m] of an object, relative to its centre; an object is detectable if all are visible."""
+"""Points `(5, 3)` [m], relative to the centre of an object, that are visible if a detector can find it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,10 +30,10 @@ class Frame:
         depth: `(H, W)` [m] along the optical axis, NaN for pixels without a measurement; None for a camera
             without depth.
         matrix: Camera matrix `(3, 3)` [pixel].
-        X_WC: Camera pose in the world at capture, OpenCV convention (z forward, y down).
+        X_WC: Camera pose in the world at capture, in the convention of OpenCV (z forward, y down).
         stamp: Capture time on the clock of the run [s].
-        visible: `(H, W)` bool, False for pixels in which the arm may occlude the scene, from its kinematics.
-        change_count: Number of changes of the table by the robot before the capture (`Ledger.change_count`).
+        visible: `(H, W)` bool, False for pixels that the arm may occlude, by the kinematics of the arm.
+        change_count: Number of changes of the table by the robot before the capture (`Ledger`).
     """
 
     id: int
@@ -55,20 +55,20 @@ class Frame:
         return float(crop.mean()) if crop.size else 0.0
 
     def is_in_area(self, points: Array, area: Box, margin: float = 0.0) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the points whose images are in a region of the image.
+        """Return a mask `(N,)` of the world points in a region of the image.
 
         Args:
             points: Points in the world `(N, 3)` [m].
             area: Region of the image [pixel].
-            margin: Minimum distance of an image point to the border of the region [pixel].
+            margin: Minimum distance of a pixel from the border of the region [pixel].
         """
         pixels, is_in_front = self._project(points)
         left, top, right, bottom = area
-        inside = (pixels >= (left + margin, top + margin)) & (pixels < (right - margin, bottom - margin))
-        return np.asarray(is_in_front & inside.all(axis=1))
+        is_inside = (pixels >= (left + margin, top + margin)) & (pixels < (right - margin, bottom - margin))
+        return np.asarray(is_in_front & is_inside.all(axis=1))
 
     def is_unoccluded(self, points: Array) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the points `(N, 3)` [m] at which the arm occludes no part of an object."""
+        """Return a mask `(N,)` of the world points `(N, 3)` [m] at which the arm cannot occlude an object."""
         mask = np.ones(len(points), dtype=bool)
         height, width = self.visible.shape
         for offset in OBJECT_POINTS:
@@ -84,9 +84,9 @@ class Frame:
     def to_opencv(self) -> tuple[Array, Array, Array]:
         """Return the camera parameters of OpenCV: matrix `(3, 3)`, rvec `(3,)` [rad] and tvec `(3,)` [m].
 
-        `cv2.projectPoints(points, rvec, tvec, matrix, None)` then returns the pixels of world points. Pixel
-        centres have integer coordinates in OpenCV: add 0.5 to get the coordinates of this project, in which
-        pixel i covers [i, i + 1).
+        `cv2.projectPoints(points, rvec, tvec, matrix, None)` projects world points with these parameters. Its
+        pixel centres have integer coordinates; in this project, pixel i covers [i, i + 1), so that 0.5 must
+        be added to each coordinate.
         """
         matrix = self.matrix.copy()
         matrix[:2, 2] -= 0.5
@@ -94,15 +94,15 @@ class Frame:
         return matrix, X_CW.rotation_vector, X_CW.position
 
     def _project(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the images `(N, 2)` [pixel] of points, and a mask of the points in front of the camera."""
-        in_camera = self.X_WC.inverse().apply(points) @ self.matrix.T
-        depth = in_camera[:, 2:]
-        return in_camera[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
+        """Return the pixels `(N, 2)` of world points, and a mask of the points in front of the camera."""
+        projected = self.X_WC.inverse().apply(points) @ self.matrix.T
+        depth = projected[:, 2:]
+        return projected[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
 
 
 @dataclass(frozen=True)
 class FrameCaptured(Event):
-    """A frame was captured; the next event `FrameSearched` has its detections. Not written to the journal.
+    """A frame was captured; the journal omits this event, and has the detections in `FrameSearched`.
 
     Attributes:
         frame: The frame with its image.

@@ -15,18 +15,18 @@ import numpy as np
 from executive.cell.frame import Frame
 from executive.geometry import Pose
 
-DIGITS = 6
+DECIMAL_PLACES = 6
 """Number of decimal places of floats: a micrometre, a microradian, a microsecond."""
 
 MAX_INTEGER_BITS = 2048
-"""Length of the largest integer that is written as a number [bit]: 617 digits; Python reads at least 640."""
+"""Size of the largest integer that is written as a number [bit]: 617 digits, of the 640 that Python reads."""
 
 
 def to_json(value: Any) -> Any:
-    """Return `value` as JSON: floats rounded to `DIGITS` places; of a frame, number, camera and time.
+    """Return `value` as JSON that every JSON parser can read.
 
-    Values without a JSON form become text: infinities, NaN, integers beyond `MAX_INTEGER_BITS`, and lone
-    surrogates, as in a file name that is not UTF-8. Every JSON parser can read the result.
+    Floats are rounded to `DECIMAL_PLACES`. A frame is converted without its image. Infinities, NaN and
+    integers beyond `MAX_INTEGER_BITS` become text. Characters that are not UTF-8 are escaped.
     """
     return _find_converter(value.__class__)(value)
 
@@ -34,7 +34,7 @@ def to_json(value: Any) -> Any:
 def to_json_or_type_name(value: Any) -> Any:
     """Return `value` as JSON, or the name of its type if the value cannot be converted.
 
-    Skills set outputs of any type; an output that cannot be converted must not end the run.
+    An output of a skill can have any type; the run must not end if the output cannot be converted.
     """
     try:
         return to_json(value)
@@ -48,15 +48,17 @@ def round_values(values: Iterable[float], digits: int) -> list[float]:
 
 
 def _escape(value: str) -> str:
+    """Return a text in which lone surrogates, which UTF-8 cannot encode, are escaped."""
     return value if value.isascii() else value.encode(errors="backslashreplace").decode()
 
 
 def _round_number(value: Any) -> float | str:
+    """Return a rounded number, or the text of an infinity or NaN."""
     number = float(value)
     if not math.isfinite(number):
         return str(number)
     # The addition of zero turns -0.0 into 0.0; both are equal, but print differently.
-    return round(number, DIGITS) + 0.0
+    return round(number, DECIMAL_PLACES) + 0.0
 
 
 _CONVERTERS: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
@@ -68,25 +70,23 @@ _CONVERTERS: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
     (np.generic, lambda value: to_json(value.item())),
     (np.ndarray, lambda value: to_json(value.tolist())),
     (Frame, lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _round_number(frame.stamp)}),
-    (Pose, lambda pose: pose.to_rounded_list(DIGITS)),
-    (
-        Mapping,
-        lambda mapping: {_escape(str(key)): to_json(value) for key, value in mapping.items()},
-    ),
+    (Pose, lambda pose: pose.to_rounded_list(DECIMAL_PLACES)),
+    (Mapping, lambda mapping: {_escape(str(key)): to_json(value) for key, value in mapping.items()}),
     ((list, tuple), lambda values: [to_json(value) for value in values]),
     ((set, frozenset), lambda values: sorted((to_json(value) for value in values), key=repr)),
     (PurePath, lambda path: _escape(str(path))),
 )
-"""Types, and functions that convert their values to JSON; the first matching type applies."""
+"""Types and the converters of their values to JSON; the first matching type applies."""
 
 
 @functools.cache
-def _find_converter(kind: type) -> Callable[[Any], Any]:
-    """Return the conversion for a type; cached, because it is needed in every control step."""
-    if converter := next((converter for known, converter in _CONVERTERS if issubclass(kind, known)), None):
-        return converter
-    if dataclasses.is_dataclass(kind):
-        names = [field.name for field in dataclasses.fields(kind)]
+def _find_converter(value_type: type) -> Callable[[Any], Any]:
+    """Return the converter of a type; cached, because every control step converts values."""
+    for types, converter in _CONVERTERS:
+        if issubclass(value_type, types):
+            return converter
+    if dataclasses.is_dataclass(value_type):
+        names = [field.name for field in dataclasses.fields(value_type)]
         return lambda value: {name: to_json(getattr(value, name)) for name in names}
     # The default `repr` contains a memory address, which differs between equal runs.
-    return lambda _: kind.__name__
+    return lambda _: value_type.__name__

@@ -1,4 +1,4 @@
-"""Bins, object classes, and derived heights and sizes of a cell file."""
+"""Bins, object classes, heights and shapes that follow from a cell file."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from executive.cell.workcell import KeyPath
 from executive.errors import Unreachable
 from executive.geometry import Array
 
-Triple = tuple[float, float, float]
-
+Vector3 = tuple[float, float, float]
+"""Three values along x, y and z [m]."""
 TOOL_RADIUS = 0.012
 """Radius of the body of the tool [m]."""
 NECK_LENGTH = 0.015
@@ -22,7 +22,7 @@ NECK_LENGTH = 0.015
 
 
 def build_bin(name: str, config: BinConfig) -> Bin:
-    """Return a bin, with slots evenly distributed over its floor, for a section of a cell file."""
+    """Return the bin of a section of a cell file, with slots evenly distributed over the floor."""
     position, size = np.array(config.position), np.array(config.size)
     columns, rows = config.slots
     x = position[0] + size[0] * ((np.arange(columns) + 0.5) / columns - 0.5)
@@ -32,31 +32,34 @@ def build_bin(name: str, config: BinConfig) -> Bin:
 
 
 def build_object_class(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return an object class, with the default mass, for a section of a cell file."""
+    """Return the object class of a section of a cell file, with the default mass."""
     return ObjectClass(label, config.height, config.radius, config.ring)
 
 
 def compute_travel_height(config: CellConfig) -> float:
-    """Return the tool height [m] at which the tallest held object passes over all bin walls and piles."""
+    """Return the tool height [m] at which a held object of any class clears all bin walls and piles."""
     max_height = max(kind.height for kind in config.objects.values())
     wall_top = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
     return max(wall_top, compute_max_pile_height(config)) + max_height + config.motion.clearance
 
 
 def compute_max_pile_height(config: CellConfig) -> float:
-    """Return the maximum height of a pile on the table [m]: the tallest object, or two if stacks occur."""
+    """Return the maximum height of a pile on the table [m], which has two objects if stacks occur."""
     max_height = max(kind.height for kind in config.objects.values())
     return 2 * max_height if config.table.stacked else max_height
 
 
-def list_bin_walls(size: tuple[float, float, float]) -> Sequence[tuple[Triple, Triple]]:
-    """Return half extents and centre, relative to the bin, of the boxes of its floor and four walls [m]."""
-    (length, width, height), t = size, BIN_THICKNESS
-    across, along = (t / 2, width / 2 + t, height / 2), (length / 2, t / 2, height / 2)
-    x, y, z = (length + t) / 2, (width + t) / 2, height / 2
-    floor = (length / 2 + t, width / 2 + t, t / 2), (0.0, 0.0, t / 2)
-    sides = (across, (x, 0.0, z)), (across, (-x, 0.0, z)), (along, (0.0, y, z)), (along, (0.0, -y, z))
-    return floor, *sides
+def list_bin_boxes(size: Vector3) -> Sequence[tuple[Vector3, Vector3]]:
+    """Return the half extents and the centre of the floor and of each wall of a bin.
+
+    `size` contains length, width and height [m]; centres are relative to `Bin.position` [m].
+    """
+    (length, width, height), thickness = size, BIN_THICKNESS
+    x, y, z = (length + thickness) / 2, (width + thickness) / 2, height / 2
+    floor = (length / 2 + thickness, width / 2 + thickness, thickness / 2), (0.0, 0.0, thickness / 2)
+    x_wall, y_wall = (thickness / 2, width / 2 + thickness, z), (length / 2, thickness / 2, z)
+    walls = (x_wall, (x, 0.0, z)), (x_wall, (-x, 0.0, z)), (y_wall, (0.0, y, z)), (y_wall, (0.0, -y, z))
+    return floor, *walls
 
 
 def find_unreachable_places(
@@ -66,19 +69,19 @@ def find_unreachable_places(
 
     Args:
         config: The cell file.
-        require_reachable: Raises `Unreachable` if the arm cannot reach a position `(2,)` [m] over a floor of
-            the given height [m].
+        require_reachable: Function that raises `Unreachable` if the arm cannot reach a position `(2,)` [m]
+            above a surface with a height [m].
     """
     places: list[tuple[KeyPath, str, Array, float]] = [
         (("bins", name, "position"), f'the bin "{name}"', build_bin(name, bin).slots, bin.position[2])
         for name, bin in config.bins.items()
     ]
-    safe_place = np.array([config.safe_place[:2]])
-    places.append((("safe_place",), "the safe place", safe_place, config.safe_place[2]))
-    for keys, name, slots, floor_height in places:
+    safe_position = np.array([config.safe_place[:2]])
+    places.append((("safe_place",), "the safe place", safe_position, config.safe_place[2]))
+    for keys, name, positions, surface_height in places:
         try:
-            for slot in slots:
-                require_reachable(slot, floor_height)
+            for position in positions:
+                require_reachable(position, surface_height)
         except Unreachable as error:
             yield keys, f"{name} is out of reach: {error}"
 

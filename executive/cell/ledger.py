@@ -20,13 +20,13 @@ class Ledger(Protocol):
 
     @property
     def unknown_labels(self) -> Mapping[str, int]:
-        """Maximum number of boxes in one look, by label, for labels that the cell file does not declare."""
+        """Maximum number of boxes in one look, by label that the cell file does not declare."""
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
-        """Update all items with one look (the detections in a frame), and return the new `find_targets`.
+        """Update all items with the detections in a frame, and return the targets (`find_targets`).
 
-        Objects in bins are no targets. Ignored: detections at positions that the robot changed after the
-        capture, and a second search of the same frame.
+        The ledger ignores a second search of a frame, and detections at positions where the robot has moved
+        objects since the capture.
 
         Args:
             detections: The frame, the searched region, and the error rates of the detector.
@@ -34,7 +34,7 @@ class Ledger(Protocol):
         """
 
     def find_targets(self) -> Sequence[Target]:
-        """Return a target for each item that is still to be sorted (`is_open`) at a known position."""
+        """Return a target for each item that is still to be sorted, and whose position is known."""
 
     def find_objects_on_table(self) -> Sequence[Target]:
         """Return all items that lie on the table with a probability of at least 0.5."""
@@ -46,22 +46,21 @@ class Ledger(Protocol):
         """Return the item in the tool, or None."""
 
     def is_current(self, frame: Frame) -> bool:
-        """Return True unless the robot may have moved any of the objects since the capture of a frame."""
+        """Return True if the robot cannot have moved all objects since the capture of a frame."""
 
     def is_fresh(self, target: Target) -> bool:
         """Return True if the robot cannot have moved a target since its last detection."""
 
     def is_open(self, item: Item) -> bool:
-        """Return True if an item is still to be sorted: neither placed, rejected, held nor lost."""
+        """Return True if an item is still to be sorted: on the table or dropped, and not rejected."""
 
     def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough to pick it."""
 
     def is_table_empty(self, label: str | None = None) -> bool:
-        """Return True if probably no object with a route is left in the visible part of the table.
+        """Return True if almost certainly no object with a route is visible on the table.
 
-        Args:
-            label: Class of the counted objects; None: all classes with a route.
+        `label` is the class of the counted objects; None: all classes with a route.
         """
 
     def get_label(self, item: Item) -> str:
@@ -78,8 +77,8 @@ class Ledger(Protocol):
 
         Args:
             item: The item.
-            contradiction: Sentence: how the height of the touch contradicts the class; "" if it does not.
-            may_miss_top: True if the cup may have touched the object beside its top.
+            contradiction: Sentence that the height of the touch contradicts the class, or "".
+            may_miss_top: True if the cup may have touched the object below its top.
         """
 
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
@@ -87,7 +86,7 @@ class Ledger(Protocol):
 
         Args:
             item: The item.
-            found_table: True if the tool descended almost to the table at the item without a contact.
+            found_table: True if the descent to the item touched nothing above the table.
         """
 
     def record_grasp(self, item: Item) -> None:
@@ -96,7 +95,7 @@ class Ledger(Protocol):
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
         """Record that the tool lost an item, which may have moved any object on the table.
 
-        `landing` `(3,)` [m] is the predicted position of the item; None if unknown.
+        `landing` is the predicted landing position `(3,)` [m]; None if it is unknown.
         """
 
     def record_placement(self, item: Item, bin: str) -> None:
@@ -106,24 +105,23 @@ class Ledger(Protocol):
         """Record that an item was put back on the table, with its centre at `position` `(3,)` [m]."""
 
     def reject(self, item: Item, reason: str) -> None:
-        """Reject an item: it is reported and not tried again."""
+        """Reject an item, which is reported, and not selected again."""
 
     def invalidate_positions(self) -> None:
         """Record that the robot may have moved any object on the table."""
 
     def lose_track(self) -> None:
-        """Record that the tool may have moved any item that is not in a bin."""
+        """Record that the tool may have moved any item outside of the bins."""
 
     def mark_unseen_as_dropped(self) -> None:
         """Record as dropped every item that no look has shown since `lose_track`.
 
-        Later looks search for these items on the table and in the bins. An item that they do not show is
-        rejected at the end of the run, because its position is unknown.
+        Later looks search for these items on the table and in the bins. An item without a detection until the
+        end of the run is rejected, because its position is unknown.
         """
 
     def record_bin_contents(self) -> None:
-        """Record the objects that most looks at the full image since `lose_track` have shown in bins.
+        """Record an item for each unknown object that most looks since `lose_track` show in a bin.
 
-        Objects that the ledger knows to be in the bin are ignored. Each other object is assigned to a
-        dropped item, or becomes a new item.
+        An unknown object is assigned to a dropped item of its class, or becomes a new item.
         """

@@ -13,7 +13,7 @@ Item = str
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """An item on the table as skills see it.
+    """An item on the table that a skill may pick.
 
     Attributes:
         item: The item.
@@ -22,7 +22,7 @@ class Target:
         confidence: Confidence of the last detection, 0 to 1.
         frame: Id of the last frame that showed the item.
         change_count: Number of changes of the table by the robot before the capture.
-        stamp: Capture time of this frame [s].
+        stamp: Capture time of this frame on the clock of the run [s].
     """
 
     item: Item
@@ -59,7 +59,7 @@ class Load:
 
     Attributes:
         kind: Class of the object.
-        holding_force: Largest force that the seal withstands [N].
+        holding_force: Maximum force that the seal of the suction cup withstands [N].
     """
 
     kind: ObjectClass

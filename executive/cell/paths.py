@@ -1,4 +1,4 @@
-"""Checks that paths in files of the user do not lead out of a folder."""
+"""Checks of paths in files of the user, which must not lead out of a folder."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Protocols of the parts of a work cell that skills use.
 
-A skill uses the parts of its `Cell` only through these protocols, so it runs unchanged in simulation, on the
-fake cell of the test kit, and on hardware. No call blocks: a skill sends a request, yields, and reads the
-result in a later control step.
+Through these protocols, a skill runs unchanged in simulation, on the fake cell of the test kit, and on
+hardware. No call blocks: a skill sends a request, yields, and reads the result in a later control step.
 """
 
 from __future__ import annotations
@@ -54,10 +53,10 @@ class Tool(Protocol):
 
     @property
     def holding_force(self) -> float:
-        """Maximum force that the seal withstands, from the measured vacuum [N]; 0 without a seal."""
+        """Maximum force that the seal withstands [N], computed from the vacuum; 0 without a seal."""
 
     def close(self) -> None:
-        """Switch the vacuum on; the touched object is held if its surface allows a seal."""
+        """Switch the vacuum on, which holds a touched object if its surface allows a seal."""
 
     def open(self) -> None:
         """Switch the vacuum off and release the object."""
@@ -87,11 +86,11 @@ class Camera(Protocol):
         """Capture and return a new frame."""
 
     def describe_displacement(self, frame: Frame) -> str:
-        """Return a sentence about the displacement of the camera from its declared pose in a frame, or ""."""
+        """Return a sentence if a frame shows that the camera is not at its declared pose, else ""."""
 
 
 class Request(Protocol):
-    """Search of a frame by a detector, running or finished."""
+    """Running or finished search of a frame by a detector."""
 
     @property
     def ready(self) -> bool:
@@ -101,7 +100,7 @@ class Request(Protocol):
         """Return the answer of the detector; only allowed while `ready` is True.
 
         Raises:
-            Crowded: The detector found more boxes than there can be objects in the cell.
+            Crowded: The detector found more boxes than objects fit into the cell.
             Unavailable: The detector gave no usable answer.
         """
 
@@ -126,8 +125,8 @@ class Localizer(Protocol):
     def localize(self, detections: Detections) -> Sequence[Observation]:
         """Return an observation of each found or doubtful detection.
 
-        An observation is not confident if its detection is doubtful, or if the size of its box or the height
-        of its top contradicts its class.
+        An observation is not confident if the detection is doubtful, or if the size of the box or the height
+        of the top of the object contradicts the class.
 
         Raises:
             NoDepth: The depth image has no usable values at a detection.
@@ -138,12 +137,12 @@ class Operator(Protocol):
     """The person or script that requests classes of objects."""
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Wait for and return a request: one of `choices` (classes), `rescan`, or None to quit.
+        """Wait for a request, and return one of `choices` (classes), `rescan`, or None to quit.
 
         The clock of the run stops while the operator decides.
 
         Raises:
-            Stopped: The run was halted while it waited.
+            Stopped: The run was halted during the wait.
         """
 
 
@@ -157,11 +156,11 @@ class MinTimes(Protocol):
     def get_transport_time(self, bin: str | None) -> float:
         """Return the minimum time of a transport from the workspace to a bin [s], from rest to rest.
 
-        None: to the nearest bin. 0 for a bin that does not exist.
+        If `bin` is None, the transport is to the nearest bin. The time is 0 if the bin does not exist.
         """
 
     def get_answer_time(self, detector: str) -> float:
-        """Return the minimum time from a frame to the answer [s]; "": first detector; 0 if unknown."""
+        """Return the minimum time from a frame to an answer of a detector [s]; "": the first detector."""
 
 
 @dataclass(frozen=True)

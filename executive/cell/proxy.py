@@ -1,7 +1,6 @@
-"""Proxies of the parts of a cell: every attribute read and every call goes through an interceptor.
+"""Proxies of the parts of a cell, which pass every attribute read and every call to an interceptor.
 
 Recorder, replay, test kit and fault scripts use proxies to record, replace, observe or change results.
-The cell that `intercept` returns can be intercepted again.
 """
 
 from __future__ import annotations
@@ -26,14 +25,15 @@ _PROTOCOLS: Mapping[str, type] = {
     "operator": Operator,
     "localizer": Localizer,
 }
+"""Protocol of each role, which is an attribute of `Cell` or an object that a part returns."""
 _RETURNED_ROLES = {"arm.plan": "plan", "detector.request": "request"}
-"""Role of the object that a call returns, by `Access.name`; the object gets a proxy, too."""
+"""Role of the object that a call returns, by `Access.name`; a proxy of the object is returned."""
 
 IS_METHOD: Mapping[str, Mapping[str, bool]] = {
     role: {name: callable(member) for name, member in vars(protocol).items() if not name.startswith("_")}
     for role, protocol in _PROTOCOLS.items()
 }
-"""For every role and member: True for a method, False for an attribute."""
+"""True for each method and False for each attribute, by role and member name."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Access:
 
     Attributes:
         role: Role of the part, a key of `IS_METHOD`: `arm`, `tool`, `detector`, `request`, ...
-        detector: Name of the accessed detector, or of the detector of the request; "" for other parts.
+        detector: Name of the detector for the roles `detector` and `request`, otherwise "".
         member: Name of the attribute or method.
-        proceed: Function that performs the access on the part itself and returns the result.
+        proceed: Function that performs the access without the interceptor and returns the result.
         arguments: Positional arguments of the call.
         keywords: Keyword arguments of the call.
     """
@@ -58,7 +58,7 @@ class Access:
 
     @cached_property
     def name(self) -> str:
-        """Role and member: `arm.start`."""
+        """Role and member, for instance `arm.start`."""
         return f"{self.role}.{self.member}"
 
     @property
@@ -77,9 +77,9 @@ Interceptor = Callable[[Access], Any]
 
 
 def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> Cell:
-    """Return a copy of the cell in which each access to the parts in `roles` goes through the interceptor.
+    """Return a copy of the cell in which the interceptor handles each access to the parts in `roles`.
 
-    The same applies to the `Planning` and `Request` objects that these parts return.
+    The interceptor also handles accesses to `Planning` and `Request` objects that these parts return.
     """
     parts: dict[str, Any] = {
         role: _Proxy(role, "", getattr(cell, role), interceptor) for role in roles if role != "detector"
@@ -92,7 +92,7 @@ def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> C
 
 
 class _Proxy:
-    """Stands for a part of a cell: has the members of its protocol, each through an interceptor.
+    """Proxy of a part of a cell, with the members of the protocol of the part.
 
     The part may be None if the interceptor never calls `Access.proceed`.
     """
@@ -103,7 +103,7 @@ class _Proxy:
 
     def __getattr__(self, member: str) -> Any:
         if member.startswith("_") or member not in IS_METHOD[self._role]:
-            # Underscores are tested first, because `copy` reads such names before `_role` is set.
+            # The underscore is tested first, because `copy` reads private names before `_role` is set.
             raise AttributeError(f"{type(self).__name__} has no attribute {member!r}")
         if IS_METHOD[self._role][member]:
             return partial(self._call, member)

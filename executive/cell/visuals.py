@@ -1,6 +1,6 @@
-"""Shapes and poses of the bodies in a cell, for displays.
+"""Shapes and true poses of the bodies in a cell, for displays.
 
-Skills do not use these true poses: they know the objects only from camera images.
+Skills know the objects from camera images only.
 """
 
 from __future__ import annotations

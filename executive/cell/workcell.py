@@ -1,4 +1,4 @@
-"""Protocols for the run: a work cell with its world, its ledger, and the kinds of work cells."""
+"""Protocols of work cells and kinds of work cells, as a run uses them."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from executive.cell.protocols import Cell, MinTimes, Operator, Routes
 from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
 
-PLACES = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
-"""Keys of the counts of an audit; the last two counts are subsets of the first four."""
+AUDIT_KEYS = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
+"""Keys of the object counts of an audit; `fell_in_wrong_bin` and `unseen` are subsets of the other counts."""
 
 
 class Accounts(Protocol):
-    """The methods of a ledger that a run uses at its end and at a resumption."""
+    """Ledger with the methods that a run calls when it ends and when it is resumed."""
 
     def close(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the tree succeeded."""
 
     def reopen(self) -> None:
-        """Remove the items that were left on the table; the next look adds visible objects again."""
+        """Discard the items on the table; the next look adds a new item for each visible object."""
 
     def count_states(self) -> dict[str, int]:
-        """Return the number of items by state: `placed`, `rejected`, `skipped`, `lost`, `phantom`.
+        """Return the number of items by final state: `placed`, `rejected`, `skipped`, `lost`, `phantom`.
 
-        The key `seen` has the sum of the first four.
+        The key `seen` is the number of all items except phantoms.
         """
 
     @property
     def unknown_labels(self) -> Mapping[str, int]:
-        """Maximum number of boxes in one look, by label, for labels that the cell file does not declare."""
+        """Maximum number of boxes in one look, by label that the cell file does not declare."""
 
     @property
     def assumption_reasons(self) -> Sequence[str]:
-        """Reasons why error rates of detectors were assumed instead of measured."""
+        """Reasons for which error rates of detectors were assumed instead of measured."""
 
     def list_items(self) -> Sequence[ItemChanged]:
         """Return the current state of each item, in the order of the first detection."""
@@ -51,7 +51,7 @@ class Workcell(Protocol):
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger, which the run closes and reads at its end."""
+        """The ledger, which the run closes when it ends."""
 
     @property
     def steps(self) -> int:
@@ -59,9 +59,9 @@ class Workcell(Protocol):
 
     @property
     def last_command(self) -> int:
-        """Control step of the last start of a motion, or of the last opening or closing of the tool.
+        """Control step of the last start of a motion or command to the tool; 0 without a command.
 
-        0 if there was none, or if it is unknown after an interruption of the run.
+        The step is also 0 if it is unknown after an interruption of the run.
         """
 
     def log_to(self, path: Path) -> None:
@@ -80,7 +80,7 @@ class Workcell(Protocol):
         """Return shapes and poses for displays, or None if the cell has none."""
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return the true final counts of the objects, or None if they are unknown, as on hardware."""
+        """Return the true object counts by `AUDIT_KEYS`, or None if they are unknown, as on hardware."""
 
     def close(self) -> None:
         """Release all resources; the cell is unusable afterwards."""
@@ -90,17 +90,15 @@ class Workcell(Protocol):
 class ResumePoint:
     """State of a cell at the interruption of a run.
 
-    A simulated world is reconstructed from its log, including the braking arm, and continues the log.
-
     Attributes:
-        log: The log file that `log_to` started.
-        frames: Number of captured frames.
-        turns: Number of calls of `Camera.next_pose`.
+        log_path: Log file that `log_to` started, from which the simulated world is reconstructed.
+        frame_count: Number of captured frames.
+        pose_count: Number of calls of `Camera.next_pose`.
     """
 
-    log: Path
-    frames: int = 0
-    turns: int = 0
+    log_path: Path
+    frame_count: int = 0
+    pose_count: int = 0
 
 
 @dataclass(frozen=True)
@@ -112,8 +110,7 @@ class CellOptions:
         base: Folder to which paths in the cell file are relative.
         gui: True to show the simulated world in a window.
         resume: State of the cell at the interruption of a resumed run; None for a new run.
-        scene: Scene file that changes the world of a simulated cell; None: the world is as the cell file
-            declares.
+        scene: Scene file with differences of the simulated world from the cell file; None: no differences.
     """
 
     operator: Operator
@@ -142,11 +139,11 @@ class CellKind(Protocol):
         """
 
     def labels(self, config: Any, base: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return, by detector of a cell file, the labels in the cell of the classes that it can find.
+        """Return the labels that each detector of a cell file can find, by name of the detector.
 
-        None for a detector whose classes are unknown before its first answer. Never raises an error: `check`
-        reports errors.
+        The labels of a detector are None if they are unknown before its first answer. Errors in the file are
+        ignored, because `check` reports errors.
         """
 
     def min_times(self, config: Any) -> MinTimes:
-        """Return the minimum times of actions in a cell whose file has no errors by `check`."""
+        """Return the minimum times of actions in a cell; `check` has found no error in the cell file."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from executive.cell.protocols import Routes
-from executive.cell.workcell import PLACES
+from executive.cell.workcell import AUDIT_KEYS
 from executive.geometry import Array
 from executive.ledger.item import Record, State
 
@@ -54,7 +54,7 @@ def audit_objects(
         routes: Names of the permitted bins of each class.
         max_distance: Maximum horizontal distance from the first position of an item to its object [m].
     """
-    counts = dict.fromkeys(PLACES, 0)
+    counts = dict.fromkeys(AUDIT_KEYS, 0)
     first_positions = [record.first_position for record in records if record.state is not State.PHANTOM]
     for final_object in objects:
         is_seen = any(

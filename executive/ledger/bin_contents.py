@@ -90,7 +90,7 @@ class BinContents:
         visible_counts = Counter(
             (observed.detection.label, name)
             for observed, name in bin_names.items()
-            if observed.confident and name and self.bins[name].contains(observed.position, BIN_THICKNESS)
+            if observed.is_confident and name and self.bins[name].contains(observed.position, BIN_THICKNESS)
         )
         placed_records = []
         for record in (record for record in records if record.state is State.DROPPED):

@@ -35,7 +35,7 @@ def make_look_event(look: Detections, observations: Sequence[Observation]) -> Fr
                 round_values(observation.detection.box, 2), round_values(observation.position, 4),
                 observation.contradiction,
             )
-            for observation in observations if observation.confident == confident
+            for observation in observations if observation.is_confident == confident
         ]  # fmt: skip
 
     return FrameSearched(
@@ -69,8 +69,8 @@ class LookUpdate:
         """
         current = [observation for observation in observations if self._is_current(observation.position)]
         known = [record for record in self.records if record.state in ON_TABLE]
-        detected = self._update_detected(known, [entry for entry in current if entry.confident])
-        uncertain = self._update_uncertain(detected, [entry for entry in current if not entry.confident])
+        detected = self._update_detected(known, [entry for entry in current if entry.is_confident])
+        uncertain = self._update_uncertain(detected, [entry for entry in current if not entry.is_confident])
         undetected = [record for record in known if record not in (*detected, *uncertain)]
         phantoms = self._update_undetected(undetected)
         # No further look has to find a rejected item, so that its position counts as searched.

@@ -46,7 +46,7 @@ class Recovery:
         for name in self._bins.bins:
             if self._bins.is_floor_visible(name, look):
                 in_bin = [observation for observation in bin_names if bin_names[observation] == name]
-                labels = (observation.detection.label for observation in in_bin if observation.confident)
+                labels = (observation.detection.label for observation in in_bin if observation.is_confident)
                 self._counts_by_bin[name].append(Counter(labels))
 
     def record_bin_contents(self, change_count: int) -> None:

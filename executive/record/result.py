@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from executive.cell.json_values import to_json
-from executive.cell.workcell import PLACES
+from executive.cell.workcell import AUDIT_KEYS
 from executive.errors import ExecutiveError, explain_os_errors
 from executive.events import RunResumed, TimedEvent
 from executive.exit_codes import ExitCode
@@ -31,7 +31,7 @@ MISTAKE_DESCRIPTIONS = {
     "fell_in_wrong_bin": "fallen into a wrong bin",
     "unseen": "never seen",
 }
-"""Description of each count of an audit that is a mistake, by its key in `PLACES`."""
+"""Description of each count of an audit that is a mistake, by its key in `AUDIT_KEYS`."""
 
 FINAL_STATUSES = ("SUCCESS", "FAILURE")
 """Statuses of a run that cannot be resumed: its tree has ended, and no item was rejected."""
@@ -51,7 +51,7 @@ class ItemCounts:
 
 @dataclass(frozen=True)
 class Audit:
-    """Number of objects by true place, as in `executive.cell.workcell.PLACES`.
+    """Number of objects by true place, as in `executive.cell.workcell.AUDIT_KEYS`.
 
     Attributes:
         agrees: True if the true places confirm the counts of the ledger.
@@ -155,7 +155,9 @@ def list_requests(timeline: Timeline) -> list[str]:
 
 def make_audit(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> Audit:
     """Return the true counts `audit`, compared with the counts `items` of the ledger."""
-    return Audit(is_confirmed_by_audit(items, audit, empty), **{place: int(audit[place]) for place in PLACES})
+    return Audit(
+        is_confirmed_by_audit(items, audit, empty), **{place: int(audit[place]) for place in AUDIT_KEYS}
+    )
 
 
 def is_confirmed_by_audit(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> bool:

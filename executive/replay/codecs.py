@@ -91,7 +91,7 @@ def decode_frame(value: Any) -> Frame:
 def encode_detection(detection: Detection) -> list[Any]:
     """Return the class, its confidence, the box and the confidence of the second most likely class."""
     box = [float(edge) for edge in detection.box]
-    return [detection.label, float(detection.confidence), box, float(detection.rival)]
+    return [detection.label, float(detection.confidence), box, float(detection.second_confidence)]
 
 
 def decode_detection(value: Any) -> Detection:
@@ -126,7 +126,7 @@ def encode_observations(observations: Sequence[Observation]) -> list[Any]:
             encode_detection(each.detection),
             each.position.tolist(),
             each.std,
-            each.confident,
+            each.is_confident,
             each.contradiction,
         ]
         for each in observations

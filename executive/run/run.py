@@ -94,7 +94,7 @@ class Run:
         return self.workcell.accounts.count_states()
 
     def count_ground_truth(self) -> Mapping[str, int] | None:
-        """Return the number of objects by their true place (`PLACES`) after `execute`; None if unknown."""
+        """Return the true object counts (`AUDIT_KEYS`) after `execute`, or None if they are unknown."""
         return self.workcell.audit()
 
     def close(self) -> None:

@@ -21,12 +21,14 @@ VISIBLE[:, 10:] = False  # The arm hides the right half.
 FRAME = Frame(1, "eye", np.zeros((20, 20, 3), np.uint8), None, np.eye(3), Pose.identity(), 0.0, VISIBLE, 0)
 
 
-def detect(label: str = "cube", confidence: float = 0.9, right: float = 9.0, rival: float = 0.0) -> Detection:
-    return Detection(label, confidence, (right - 9.0, 0.0, right, 9.0), rival)
+def detect(
+    label: str = "cube", confidence: float = 0.9, right: float = 9.0, second_confidence: float = 0.0
+) -> Detection:
+    return Detection(label, confidence, (right - 9.0, 0.0, right, 9.0), second_confidence)
 
 
 def test_detections_are_divided_by_confidence_second_class_and_label() -> None:
-    cube, weak, torn = detect(), detect(confidence=0.4), detect(confidence=0.7, rival=0.4)
+    cube, weak, torn = detect(), detect(confidence=0.4), detect(confidence=0.7, second_confidence=0.4)
     mug, weak_mug = detect("mug"), detect("mug", confidence=0.4)
     answer = screen_answer(Answer("eye", (cube, mug, torn, weak, weak_mug), RATES), FRAME, "table", ["cube"])
     assert (answer.found, answer.doubtful, answer.unknown) == ((cube,), (torn, weak), (mug,))

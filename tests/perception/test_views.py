@@ -33,11 +33,11 @@ def test_the_table_view_is_the_square_of_the_cell_file_and_a_smaller_frame_is_on
 
 
 def test_a_detection_keeps_the_confidence_of_its_second_class_and_gets_the_name_of_the_cell():
-    ball = Detection("ball", 0.6, (1, 2, 3, 4), rival=0.5)
+    ball = Detection("ball", 0.6, (1, 2, 3, 4), second_confidence=0.5)
     (kept,) = search_regions(
         np.zeros((480, 640, 3), np.uint8), [TABLE], lambda part: [ball], {"ball": "sphere"}
     )
-    assert kept == Detection("sphere", 0.6, (193, 102, 195, 104), rival=0.5)
+    assert kept == Detection("sphere", 0.6, (193, 102, 195, 104), second_confidence=0.5)
 
 
 @given(

@@ -72,5 +72,5 @@ def test_observations_come_back(
 ) -> None:
     (read,) = back(codecs.OBSERVATIONS, [Observation(detection, position, std, confident, contradiction)])
     assert np.array_equal(read.position, position)
-    others = (read.detection, read.std, read.confident, read.contradiction)
+    others = (read.detection, read.std, read.is_confident, read.contradiction)
     assert others == (detection, std, confident, contradiction)

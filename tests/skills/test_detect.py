@@ -12,7 +12,7 @@ from executive.testing.run_skill import run_skill
 from skills.detect import Detect
 
 WEAK = Detection("duck", 0.4, (0, 0, 9, 9))
-TORN = Detection("cube", 0.62, (0, 0, 9, 9), rival=0.58)
+TORN = Detection("cube", 0.62, (0, 0, 9, 9), second_confidence=0.58)
 
 
 def test_an_answer_becomes_visible_after_the_detectors_latency(fake: FakeCell) -> None:

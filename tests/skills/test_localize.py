@@ -78,7 +78,7 @@ def test_an_object_in_a_bin_may_lie_at_any_height(fake: FakeCell, monkeypatch: p
     observed: list[bool] = []
 
     def observe(look: Detections, observations: list[Observation]) -> list[Target]:
-        observed.extend(one.confident for one in observations)
+        observed.extend(one.is_confident for one in observations)
         return []
 
     monkeypatch.setattr(fake.ledger, "observe", observe)

@@ -100,7 +100,7 @@ class ToolConfig(Section):
     cup_radius: Length
     """Radius of the lip [m]."""
     reach: Length = 0.002
-    """Maximum distance from a surface at which the lip still seals [m]."""
+    """Maximum distance between lip and surface at which the lip seals [m]."""
     force: Force
     """Breakaway force of a perfect seal [N]."""
     gap: Length
@@ -119,12 +119,12 @@ class MotionConfig(Section):
     margin: Distance = 0.005
     """Minimum distance of arm, tool and load from all obstacles during a motion [m]."""
     clearance: Length = 0.04
-    """Clearance over the highest wall and pile in the fallback motion [m]. This motion stops at every corner;
-    it is used if no other motion is collision-free."""
+    """Clearance over the highest wall and pile [m] in the fallback motion, which stops at every corner and is
+    used if no other motion is collision-free."""
     descent: float = Field(0.005, ge=MIN_LENGTH, le=0.1)
-    """Height above the expected surface at which the slow, guarded descent of an approach starts [m]."""
+    """Height above the expected surface at which the guarded descent of an approach starts [m]."""
     descent_speed: float = Field(0.035, ge=0.001, le=0.25)
-    """Tool speed of the guarded descent [m/s]; at most the reduced speed of ISO 10218."""
+    """Tool speed of the guarded descent [m/s]; the maximum is the reduced speed of ISO 10218."""
     straight: float = Field(0.0, ge=0, le=0.2)
     """Length of the straight vertical segment at the end of a motion into a bin, and at the start of a motion
     that begins upwards [m]."""

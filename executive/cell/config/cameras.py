@@ -7,20 +7,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from executive.cell.config.section import (
-    Distance,
-    Fraction,
-    GreyLevels,
-    Length,
-    Name,
-    Natural,
-    Section,
-    Vector,
-)
+from executive.cell.config.section import Distance, Fraction, Length, Name, Natural, Section, Vector
 
 Pixels = Annotated[float, Field(ge=-1e5, le=1e5)]
 """An entry of a camera matrix [pixel]; with a focal length of 100,000, 640 pixels span 0.4 degrees."""
 Row = tuple[Pixels, Pixels, Pixels]
+"""A row of a camera matrix."""
 RotationComponent = Annotated[float, Field(ge=-7, le=7)]
 """A component of a rotation vector [rad]; 7 rad are more than one revolution."""
 
@@ -32,9 +24,9 @@ class NoiseConfig(Section):
     """Image noise of a camera, sampled for each frame with the seed of the run."""
 
     gain: Fraction = 0.02
-    """Standard deviation of the brightness factor of a frame, whose mean is 1."""
-    read: GreyLevels = 2.0
-    """Standard deviation of the noise added to each pixel [grey level, 0 to 255]."""
+    """Standard deviation of the random brightness factor of a frame; the mean of the factor is 1."""
+    read: float = Field(2.0, ge=0, le=255)
+    """Standard deviation of the noise of each pixel [grey level, 0 to 255]."""
 
 
 class DepthConfig(Section):
@@ -53,7 +45,7 @@ class DepthConfig(Section):
     grain: float = Field(1.0, ge=0, le=100)
     """Standard deviation of the Gaussian kernel that smooths the noise [pixel]; 0: independent pixels."""
     step: Distance = 0.001
-    """Resolution of the distances [m]; 0: not rounded."""
+    """Resolution of the distances [m]; 0: exact distances."""
     edge: Length = 0.02
     """Minimum difference between the distances of neighbouring pixels that counts as an edge [m]."""
     edge_width: Natural = 2
@@ -120,7 +112,7 @@ class CameraConfig(Section):
     calibration: CalibrationConfig | None = None
     """Camera matrix and pose, instead of `position`, `look_at`, `up` and `fov_deg`."""
     table_view: tuple[int, int, int, int]
-    """Left, top, right and bottom side [pixel] of the square region of the image that shows the workspace."""
+    """Square region of the image that shows the workspace: left, top, right and bottom side [pixel]."""
     scan_poses: tuple[Name, ...] = Field(min_length=1)
     """Arm poses from which the camera sees the table, best first."""
     noise: NoiseConfig = NoiseConfig()

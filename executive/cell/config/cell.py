@@ -17,8 +17,8 @@ class LedgerConfig(Section):
     """Thresholds of the ledger."""
 
     gate: Length = 0.025
-    """Maximum distance between a detection and the item to which it is assigned [m]; up to twice the value if
-    the positions are uncertain."""
+    """Maximum distance between a detection and the item to which it is assigned [m]; twice the value if the
+    positions are very uncertain."""
     neighbourhood: Distance = 0.07
     """Radius around a picked item within which other items may have been moved [m]."""
     max_miss_probability: float = Field(0.001, ge=1e-9, lt=1)
@@ -37,8 +37,8 @@ class CellConfig(Section):
     """
 
     base: str = Field("", exclude=True)  # "" after loading.
-    """Path of a base file, from which this file inherits each missing top-level key, each missing detector
-    and each missing key of a detector."""
+    """Path of a base file, from which this file inherits missing top-level keys, missing detectors and
+    missing keys of detectors."""
     cell: Name
     """Name of the cell."""
     description: str = ""
@@ -61,8 +61,8 @@ class CellConfig(Section):
     detector: str = ""
     """Name of the detector that skills use by default; if not given, the first of `detectors`."""
     detectors: dict[Name, DetectorConfig] = Field(min_length=1)
-    """Detectors by name. With a `base`: a detector with the name and kind of a base detector overrides single
-    keys, with another kind it replaces the base detector, and a name without a value removes it."""
+    """Detectors by name. A detector of the base file keeps the keys that this file does not override, is
+    replaced if this file declares another kind, and is removed by its name without a value."""
     localization: Literal["plane", "depth", "ray"] = "plane"
     """Source of the height of a detected object: `plane`, its class; `depth`, the depth image; `ray`, a ray
     test of the simulator."""
@@ -76,10 +76,10 @@ class CellConfig(Section):
     @field_validator("detectors")
     @classmethod
     def _put_default_first(
-        cls, detectors: dict[str, DetectorConfig], others: ValidationInfo
+        cls, detectors: dict[str, DetectorConfig], info: ValidationInfo
     ) -> dict[str, DetectorConfig]:
         """Put the default detector first, because skills use the first detector by default."""
-        default = others.data.get("detector", "")
+        default = info.data.get("detector", "")
         if not default:
             return detectors
         if default not in detectors:

@@ -24,12 +24,12 @@ class DetectorConfig(Section):
     latency: Seconds = 0.05
     """Time from the frame to the answer, on the clock of the run [s]."""
     miss_rate: float = Field(0.03, gt=0, lt=1)
-    """Fraction of the completely visible objects that one look misses. This key, `confusion_rate`,
-    `false_detections` and `jitter` are only for fake detectors; `executive evaluate` measures others."""
+    """Fraction of the completely visible objects that the search of a frame misses. The keys `miss_rate`,
+    `confusion_rate`, `false_detections` and `jitter` are for fake detectors; others are measured."""
     confusion_rate: float = Field(0.004, gt=0, lt=1)
     """Fraction of the found objects that get a wrong class."""
     false_detections: float = Field(0.02, gt=0, le=100)
-    """Mean number of false detections per look."""
+    """Mean number of false detections per frame."""
     jitter: float = Field(1.0, gt=0, le=1000)
     """Standard deviation of the random error of the centre of a box, along each axis [pixel]."""
 

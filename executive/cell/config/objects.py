@@ -27,8 +27,8 @@ class ObjectConfig(Section):
     urdf: str = ""
     """Path of a URDF, relative to the cell file or to pybullet_data."""
     mesh: str = ""
-    """Path of a Wavefront mesh (`.obj`, with z up, or see `upright_deg`), relative as for `urdf`.
-    The collision shape of each group (`o`) is its convex hull; a part with a hole needs several groups."""
+    """Path of a Wavefront mesh (`.obj`), relative to the cell file or to pybullet_data. The collision shape
+    of each group (`o`) is the convex hull of the group: a part with a hole needs several groups."""
     mass: float = Field(0.05, ge=1e-4, le=1000)
     """Mass of a mesh [kg]; a URDF contains its mass."""
     scale: float = Field(1.0, ge=1e-4, le=1e4)
@@ -42,7 +42,7 @@ class ObjectConfig(Section):
     ring: Distance = 0.0
     """Distance of the contact point from the centre [m]; above 0 only for parts with a hole."""
     colours: tuple[Colour, ...] = ((1.0, 1.0, 1.0),)
-    """Colours (red, green, blue, each 0 to 1) of which each spawned object gets a random one."""
+    """Colours (red, green, blue, each 0 to 1) from which the colour of each spawned object is drawn."""
 
     @model_validator(mode="after")
     def _check_model(self) -> ObjectConfig:
@@ -82,4 +82,4 @@ class TableConfig(Section):
     gap: Distance = 0.012
     """Minimum distance between the outlines of two spawned objects [m]."""
     stacked: Fraction = 0.0
-    """Fraction of the objects that are spawned on top of another object, unless they fall down."""
+    """Fraction of the objects that are spawned on another object; unstable objects fall down."""

@@ -37,14 +37,14 @@ def check_name(name: str) -> str:
 
 Name = Annotated[str, AfterValidator(check_name)]
 MIN_LENGTH, MAX_LENGTH = 1e-4, 10.0
-"""Smallest and largest length in a cell [m]: a tenth of a millimetre is below every sensor's error, and 10 m
-is beyond every arm's reach."""
+"""Minimum and maximum length in a cell [m]; every sensor has a larger error, every arm a shorter reach."""
 Length = Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
 Distance = Annotated[float, Field(ge=0, le=MAX_LENGTH)]
 Coordinate = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]
 Count = Annotated[int, Field(ge=1, le=1000)]
 """A positive number of things; no bin, table or image has more than 1000 objects."""
 Natural = Annotated[int, Field(ge=0, le=1000)]
+"""A number of things that may be 0."""
 Range = Annotated[tuple[Coordinate, Coordinate], AfterValidator(check_ascending)]
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 """x, y, z [m]."""
@@ -59,7 +59,6 @@ Colour = tuple[Channel, Channel, Channel]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Seconds = Annotated[float, Field(ge=0, le=600)]
 """A duration [s]; more than ten minutes is an error in the cell file."""
-GreyLevels = Annotated[float, Field(ge=0, le=255)]
 
 
 class Section(BaseModel):

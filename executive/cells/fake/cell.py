@@ -109,9 +109,9 @@ class FakeCell(CellWithoutHardware):
         self.detector = next(iter(self.detectors.values()))
         self._log: FakeLog | None = None
         if options.resume is not None:
-            self.steps, self.last_command = restore_world(options.resume.log, self.world, self.arm)
-            self.camera.set_counts(options.resume.frames, options.resume.turns)
-            self.log_to(options.resume.log)
+            self.steps, self.last_command = restore_world(options.resume.log_path, self.world, self.arm)
+            self.camera.set_counts(options.resume.frame_count, options.resume.pose_count)
+            self.log_to(options.resume.log_path)
         self.cell = replace(
             self.cell,
             arm=self.arm,

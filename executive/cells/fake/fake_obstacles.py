@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from executive.cell.config import CellConfig
-from executive.cell.layout import list_bin_walls
+from executive.cell.layout import list_bin_boxes
 from executive.cell.objects import ObjectClass
 from executive.geometry import Array
 from executive.motion.clearance_model import MAX_PENETRATION
@@ -38,7 +38,7 @@ class FakeObstacles:
 
     def __init__(self, config: CellConfig) -> None:
         self._cup_radius = config.tool.cup_radius
-        parts = [(name, bin, *wall) for name, bin in config.bins.items() for wall in list_bin_walls(bin.size)]
+        parts = [(name, bin, *wall) for name, bin in config.bins.items() for wall in list_bin_boxes(bin.size)]
         centres = np.array([np.add(bin.position, centre) for _, bin, _, centre in parts]).reshape(-1, 3)
         half_sizes = np.array([half_size for _, _, half_size, _ in parts]).reshape(-1, 3)
         # Index 0 is the table: an infinite box with its top at height 0.

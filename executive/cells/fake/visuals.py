@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from executive.cell.config import CellConfig
-from executive.cell.layout import TOOL_RADIUS, list_bin_walls
+from executive.cell.layout import TOOL_RADIUS, list_bin_boxes
 from executive.cell.visuals import Shape
 from executive.cells.fake.world import FakeObject, FakeWorld
 from executive.geometry import Pose
@@ -64,7 +64,7 @@ def _make_fixed_shapes(config: CellConfig) -> Iterator[Shape]:
     X_WS = Pose.of(((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2))
     yield Shape("", "box", size, X_WS, TABLE_COLOUR)
     for bin in config.bins.values():
-        for (x, y, z), centre in list_bin_walls(bin.size):
+        for (x, y, z), centre in list_bin_boxes(bin.size):
             size = 2 * x, 2 * y, 2 * z
             yield Shape("", "box", size, Pose.of(np.add(bin.position, centre)), bin.colour)
 

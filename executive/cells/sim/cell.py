@@ -74,7 +74,7 @@ class SimCell(CellWithoutHardware):
         self._clearance_checker = ClearanceChecker(config)
         planner = build_planner(config, self._clearance_checker.check)
         self._tool = SuctionTool(world, config.tool)
-        interrupted = None if options.resume is None else self._rebuild_world(options.resume.log)
+        interrupted = None if options.resume is None else self._rebuild_world(options.resume.log_path)
         self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, interrupted)
         name, camera_config = next(iter(config.cameras.items()))
         self._camera = camera(
@@ -90,7 +90,7 @@ class SimCell(CellWithoutHardware):
             bins=tuple(bins),
         )
         if options.resume is not None:
-            self._camera.set_counts(options.resume.frames, options.resume.turns)
+            self._camera.set_counts(options.resume.frame_count, options.resume.pose_count)
         classes = {label: object_class_with_mass(label, kind) for label, kind in config.objects.items()}
         localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
         # Detectors are built last, because their processes would not be ended if a later statement failed.

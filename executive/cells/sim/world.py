@@ -16,7 +16,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.clock import STEP
 from executive.cell.config import BinConfig, CellConfig, ObjectConfig
-from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_walls
+from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_boxes
 from executive.cells.sim import command_log
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.model_files import find_model
@@ -214,7 +214,7 @@ def name_held(label: str) -> str:
 
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
     """Create a static body with floor and walls of a bin at its position, and return the body."""
-    half_sizes, centres = map(list, zip(*list_bin_walls(bin.size), strict=True))
+    half_sizes, centres = map(list, zip(*list_bin_boxes(bin.size), strict=True))
     shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(half_sizes), "halfExtents": half_sizes}
     colours = [[*bin.colour, 1]] * len(half_sizes)
     collision = client.createCollisionShapeArray(**shape, collisionFramePositions=centres)

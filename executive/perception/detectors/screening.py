@@ -95,7 +95,7 @@ def screen_detectors(detectors: Mapping[str, Detector], labels: Collection[str])
 def _is_confident(detection: Detection, threshold: float) -> bool:
     """Return True if a detection is confident enough, and its second class is at most half as likely."""
     confidence = detection.confidence
-    return confidence >= threshold and detection.rival <= MAX_RIVAL_RATIO * confidence
+    return confidence >= threshold and detection.second_confidence <= MAX_RIVAL_RATIO * confidence
 
 
 def _is_valid(detection: Detection) -> bool:

@@ -10,7 +10,7 @@ import pytest
 
 from executive.cell.config import CellConfig
 from executive.cell.detection import Detections
-from executive.cell.workcell import PLACES, CellOptions
+from executive.cell.workcell import AUDIT_KEYS, CellOptions
 from executive.cells.fake.cell import FakeCell, SilentOperator
 from executive.errors import InputError
 from executive.mission.load import load_mission
@@ -189,7 +189,7 @@ def test_what_fell_between_two_bins_is_in_the_nearer(load: Load, x: float, what:
     """The premium crate ends at 0.36 m, and the market crate begins at 0.37 m."""
     cell = FakeCell(load("fruit", table__objects="[0, 0]"), routes={"banana": ("premium_crate",)})
     cell.world.put("banana", x, 0.4).is_dropped = True
-    assert {count: n for count, n in cell.audit().items() if n and count not in PLACES[-2:]} == {what: 1}
+    assert {count: n for count, n in cell.audit().items() if n and count not in AUDIT_KEYS[-2:]} == {what: 1}
 
 
 @pytest.mark.parametrize("beside", [None, 0.04], ids=["alone", "beside a cube"])
@@ -217,4 +217,4 @@ def test_what_is_taken_out_of_a_bin_counts_as_if_it_still_lay_there(
     if in_bin:
         cube.position = cell.cell.bins["red_bin"].position
     cell.world.remove(cube)
-    assert cell.audit() == {**dict.fromkeys(PLACES, 0), what: 1}
+    assert cell.audit() == {**dict.fromkeys(AUDIT_KEYS, 0), what: 1}

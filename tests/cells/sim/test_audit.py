@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from executive.cell.bins import Bin
-from executive.cell.workcell import PLACES
+from executive.cell.workcell import AUDIT_KEYS
 from executive.cells.audit import UNKNOWN
 from executive.cells.sim.audit import audit_bodies
 from executive.geometry import Pose
@@ -73,8 +73,8 @@ def test_a_body_that_was_taken_out_of_a_bin_counts_as_if_it_still_lay_there(
     world = OneBody()
     world.removed_objects[7] = (world.bodies.pop(7), np.array(place))
     item = SimpleNamespace(state=None, first_position=np.array(ON_TABLE))
-    assert counted(bins, world, records=[item], **more) == {**dict.fromkeys(PLACES, 0), end: 1}
-    assert counted(bins, world, **more) == dict.fromkeys(PLACES, 0), "nobody had seen it"
+    assert counted(bins, world, records=[item], **more) == {**dict.fromkeys(AUDIT_KEYS, 0), end: 1}
+    assert counted(bins, world, **more) == dict.fromkeys(AUDIT_KEYS, 0), "nobody had seen it"
 
 
 @pytest.mark.parametrize(
@@ -92,5 +92,5 @@ def test_an_unknown_object_counts_if_an_item_stands_for_it_or_if_it_is_in_a_bin(
     place: Sequence[float], claimed: bool, end: dict[str, int]
 ) -> None:
     items = [SimpleNamespace(state=None, first_position=np.array(ON_TABLE))] if claimed else []
-    none = dict.fromkeys(PLACES, 0)
+    none = dict.fromkeys(AUDIT_KEYS, 0)
     assert counted(("red_bin",), OneBody(UNKNOWN, place), records=items) == {**none, **end}
