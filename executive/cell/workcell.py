@@ -25,10 +25,7 @@ class Accounts(Protocol):
         """Discard the items on the table; the next look adds a new item for each visible object."""
 
     def count_states(self) -> dict[str, int]:
-        """Return the number of items by final state: `placed`, `rejected`, `skipped`, `lost`, `phantom`.
-
-        The key `seen` is the number of all items except phantoms.
-        """
+        """Return the number of items in each final state, and of all items except phantoms (`seen`)."""
 
     @property
     def unknown_labels(self) -> Mapping[str, int]:

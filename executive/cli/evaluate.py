@@ -123,8 +123,8 @@ def command(
             from executive.training.dataset import save_image
             from executive.training.evaluation.worst_mistakes import draw_sheet
 
-            save_image(sheet, draw_sheet(worst.kept, ", ".join(results)))
-            click.echo(f"{sheet}: the {len(worst.kept)} worst mistakes", err=True)
+            save_image(sheet, draw_sheet(worst.mistakes, ", ".join(results)))
+            click.echo(f"{sheet}: the {len(worst.mistakes)} worst mistakes", err=True)
     if as_json:
         named_files = {"scene": scene and str(scene), "weights": weights and str(weights)}
         print_json({"seed": seed, "varied": varied, **named_files, "measured": results})

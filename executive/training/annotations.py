@@ -1,4 +1,4 @@
-"""Reading of the annotations of labelled images, in COCO or YOLO format, without reading the images."""
+"""Reader of the annotations of labelled images in COCO or YOLO format; it does not read the images."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MAX_LABEL_FILE_SIZE = 10_000_000
 MAX_CLASS_FILE_SIZE = 100_000
 """Maximum size of a YOLO class file [byte]."""
 NORMALIZED_TOLERANCE = 1e-6
-"""Distance by which a normalized coordinate may lie outside of 0 to 1, because of rounding."""
+"""Maximum rounding error of a normalized coordinate, which is 0 to 1."""
 
 
 @dataclass
@@ -53,15 +53,14 @@ class ImageAnnotation:
 
     def to_pixel_boxes(self, width: int, height: int) -> tuple[Box, ...]:
         """Return the boxes in pixels for an image of `width` by `height` pixels."""
-        x, y = (width, height) if self.is_normalized else (1, 1)
-        return tuple((x0 * x, y0 * y, x1 * x, y1 * y) for x0, y0, x1, y1 in self.boxes)
+        x_scale, y_scale = (width, height) if self.is_normalized else (1, 1)
+        return tuple(
+            (left * x_scale, top * y_scale, right * x_scale, bottom * y_scale)
+            for left, top, right, bottom in self.boxes
+        )
 
     def add(self, label: str, box: Box, message_start: str) -> None:
-        """Add an object.
-
-        Raises:
-            InputError: The image has too many objects; the message begins with `message_start`.
-        """
+        """Add an object; `message_start` is the start of the message if the image has too many objects."""
         if len(self.labels) == MAX_OBJECT_COUNT:
             raise InputError(f"{message_start} more than {MAX_OBJECT_COUNT} objects; divide the image")
         self.labels.append(label)
@@ -70,38 +69,49 @@ class ImageAnnotation:
 
 Annotations = Mapping[Path, ImageAnnotation]
 """Annotations of a split by the path of the image, sorted by path."""
-NonNegative = Annotated[FiniteFloat, Field(ge=0)]
+Length = Annotated[FiniteFloat, Field(ge=0)]
+"""Width or height of a COCO box [pixel]."""
 ContentT = TypeVar("ContentT")
 
 
 class _CocoImage(BaseModel):
+    """An image of a COCO file."""
+
     id: int
     file_name: str
 
 
 class _CocoObject(BaseModel):
+    """A labelled object; `bbox` has left, top, width and height [pixel]."""
+
     image_id: int
     category_id: int
-    bbox: tuple[FiniteFloat, FiniteFloat, NonNegative, NonNegative]
+    bbox: tuple[FiniteFloat, FiniteFloat, Length, Length]
 
 
 class _CocoCategory(BaseModel):
+    """A class of objects."""
+
     id: int
     name: str
 
 
 class _CocoFile(BaseModel):
+    """The used keys of a COCO file."""
+
     images: list[_CocoImage]
     annotations: list[_CocoObject]
     categories: list[_CocoCategory]
 
 
 class _YoloClassFile(BaseModel):
+    """The used key of a YOLO class file: names by class number, or in the order of the numbers."""
+
     names: dict[int, str] | list[str]
 
 
 def is_split(folder: Path) -> bool:
-    """Return True if a folder contains labelled images in COCO or YOLO format (one split of a dataset)."""
+    """Return True if a folder is a split of a dataset: labelled images in COCO or YOLO format."""
     return (folder / COCO_FILE_NAME).is_file() or (
         (folder / "images").is_dir() and (folder / "labels").is_dir()
     )
@@ -119,90 +129,95 @@ def read_annotations(split: Path) -> Annotations:
 
 
 def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
+    """Yield the path and the objects of each image of a split in COCO format."""
     file = split / COCO_FILE_NAME
     content = parse_file(file, MAX_COCO_FILE_SIZE, _CocoFile.model_validate_json)
-    names = {category.id: category.name for category in content.categories}
-    objects = {image.id: ImageAnnotation() for image in content.images}
-    for problem, values in (
+    class_names = {category.id: category.name for category in content.categories}
+    annotations = {image.id: ImageAnnotation() for image in content.images}
+    for duplicate, values in (
         ("images have the same id", [image.id for image in content.images]),
         ("images have the same file_name", [split / image.file_name for image in content.images]),
         ("categories have the same id", [category.id for category in content.categories]),
     ):
         if len(set(values)) < len(values):
-            raise InputError(f"{file}: two {problem}")
-    for index, entry in enumerate(content.annotations):
-        key, image_id, category = f"{file}: annotations[{index}]", entry.image_id, entry.category_id
-        if image_id not in objects:
+            raise InputError(f"{file}: two {duplicate}")
+    for index, coco_object in enumerate(content.annotations):
+        image_id, class_id = coco_object.image_id, coco_object.category_id
+        key = f"{file}: annotations[{index}]"
+        if image_id not in annotations:
             raise InputError(f"{key}.image_id: there is no image {image_id}")
-        if category not in names:
-            known_ids = ", ".join(map(str, names))[:MAX_QUOTATION_LENGTH] or "none"
-            raise InputError(f"{key}.category_id: no category has the id {category}; ids: {known_ids}")
-        left, top, width, height = entry.bbox
+        if class_id not in class_names:
+            known_ids = ", ".join(map(str, class_names))[:MAX_QUOTATION_LENGTH] or "none"
+            raise InputError(f"{key}.category_id: no category has the id {class_id}; ids: {known_ids}")
+        left, top, width, height = coco_object.bbox
         box = left, top, left + width, top + height
-        objects[image_id].add(names[category], box, f"{key}.image_id: image {image_id} has")
+        annotations[image_id].add(class_names[class_id], box, f"{key}.image_id: image {image_id} has")
     for index, image in enumerate(content.images):
         path = _find_image(split, image.file_name, f"{file}: images[{index}].file_name")
-        yield path, objects[image.id]
+        yield path, annotations[image.id]
 
 
 def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
+    """Yield the path and the objects of each image of a split in YOLO format."""
     paths = (split.parent / name for name in YOLO_CLASS_FILES)
     class_file = next((path for path in paths if path.is_file()), None)
     if class_file is None:
         raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO dataset")
-    content = parse_file(
-        class_file,
-        MAX_CLASS_FILE_SIZE,
-        lambda text: _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader)),
-    )
-    names = dict(enumerate(content.names)) if isinstance(content.names, list) else content.names
+
+    def parse(text: str) -> _YoloClassFile:
+        return _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader))
+
+    names = parse_file(class_file, MAX_CLASS_FILE_SIZE, parse).names
+    class_names = dict(enumerate(names)) if isinstance(names, list) else names
     folder = split / "images"
     for path in folder.iterdir():
         if path.suffix.lower() in IMAGE_SUFFIXES:
-            image = _find_image(folder, path.name, str(path))
-            yield image, _read_labels(split / "labels" / f"{path.stem}.txt", names)
+            image_path = _find_image(folder, path.name, str(path))
+            yield image_path, _read_labels(split / "labels" / f"{path.stem}.txt", class_names)
 
 
-def _read_labels(file: Path, names: Mapping[int, str]) -> ImageAnnotation:
+def _read_labels(file: Path, class_names: Mapping[int, str]) -> ImageAnnotation:
     """Return the objects in the label file of a YOLO image; an image without a label file has none."""
-    objects = ImageAnnotation(is_normalized=True)
+    annotation = ImageAnnotation(is_normalized=True)
     if not os.path.lexists(file):
-        return objects
-    for number, line in enumerate(_read_text(file, MAX_LABEL_FILE_SIZE).splitlines(), start=1):
+        return annotation
+    for line_number, line in enumerate(_read_text(file, MAX_LABEL_FILE_SIZE).splitlines(), start=1):
         if not line.strip():
             continue
         try:
-            label, *values = line.split()
-            numbers = [float(value) for value in values]
-            name = names[int(label)]
+            class_number, *texts = line.split()
+            values = [float(text) for text in texts]
+            label = class_names[int(class_number)]
         except KeyError:
-            raise InputError(f"{file}:{number}: {label} is not one of {len(names)} classes") from None
+            raise InputError(
+                f"{file}:{line_number}: {class_number} is not one of {len(class_names)} classes"
+            ) from None
         except ValueError:
             raise InputError(
-                f'{file}:{number}: must be a class number and normalized coordinates, not "{line}"'
+                f'{file}:{line_number}: must be a class number and normalized coordinates, not "{line}"'
             ) from None
-        is_polygon = len(numbers) > BOX_VALUE_COUNT and len(numbers) % 2 == 0
-        if len(numbers) != BOX_VALUE_COUNT and not is_polygon:
+        is_polygon = len(values) > BOX_VALUE_COUNT and len(values) % 2 == 0
+        if len(values) != BOX_VALUE_COUNT and not is_polygon:
             raise InputError(
-                f"{file}:{number}: a box has {BOX_VALUE_COUNT} values and a polygon an even number, at least "
-                f"6; this line has {len(numbers)}"
+                f"{file}:{line_number}: a box has {BOX_VALUE_COUNT} values and a polygon an even number, at "
+                f"least 6; this line has {len(values)}"
             )
-        # The comparison is False for numbers that are not finite.
-        if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in numbers):
-            raise InputError(f'{file}:{number}: coordinates must be normalized (0 to 1), not "{line}"')
+        # A value that is not finite fails the comparison.
+        if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in values):
+            raise InputError(f'{file}:{line_number}: coordinates must be normalized (0 to 1), not "{line}"')
         if is_polygon:
-            xs, ys = numbers[0::2], numbers[1::2]
+            xs, ys = values[0::2], values[1::2]
             box = min(xs), min(ys), max(xs), max(ys)
         else:
-            x, y, width, height = numbers
+            x, y, width, height = values
             box = x - width / 2, y - height / 2, x + width / 2, y + height / 2
-        objects.add(name, box, f"{file}:{number}: the image has")
-        objects.polygon_count += is_polygon
-    return objects
+        annotation.add(label, box, f"{file}:{line_number}: the image has")
+        annotation.polygon_count += is_polygon
+    return annotation
 
 
 def _find_image(folder: Path, name: str, source: str) -> Path:
-    """Return the path of an image; `source` is the file and the key that name it, for error messages.
+    """Return the path of an image; `source` is the file and the key with the name, for error messages.
 
     Raises:
         InputError: The image is missing, is not a regular file, or lies outside of the folder.
@@ -218,6 +233,7 @@ def _find_image(folder: Path, name: str, source: str) -> Path:
 
 
 def _read_text(file: Path, max_size: int) -> str:
+    """Return the text of a file of at most `max_size` [byte]."""
     if not os.path.isfile(file):
         raise InputError(f"{file} is not a file")
     if file.stat().st_size > max_size:

@@ -15,7 +15,7 @@ ARCHITECTURE: dict[str, Any] = {
     "resolution": RESOLUTION,
     # The model uses the outputs of encoder layers 1 and 3; the export drops deeper layers.
     "out_feature_indexes": [1, 3],
-    # At most 20 objects lie on the table; each of the 300 default queries would cost time in every step.
+    # At most 20 objects lie on the table; the default, 300 queries, would make training and inference slower.
     "num_queries": 50,
     "num_select": 50,
     "group_detr": 5,
@@ -24,7 +24,7 @@ ARCHITECTURE: dict[str, Any] = {
 """Arguments of `RFDETRNano` that differ from its defaults."""
 
 TORCHVISION_OPERATORS = ("nms", "qnms")
-"""Operators that torchvision's Python part needs at import; the training calls none of them."""
+"""Operators that the import of torchvision needs; the training calls none of them."""
 
 
 def create_model(class_count: int, checkpoint: Path | None = None, device: str = "cpu") -> Any:
@@ -43,33 +43,24 @@ def create_model(class_count: int, checkpoint: Path | None = None, device: str =
     with warnings.catch_warnings():
         # RF-DETR warns that training from random weights needs more data than fine-tuning.
         warnings.simplefilter("ignore")
-        return RFDETRNano(
-            # For a name without a folder, rfdetr would search its own downloads.
-            pretrain_weights=None if checkpoint is None else str(checkpoint.resolve()),
-            num_classes=class_count,
-            device=device,
-            **ARCHITECTURE,
-        )
+        # For a name without a folder, rfdetr would search its own downloads.
+        weights = None if checkpoint is None else str(checkpoint.resolve())
+        return RFDETRNano(pretrain_weights=weights, num_classes=class_count, device=device, **ARCHITECTURE)
 
 
 def describe_architecture() -> dict[str, str]:
-    """Return the architecture and the input as texts by name, for a model card."""
-    return {
-        "architecture": "RF-DETR Nano (rfdetr), "
-        + ", ".join(f"{name} {value}" for name, value in ARCHITECTURE.items()),
-        "input": f"{RESOLUTION} x {RESOLUTION} pixel, RGB",
-    }
+    """Return the descriptions of architecture and input for a model card, by name."""
+    arguments = ", ".join(f"{name} {value}" for name, value in ARCHITECTURE.items())
+    model_input = f"{RESOLUTION} x {RESOLUTION} pixel, RGB"
+    return {"architecture": f"RF-DETR Nano (rfdetr), {arguments}", "input": model_input}
 
 
 @functools.cache
 def declare_missing_operators() -> object | None:
-    """Declare torchvision's operators if its compiled part does not load; to call before its import.
+    """Declare operators if the compiled part of torchvision does not load; return their library, or None.
 
-    With a CPU build of torch and the default build of torchvision, the compiled part of torchvision does not
-    load, and its Python part raises an error at the missing operators.
-
-    Returns:
-        The library that keeps the declarations alive, or None.
+    With a CPU build of torch and the default build of torchvision, the compiled part does not load. Without
+    the declarations, the import of torchvision then raises an error. The library keeps them alive.
     """
     import torch
 

@@ -1,8 +1,8 @@
 """Writer of datasets of labelled images, in two layouts from which detectors are trained.
 
-Layout `coco` is that of Roboflow: `train|valid|test/_annotations.coco.json` beside the images. Layout `yolo`
-is `data.yaml` with `train|valid|test/images` and `…/labels`. The caller writes the images (see
-`build_image_path`), then all annotations with `write_annotations`.
+Layout `coco` has a file `_annotations.coco.json` beside the images of each split, like exports of Roboflow.
+Layout `yolo` has a file `data.yaml`, and folders `images` and `labels` in each split. The caller writes the
+images to `build_image_path`, and then all annotations with `write_annotations`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class DatasetEntry:
         size: Width and height [pixel].
         labels: Class of each labelled object.
         boxes: Left, top, right and bottom [pixel] of each labelled object.
-        ignored: Boxes of objects that are neither labelled nor background.
+        ignored_boxes: Boxes of objects that a detector may find or miss; both are correct [pixel].
         truth: Further ground truth for measurements, as JSON values.
     """
 
@@ -46,7 +46,7 @@ class DatasetEntry:
     size: tuple[int, int]
     labels: tuple[str, ...]
     boxes: tuple[Box, ...]
-    ignored: tuple[Box, ...] = ()
+    ignored_boxes: tuple[Box, ...] = ()
     truth: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -71,8 +71,8 @@ def write_annotations(
 ) -> None:
     """Write the annotations of a dataset; the classes are numbered from 0 in the given order.
 
-    Each split also gets `ignored.json` (`DatasetEntry.ignored` by file name: a measurement counts their
-    detections neither as right nor as wrong) and `truth.json` (`DatasetEntry.truth` by file name).
+    Each split also gets `ignored.json` with `DatasetEntry.ignored_boxes`, and `truth.json` with
+    `DatasetEntry.truth`, by file name.
 
     Raises:
         InputError: The layout is unknown.
@@ -87,7 +87,8 @@ def write_annotations(
             _write_json(root / split / "_annotations.coco.json", _to_coco(split_entries, classes))
         else:
             _write_yolo(root / split / "labels", split_entries, classes)
-        _write_json(root / split / "ignored.json", {entry.file: entry.ignored for entry in split_entries})
+        ignored_boxes = {entry.file: entry.ignored_boxes for entry in split_entries}
+        _write_json(root / split / "ignored.json", ignored_boxes)
         _write_json(root / split / "truth.json", {entry.file: entry.truth for entry in split_entries})
     if layout == "yolo":
         names = {"val" if split == "valid" else split: f"{split}/images" for split in splits}
@@ -96,29 +97,24 @@ def write_annotations(
 
 
 def _to_coco(entries: Sequence[DatasetEntry], classes: Sequence[str]) -> dict[str, Any]:
+    """Return the content of the COCO file of a split."""
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     for image_id, entry in enumerate(entries):
         width, height = entry.size
         images.append({"id": image_id, "file_name": entry.file, "width": width, "height": height})
         for label, (left, top, right, bottom) in zip(entry.labels, entry.boxes, strict=True):
-            annotations.append(
-                {
-                    "id": len(annotations) + 1,
-                    "image_id": image_id,
-                    "category_id": classes.index(label),
-                    "bbox": [round(value, 3) for value in (left, top, right - left, bottom - top)],
-                    "area": round((right - left) * (bottom - top), 3),
-                    "iscrowd": 0,
-                    "segmentation": [],
-                }
-            )
+            box = [round(value, 3) for value in (left, top, right - left, bottom - top)]
+            area = round((right - left) * (bottom - top), 3)
+            ids = {"id": len(annotations) + 1, "image_id": image_id, "category_id": classes.index(label)}
+            annotations.append({**ids, "bbox": box, "area": area, "iscrowd": 0, "segmentation": []})
     categories = [{"id": i, "name": name, "supercategory": "object"} for i, name in enumerate(classes)]
     lists = {"categories": categories, "images": images, "annotations": annotations}
     return {"info": {}, "licenses": [], **lists}
 
 
 def _write_yolo(folder: Path, entries: Sequence[DatasetEntry], classes: Sequence[str]) -> None:
+    """Write the label files of a split."""
     folder.mkdir(parents=True, exist_ok=True)
     for entry in entries:
         width, height = entry.size
@@ -131,5 +127,6 @@ def _write_yolo(folder: Path, entries: Sequence[DatasetEntry], classes: Sequence
 
 
 def _write_json(path: Path, content: Any) -> None:
+    """Write a JSON file and create its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(content))

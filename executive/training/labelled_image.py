@@ -13,7 +13,7 @@ from executive.cell.frame import Box, Frame
 from executive.geometry import Array, Pose
 
 MIN_BORDER_DISTANCE = 0.5
-"""Minimum distance of a box from the border of the searched region [pixel] if its object is not truncated."""
+"""Minimum distance of a box from the border of the searched region if the object is not truncated [pixel]."""
 MIN_VISIBLE_FRACTION = 0.9
 """Minimum visible fraction of the silhouette of an object that counts as fully visible."""
 
@@ -27,40 +27,35 @@ class LabelledImage:
         image: `(H, W, 3)` uint8, RGB.
         labels: Class of each object.
         boxes: Box of each object [pixel].
-        ignored: Boxes of objects that may be detected or not; both are correct.
-        truth: Ground truth of the renderer: `camera`, `part`, `matrix`, `X_WC`, `positions`, …
+        ignored_boxes: Boxes of objects that a detector may find or miss; both are correct [pixel].
+        truth: Ground truth of the renderer, for instance `X_WC` and `positions`; `part` is the region of the
+            camera's full frame that the image shows [pixel].
         region: Region of the image [pixel] that is searched and labelled; None: the whole image.
         depth: `(H, W)` [m], as in a `Frame`; None without a depth sensor.
-        second_image: Image of the same scene from the same pose with other noise; None: there is none.
+        second_image: Image of the scene from the same pose with other noise, or None.
     """
 
     file: str
     image: NDArray[np.uint8]
     labels: tuple[str, ...]
     boxes: tuple[Box, ...]
-    ignored: tuple[Box, ...] = ()
+    ignored_boxes: tuple[Box, ...] = ()
     truth: Mapping[str, Any] = field(default_factory=dict)
     region: Box | None = None
     depth: Array | None = None
     second_image: NDArray[np.uint8] | None = None
 
     def to_frame(self, frame_id: int) -> Frame:
-        """Return the image as a frame, with the true camera pose if known."""
-        is_known = "matrix" in self.truth and "X_WC" in self.truth
-        return Frame(
-            id=frame_id,
-            camera=str(self.truth.get("camera", "image")),
-            image=self.image,
-            depth=self.depth,
-            matrix=self._compute_camera_matrix() if is_known else np.eye(3),
-            X_WC=Pose.of(self.truth["X_WC"][:3], self.truth["X_WC"][3:]) if is_known else Pose.identity(),
-            stamp=0.0,
-            visible=np.ones(self.image.shape[:2], np.bool_),
-            change_count=0,
-        )
+        """Return the image as a frame, with the true camera pose if the pose is known."""
+        matrix, X_WC = np.eye(3), Pose.identity()
+        if "matrix" in self.truth and "X_WC" in self.truth:
+            matrix = self._compute_camera_matrix()
+            X_WC = Pose.of(self.truth["X_WC"][:3], self.truth["X_WC"][3:])
+        camera, visible = str(self.truth.get("camera", "image")), np.ones(self.image.shape[:2], np.bool_)
+        return Frame(frame_id, camera, self.image, self.depth, matrix, X_WC, 0.0, visible, change_count=0)
 
     def is_fully_inside(self, index: int) -> bool:
-        """Return True if an object lies completely in the searched region."""
+        """Return True if the object with the given index lies completely in the searched region."""
         box, (left, top, right, bottom) = self.boxes[index], self.region or self._image_region
         distance = min(box[0] - left, box[1] - top, right - box[2], bottom - box[3])
         return distance >= MIN_BORDER_DISTANCE
@@ -76,13 +71,14 @@ class LabelledImage:
 
     @property
     def pixel_scale(self) -> Array:
-        """Pixels of the camera's full frame per pixel of this image, along x and y `(2,)`."""
+        """Number of pixels of the camera's full frame per pixel of this image, along x and y `(2,)`."""
         _, _, width, height = self._image_region
         left, top, right, bottom = self.truth.get("part", self._image_region)
         return np.array([(right - left) / width, (bottom - top) / height])
 
     @property
     def _image_region(self) -> tuple[int, int, int, int]:
+        """Left, top, right and bottom of the whole image [pixel]."""
         height, width = self.image.shape[:2]
         return 0, 0, width, height
 

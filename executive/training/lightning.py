@@ -14,12 +14,11 @@ from executive.training.symmetry import SYMMETRY_COUNT, transform_boxes, transfo
 class SymmetryAugmentedData(RFDETRDataModule):
     """Dataset whose training images are transformed by random symmetries of the square.
 
-    The cameras look straight down, so that each of the eight symmetries gives a possible image. Pixels are
-    not resampled, so that the boxes stay exact.
+    Each symmetry gives a possible image of a camera that looks straight down. No pixel is resampled.
     """
 
     def on_after_batch_transfer(self, batch: tuple[Any, Any], dataloader_idx: int) -> tuple[Any, Any]:
-        """Return the batch; during training its images are rotated and mirrored."""
+        """Return a batch, with rotated and mirrored images during training."""
         samples, targets = super().on_after_batch_transfer(batch, dataloader_idx)
         if self.trainer is None or not self.trainer.training:
             return samples, targets
@@ -33,19 +32,19 @@ class SymmetryAugmentedData(RFDETRDataModule):
 class MixedPrecisionModel(RFDETRModelModule):
     """RF-DETR's training module with mixed precision on CPUs.
 
-    On CPUs with bfloat16, matrix products are two and a half times as fast as in float32. Losses, matching
-    and reference boxes stay in float32: with a mantissa of eight bits, boxes would be rounded to a pixel.
+    On CPUs with bfloat16, matrix products are 2.5 times as fast as in float32. Losses, matching and reference
+    boxes stay in float32, because the mantissa of bfloat16, eight bits, would round boxes to whole pixels.
 
     Args:
         model_config: RF-DETR's configuration of the model.
         train_config: RF-DETR's configuration of the training.
-        is_mixed: True: train in mixed precision on the CPU; False: use RF-DETR's own training step.
+        is_mixed: True to train in mixed precision on the CPU, False for the training step of RF-DETR.
     """
 
     def __init__(self, model_config: Any, train_config: Any, is_mixed: bool) -> None:
         super().__init__(model_config, train_config)
         self._is_mixed = is_mixed
-        # The decoder's reference boxes get the data type of the encoder's features.
+        # Reference boxes have the data type of the encoder's features, and must stay in float32.
         self.model.backbone[0].projector.register_forward_hook(
             lambda _module, _inputs, output: to_float32(output)
         )

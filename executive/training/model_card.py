@@ -15,23 +15,20 @@ EPOCH_COLUMNS = {
     "val/precision": "precision",
     "val/recall": "recall",
 }
-"""Columns of the trainer's `metrics.csv` that a card shows: name of the column, then heading."""
+"""Heading in a card of each column of the trainer's `metrics.csv`."""
 
 METRIC_COLUMNS = {
     "images": ("images", "{}"), "objects": ("objects", "{}"),
     "precision": ("precision", "{:.4f}"), "recall": ("recall", "{:.4f}"),
     "mAP50": ("map50", "{:.4f}"), "mAP50-95": ("map50_95", "{:.4f}"),
 }  # fmt: skip
-"""Metrics of an evaluation that a card shows: heading, then attribute of `Evaluation` and format."""
+"""Attribute of `Evaluation` and number format of each metric in a card, by heading."""
 
 
 def render_card(
-    title: str,
-    summary: str,
-    settings: Mapping[str, str],
-    epochs: Sequence[Mapping[str, float]],
+    title: str, summary: str, settings: Mapping[str, str], epochs: Sequence[Mapping[str, float]],
     evaluations: Mapping[str, Evaluation],
-) -> str:
+) -> str:  # fmt: skip
     """Return the card of a model as Markdown.
 
     Args:
@@ -47,7 +44,7 @@ def render_card(
         rows = [
             (
                 dataset,
-                *(form.format(getattr(evaluation, name)) for name, form in METRIC_COLUMNS.values()),
+                *(template.format(getattr(evaluation, name)) for name, template in METRIC_COLUMNS.values()),
                 _format_distribution(evaluation.centre),
                 _format_distribution(evaluation.position),
             )
@@ -55,7 +52,7 @@ def render_card(
         ]
         blocks += [
             "## Accuracy",
-            f"Precision and recall at confidence {', '.join(f'{one:g}' for one in thresholds)} and IoU 0.5. "
+            f"Precision and recall at confidence {', '.join(map('{:g}'.format, thresholds))} and IoU 0.5. "
             "Centre and position: distance between the centres of the detected and the true box, in the "
             "image and in the world at the height of the object; median / 95 % / 99 %.",
             _render_table(("dataset", *METRIC_COLUMNS, "centre [px]", "position [mm]"), rows),
@@ -80,9 +77,11 @@ def read_epochs(metrics_file: Path) -> list[dict[str, float]]:
 
 
 def _render_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table."""
     lines = [headings, ["---"] * len(headings), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 def _format_distribution(errors: Distribution | None) -> str:
+    """Return median, 95th and 99th percentile, or "" without a distribution."""
     return "" if errors is None else f"{errors.median:.2f} / {errors.p95:.2f} / {errors.p99:.2f}"

@@ -1,4 +1,4 @@
-"""Fitting of the small RF-DETR with RF-DETR's own trainer."""
+"""Fitting of the small RF-DETR with the trainer of RF-DETR."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CPU_THREAD_COUNT = 2
 def fit_model(
     dataset: Path, out: Path, settings: Settings, report_epoch: ReportEpoch, report_batch: ReportBatch
 ) -> None:
-    """Train a model; write checkpoints, `labels.txt` and `metrics.csv` to `out` (see `train.train`)."""
+    """Train a model, and write checkpoints, `labels.txt` and `metrics.csv` to the folder `out`."""
     start_model = settings.start_model
     has_gpu = torch.cuda.is_available()
     if not has_gpu:
@@ -40,7 +40,7 @@ def fit_model(
         epochs=settings.epochs,
         batch_size=BATCH_SIZE,
         lr=learning_rate,
-        # By default, pretrained encoder weights are kept by smaller learning rates; here there are none.
+        # By default, smaller learning rates preserve pretrained encoder weights, which are not used here.
         lr_encoder=learning_rate,
         lr_vit_layer_decay=1.0,
         lr_component_decay=1.0,
@@ -49,7 +49,7 @@ def fit_model(
         # `last.ckpt` is overwritten in each epoch; one checkpoint per epoch would fill the disk.
         checkpoint_interval=settings.epochs + 1,
         use_ema=False,
-        # Scaled and cropped images are resampled, which moves objects by a fraction of a pixel.
+        # Scaling and cropping would resample images, which moves objects by a fraction of a pixel.
         multi_scale=False,
         expanded_scales=False,
         scale_jitter=False,
@@ -68,7 +68,7 @@ def fit_model(
 
 
 def _write_checkpoint(model: Path, out: Path) -> Path:
-    """Write the weights of an exported model as a checkpoint into `out` and return its path."""
+    """Write the weights of an exported model as a checkpoint to the folder `out`, and return the path."""
     path = out / "start.pth"
     torch.save({"model": restore_model(model).model.model.state_dict()}, path)
     return path
@@ -78,11 +78,11 @@ def read_class_names(dataset: Path) -> list[str]:
     """Return the class names of a COCO or YOLO dataset in the order of the model's outputs."""
     from rfdetr import RFDETR
 
-    # Roboflow's exports contain a parent category, which is no class; rfdetr omits it here and in training.
+    # Exports of Roboflow contain a parent category, which rfdetr omits because the category is no class.
     return list(RFDETR._load_classes(str(dataset)))
 
 
 def has_bfloat16() -> bool:
-    """Return True if this CPU multiplies bfloat16 matrices in hardware; emulation would be slow."""
+    """Return True if this CPU multiplies bfloat16 matrices in hardware, without slow emulation."""
     capabilities = torch.cpu.get_capabilities()
     return bool(capabilities.get("avx512_bf16") or capabilities.get("amx_bf16"))

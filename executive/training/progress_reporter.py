@@ -18,10 +18,11 @@ class ProgressReporter(Callback):
     def on_train_batch_end(
         self, trainer: Any, pl_module: Any, outputs: Any, batch: Any, batch_idx: int
     ) -> None:
-        """Report the number of finished batches and of all batches, over all epochs."""
+        """Report the number of finished batches and the number of all batches, over all epochs."""
         del pl_module, outputs, batch
-        per_epoch = trainer.num_training_batches
-        self._report_batch(trainer.current_epoch * per_epoch + batch_idx + 1, trainer.max_epochs * per_epoch)
+        epoch_size = trainer.num_training_batches
+        finished_count = trainer.current_epoch * epoch_size + batch_idx + 1
+        self._report_batch(finished_count, trainer.max_epochs * epoch_size)
 
     def on_train_epoch_end(self, trainer: Any, pl_module: Any) -> None:
         """Report the metrics of the epoch, including those on the validation images."""

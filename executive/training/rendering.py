@@ -1,4 +1,4 @@
-"""Rendering of labelled images in parallel; the number of processes does not change the images."""
+"""Renderer of labelled images in parallel; the number of processes does not change the images."""
 
 from __future__ import annotations
 
@@ -23,34 +23,27 @@ from executive.processes import WorkerPool
 from executive.training.dataset import DatasetEntry, build_image_path, save_image, write_annotations
 from executive.training.labelled_image import LabelledImage
 
-ItemT = TypeVar("ItemT")
-Progress = Callable[[int, int], None]
-"""Callback with the number of finished images and of all images."""
+ResultT = TypeVar("ResultT")
+ReportProgress = Callable[[int, int], None]
+"""Callback with the number of finished images and the number of all images."""
 BLOCK_SIZE = 40
-"""Number of images per task of a worker process, which builds one world per cell and task."""
+"""Number of images per task of a worker process; each task builds a simulated world for each cell."""
 
 
 def generate_dataset(
-    configs: Mapping[str, CellConfig],
-    out: Path,
-    *,
-    images: int,
-    seed: int,
-    layout: str,
-    workers: int,
-    valid_fraction: float,
-    progress: Progress,
-) -> None:
-    """Write a dataset of random scenes of all cells in turn; the last images are for validation.
+    configs: Mapping[str, CellConfig], out: Path, *, images: int, seed: int, layout: str, workers: int,
+    valid_fraction: float, progress: ReportProgress,
+) -> None:  # fmt: skip
+    """Write a dataset of random scenes; the scenes alternate between the cells.
 
     Args:
         configs: Cells by name.
         out: Folder of the dataset.
         images: Number of images.
-        seed: Seed; the dataset is a function of the cells and the seed.
+        seed: Seed of the random scenes.
         layout: `coco` or `yolo`.
         workers: Number of processes that render.
-        valid_fraction: Fraction of the images in the split `valid`, 0 to 1.
+        valid_fraction: Fraction of the images that are in the split `valid`, 0 to 1: the last images.
         progress: Called after each block of `BLOCK_SIZE` images.
 
     Raises:
@@ -65,22 +58,18 @@ def generate_dataset(
             + "; ".join(f"{name} has {', '.join(cell.objects)}" for name, cell in configs.items())
         )
     for name, cell in configs.items():
-        for key, sentence in find_missing_models(cell):
-            raise InputError(f"{name}: {'.'.join(map(str, key))}: {sentence}")
+        for key, message in find_missing_models(cell):
+            raise InputError(f"{name}: {'.'.join(map(str, key))}: {message}")
     write_annotations(out, layout, [], classes)
-    render = partial(_render_block, cells, out, layout, seed, images - round(images * valid_fraction))
-    write_annotations(out, layout, _make_in_blocks(render, images, workers, progress), classes)
+    train_count = images - round(images * valid_fraction)
+    render_block = partial(_render_dataset_images, cells, out, layout, seed, train_count)
+    write_annotations(out, layout, _render_in_blocks(render_block, images, workers, progress), classes)
 
 
 def render_run_frames(
-    config: CellConfig,
-    *,
-    images: int,
-    seed: int,
-    workers: int,
-    progress: Progress,
+    config: CellConfig, *, images: int, seed: int, workers: int, progress: ReportProgress,
     scene: SceneConfig = DECLARED_SCENE,
-) -> list[LabelledImage]:
+) -> list[LabelledImage]:  # fmt: skip
     """Return full frames of a cell's camera, each of a random initial scene of a run.
 
     The objects in the camera's view `table` are labelled.
@@ -88,32 +77,31 @@ def render_run_frames(
     Args:
         config: The cell.
         images: Number of frames.
-        seed: Seed; the frames are a function of cell, scene and seed.
+        seed: Seed of the random scenes.
         workers: Number of processes that render.
         progress: Called after each block of `BLOCK_SIZE` frames.
         scene: Differences of the simulated world from the cell file.
     """
-    return _make_in_blocks(partial(_render_frames, config, scene, seed), images, workers, progress)
+    return _render_in_blocks(partial(_render_frames, config, scene, seed), images, workers, progress)
 
 
-def _make_in_blocks(
-    make: Callable[[range], dict[int, ItemT]], count: int, workers: int, progress: Progress
-) -> list[ItemT]:
-    """Return items 0 to `count` - 1 in order; worker processes call `make` for blocks of item numbers."""
-    made: dict[int, ItemT] = {}
+def _render_in_blocks(
+    render_block: Callable[[range], dict[int, ResultT]], count: int, workers: int, progress: ReportProgress
+) -> list[ResultT]:
+    """Return the results of `render_block` for images 0 to `count` - 1, in order, from worker processes."""
+    results: dict[int, ResultT] = {}
     with WorkerPool(workers) as pool:
-        starts = range(0, count, BLOCK_SIZE)
-        blocks = [pool.submit(make, range(first, min(first + BLOCK_SIZE, count))) for first in starts]
-        for block in as_completed(blocks):
-            made.update(block.result())
-            progress(len(made), count)
-    return [made[number] for number in sorted(made)]
+        blocks = [range(count)[first : first + BLOCK_SIZE] for first in range(0, count, BLOCK_SIZE)]
+        for task in as_completed([pool.submit(render_block, block) for block in blocks]):
+            results.update(task.result())
+            progress(len(results), count)
+    return [results[number] for number in sorted(results)]
 
 
 def _draw_samples(
     cells: Sequence[CellConfig], seed: int, numbers: range, scene: SceneConfig | None = None
 ) -> Iterator[tuple[int, str, Sample]]:
-    """Yield number, camera and sample of scenes of all cells in turn; widely varied if `scene` is None."""
+    """Yield number, camera and sample of random scenes, which vary more than in a run if `scene` is None."""
     cv2.setNumThreads(1)
     cameras = [next(iter(cell.cameras)) for cell in cells]
     with contextlib.ExitStack() as stack:
@@ -129,13 +117,13 @@ def _draw_samples(
             yield number, cameras[cell_index], renderers[cell_index].render_sample(sample_seed)
 
 
-def _render_block(
-    cells: Sequence[CellConfig], out: Path, layout: str, seed: int, first_valid: int, numbers: range
+def _render_dataset_images(
+    cells: Sequence[CellConfig], out: Path, layout: str, seed: int, train_count: int, numbers: range
 ) -> dict[int, DatasetEntry]:
-    """Render and save the images with these numbers, in a worker process."""
+    """Render and save images in a worker process; return their dataset entries by image number."""
     entries = {}
     for number, camera, sample in _draw_samples(cells, seed, numbers):
-        split, file = "train" if number < first_valid else "valid", f"{camera}_{number:06d}.jpg"
+        split, file = "train" if number < train_count else "valid", f"{camera}_{number:06d}.jpg"
         save_image(build_image_path(out, layout, split, file), sample.image)
         entries[number] = _make_entry(sample, split, file, camera)
     return entries
@@ -144,26 +132,23 @@ def _render_block(
 def _render_frames(
     config: CellConfig, scene: SceneConfig, seed: int, numbers: range
 ) -> dict[int, LabelledImage]:
-    """Render the frames with these numbers, in a worker process."""
+    """Render frames in a worker process, and return them by image number."""
     samples = _draw_samples([config], seed, numbers, scene)
     return {i: to_labelled_frame(sample, camera, f"{camera}_{i:06d}") for i, camera, sample in samples}
 
 
 def _make_entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEntry:
-    """Return the dataset entry of a sample, with the ground truth for measuring localizers."""
-    rounded = {
-        "matrix": sample.matrix.tolist(),
-        "positions": sample.positions.round(6).tolist(),
-        "centres": sample.centres.round(6).tolist(),
-        "visible_fraction": sample.visible_fraction.round(4).tolist(),
-    }
-    boxes, ignored = _to_boxes(sample.boxes), _to_boxes(sample.ignored)
-    truth = {**_collect_truth(sample, camera, sample.region), **rounded}
-    return DatasetEntry(split, file, (IMAGE_SIZE, IMAGE_SIZE), sample.labels, boxes, ignored, truth)
+    """Return the dataset entry of a sample, with the ground truth in JSON values for measuring localizers."""
+    truth = _collect_truth(sample, camera, sample.region)
+    truth["matrix"] = sample.matrix.tolist()
+    for name, digits in (("positions", 6), ("centres", 6), ("visible_fraction", 4)):
+        truth[name] = truth[name].round(digits).tolist()
+    boxes, ignored_boxes = _to_boxes(sample.boxes), _to_boxes(sample.ignored)
+    return DatasetEntry(split, file, (IMAGE_SIZE, IMAGE_SIZE), sample.labels, boxes, ignored_boxes, truth)
 
 
 def to_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
-    """Return the full frame of a sample of an initial scene; `sample.image` is a scaled part of it."""
+    """Return the full frame of a sample, of which `sample.image` is a scaled part."""
     assert sample.frame is not None
     height, width = sample.frame.shape[:2]
     left, top, right, _ = sample.region
@@ -173,7 +158,7 @@ def to_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
         image=sample.frame,
         labels=sample.labels,
         boxes=_to_boxes(sample.boxes * scale + corner),
-        ignored=_to_boxes(sample.ignored * scale + corner),
+        ignored_boxes=_to_boxes(sample.ignored * scale + corner),
         truth=_collect_truth(sample, camera, (0, 0, width, height)),
         region=sample.region,
         depth=sample.depth,
@@ -196,4 +181,5 @@ def _collect_truth(sample: Sample, camera: str, part: Box) -> dict[str, Any]:
 
 
 def _to_boxes(boxes: Array) -> tuple[Box, ...]:
+    """Return the rows of an array `(N, 4)` [pixel] as boxes."""
     return tuple((left, top, right, bottom) for left, top, right, bottom in boxes.tolist())

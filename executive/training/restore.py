@@ -19,17 +19,17 @@ from executive.training.architecture import ARCHITECTURE, create_model
 from executive.training.compress import export_model
 
 CLASS_BIAS_NAME = "class_embed.bias"
-"""Name of the bias with one element for each class, and a last one for "no object"."""
+"""Name of the bias of the class outputs; the last output means "no object"."""
 QUERY_GROUP_COUNT: int = ARCHITECTURE["group_detr"]
-"""Number of groups of queries during training; an exported model contains the first one only."""
+"""Number of groups of queries during training; an exported model contains only the first group."""
 
 
 def restore_model(model: Path) -> Any:
     """Return an `rfdetr.RFDETRNano` with the weights of an exported model.
 
-    The export renames some weights and drops others. To find the tensor of each exported weight, a model with
-    random weights is exported and the values are compared. Each further group of queries becomes a copy of
-    the first. Layers that the export drops, because no output depends on them, stay random.
+    The export renames and drops weights. A model with random weights is exported to find the tensor with the
+    values of each exported weight. All groups of queries become copies of the first group. Layers that the
+    export drops, because no output depends on them, stay random.
 
     Args:
         model: ONNX file that `executive train` wrote.
@@ -38,7 +38,6 @@ def restore_model(model: Path) -> Any:
         InputError: The file has another architecture.
     """
     stored_weights = _read_weights(onnx.load(str(model)))
-    # The last output means "no object".
     detector = create_model(len(stored_weights.get(CLASS_BIAS_NAME, [0])) - 1)
     weights_by_name = detector.model.model.state_dict()
     for tensor in weights_by_name.values():
@@ -75,32 +74,34 @@ def _read_weights(model: onnx.ModelProto) -> dict[str, Array]:
 
 
 def _find_candidate_tensors(weights_by_name: dict[str, torch.Tensor], name: str) -> Iterator[torch.Tensor]:
-    """Yield the weights of a model, and views of them, that an export can contain under `name`."""
+    """Yield the weights of a model, and views of weights, that an export can contain under `name`."""
     if name in weights_by_name:
         yield weights_by_name[name]
         return
     for tensor in weights_by_name.values():
-        parts = [tensor]
-        if tensor.ndim and len(tensor) % 3 == 0:  # the projections of queries, keys and values
-            parts += tensor.chunk(3)
+        views = [tensor]
+        # The export splits the projections of queries, keys and values, and transposes matrices.
+        if tensor.ndim and len(tensor) % 3 == 0:
+            views += tensor.chunk(3)
         if tensor.ndim and len(tensor) % QUERY_GROUP_COUNT == 0:
-            parts.append(tensor[: len(tensor) // QUERY_GROUP_COUNT])
-        for part in parts:
-            yield part
-            if part.ndim == 2:
-                yield part.T
-                yield part[None]
+            views.append(tensor[: len(tensor) // QUERY_GROUP_COUNT])
+        for view in views:
+            yield view
+            if view.ndim == 2:
+                yield view.T
+                yield view[None]
 
 
 def _is_equal(view: torch.Tensor, values: Array) -> bool:
+    """Return True if a tensor has the shape and the values of an array."""
     return tuple(view.shape) == values.shape and bool(np.array_equal(view.numpy(), values))
 
 
 def _copy_query_groups(weights_by_name: dict[str, torch.Tensor]) -> None:
     """Copy the first group of queries, and the layers that propose its boxes, to every other group."""
     for name, tensor in weights_by_name.items():
-        layer = re.fullmatch(r"(transformer\.enc_out\w+)\.0\.(.+)", name)
-        if layer is not None:
+        # The number in `transformer.enc_out_….0.…` is the index of the group.
+        if layer := re.fullmatch(r"(transformer\.enc_out\w+)\.0\.(.+)", name):
             for group in range(1, QUERY_GROUP_COUNT):
                 weights_by_name[f"{layer[1]}.{group}.{layer[2]}"].copy_(tensor)
         if name in ("refpoint_embed.weight", "query_feat.weight"):

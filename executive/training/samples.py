@@ -1,4 +1,4 @@
-"""Reading of labelled images from COCO and YOLO folders, for instance exports of Roboflow."""
+"""Reader of labelled images from COCO and YOLO folders, for instance exports of Roboflow."""
 
 from __future__ import annotations
 
@@ -21,14 +21,12 @@ from executive.training.annotations import (
 )
 from executive.training.labelled_image import LabelledImage
 
-SPLITS = ("test", "valid", "val", "train")
-"""Folders of a dataset with labelled images; splits that are not used for training come first."""
+EVALUATION_SPLITS = ("test", "valid", "val", "train")
+"""Folders of a dataset, in the order in which they are preferred for an evaluation."""
 
 
 class Samples:
     """Labelled images of a split, or of the first existing split of a dataset.
-
-    Iteration reads one image at a time.
 
     Args:
         folder: Folder of the split or the dataset.
@@ -80,12 +78,12 @@ def read_image(path: Path) -> NDArray[np.uint8]:
 
 
 def list_splits(dataset: Path) -> list[Path]:
-    """Return the existing splits of a dataset, in the order of `SPLITS`."""
-    return [dataset / name for name in SPLITS if is_split(dataset / name)]
+    """Return the existing splits of a dataset, in the order of `EVALUATION_SPLITS`."""
+    return [dataset / name for name in EVALUATION_SPLITS if is_split(dataset / name)]
 
 
 def _find_split(folder: Path) -> Path:
-    """Return the folder if it contains labelled images, else its first existing split.
+    """Return `folder` if it is a split, else the first existing split of the dataset `folder`.
 
     Raises:
         InputError: There are no labelled images.
@@ -93,12 +91,13 @@ def _find_split(folder: Path) -> Path:
     if splits := [folder] if is_split(folder) else list_splits(folder):
         return splits[0]
     raise InputError(
-        f"{folder} contains no labelled images: neither it nor its folders {', '.join(SPLITS)} contain "
-        f"{COCO_FILE_NAME} (COCO) or images/ and labels/ (YOLO); render a dataset with `executive dataset`"
+        f"{folder} contains no labelled images: neither it nor its folders {', '.join(EVALUATION_SPLITS)} "
+        f"contain {COCO_FILE_NAME} (COCO) or images/ and labels/ (YOLO); render a dataset with "
+        "`executive dataset`"
     )
 
 
 def _read_json(path: Path) -> dict[str, Any]:
-    """Return the JSON object in a file, whose keys are image names; an empty one if there is no file."""
-    read = TypeAdapter(dict[str, Any]).validate_json
-    return parse_file(path, MAX_COCO_FILE_SIZE, read) if path.is_file() else {}
+    """Return the JSON object in a file, by file name of the image; {} without a file."""
+    parse = TypeAdapter(dict[str, Any]).validate_json
+    return parse_file(path, MAX_COCO_FILE_SIZE, parse) if path.is_file() else {}

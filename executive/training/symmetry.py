@@ -5,18 +5,18 @@ from __future__ import annotations
 import torch
 
 SYMMETRY_COUNT = 8
-"""Number of symmetries: number 2 k rotates by k quarter turns; number 2 k + 1 mirrors left to right and then
-rotates by k quarter turns."""
+"""Number of symmetries. Symmetry 2 k rotates by k quarter turns anticlockwise; symmetry 2 k + 1 first mirrors
+left to right, then rotates by k quarter turns."""
 
 
 def transform_image(image: torch.Tensor, symmetry: int) -> torch.Tensor:
-    """Return `image` `(..., N, N)` transformed by the symmetry with the number `symmetry`, 0 to 7."""
+    """Return `image` `(..., N, N)`, transformed by the symmetry with the number `symmetry`, 0 to 7."""
     mirrored = image.flip(-1) if symmetry % 2 else image
     return mirrored.rot90(symmetry // 2, (-2, -1))
 
 
 def transform_boxes(boxes: torch.Tensor, symmetry: int) -> torch.Tensor:
-    """Return `boxes` `(N, 4)` (centre x, y, width, height; 0 to 1), transformed like the image."""
+    """Return `boxes` `(N, 4)` (centre x and y, width, height; 0 to 1), transformed by a symmetry, 0 to 7."""
     x, y, width, height = boxes.unbind(-1)
     if symmetry % 2:
         x = 1 - x

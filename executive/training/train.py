@@ -16,14 +16,14 @@ from executive.training.samples import list_splits
 ReportEpoch = Callable[[int, dict[str, float]], None]
 """Called after each epoch with its number, from 1, and its metrics by name."""
 ReportBatch = Callable[[int, int], None]
-"""Called after each batch with the number of finished batches and of all batches, over all epochs."""
+"""Called after each batch with the number of finished batches and the number of all batches."""
 
 CARD_THRESHOLD = 0.5
-"""Minimum confidence of the detections from which the card computes precision and recall."""
+"""Minimum confidence of the detections for precision and recall in a model card."""
 LEARNING_RATE = 3e-4
-"""Learning rate of a training from random weights, or from a model with other classes."""
+"""Learning rate of random weights, or of a model with other classes."""
 FINE_TUNING_RATE = 1e-4
-"""Learning rate of a training from a model with the same classes; a larger one would undo its weights."""
+"""Learning rate of a model with the same classes, small enough to preserve the weights."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Settings:
     """Settings of a training that the user chooses.
 
     Attributes:
-        start_model: Checkpoint (`.pth`) or exported model (`.onnx`) of this architecture to fine-tune; its
-            classes may be others. None: training starts from random weights.
+        start_model: Checkpoint (`.pth`) or exported model (`.onnx`) of this architecture to fine-tune, which
+            may have other classes; None: training starts from random weights.
         learning_rate: Learning rate; None: 1e-4 if `start_model` has the same classes, else 3e-4.
         epochs: Number of passes over the dataset.
         seed: Seed of initial weights, order of the images and augmentation.
@@ -48,19 +48,18 @@ def train(
     dataset: Path,
     out: Path,
     settings: Settings,
-    report_epoch: ReportEpoch = lambda _epoch, _metrics: None,
-    report_batch: ReportBatch = lambda _done, _all: None,
+    report_epoch: ReportEpoch = lambda _number, _metrics: None,
+    report_batch: ReportBatch = lambda _finished_count, _total_count: None,
 ) -> None:
     """Train a model and write it to `out`.
 
     Files in `out`: `model.onnx` and `labels.txt` for a detector of kind `rfdetr`; `card.md` with the accuracy
-    on the validation images; `checkpoint_best_total.pth`, from which a further training can start;
+    on the validation images; `checkpoint_best_total.pth` with weights that can be trained further;
     `metrics.csv` with the metrics of each epoch.
 
     Args:
-        dataset: Folder in a format of Roboflow: `train/` and `valid/`, each with `_annotations.coco.json`
-            (COCO), or `data.yaml` (YOLO).
-        out: Output folder; created if missing.
+        dataset: Folder with `_annotations.coco.json` in `train/` and `valid/` (COCO), or `data.yaml` (YOLO).
+        out: Output folder, which is created if it is missing.
         settings: Settings of the training.
         report_epoch: Called after each epoch.
         report_batch: Called after each batch.
@@ -105,10 +104,7 @@ def train(
 
 
 def choose_learning_rate(start_model: Path | None, labels: list[str]) -> float:
-    """Return the default learning rate of a training of the classes `labels` from `start_model`.
-
-    The classes of a model `NAME.onnx` are in `NAME.labels.txt` or `labels.txt` in its folder.
-    """
+    """Return the default learning rate for training `start_model` on the classes `labels`."""
     if start_model is None:
         return LEARNING_RATE
     file = find_label_file(start_model)

@@ -59,11 +59,11 @@ def test_the_images_that_no_training_used_are_read_as_they_were_written(root):
     (sample,) = Samples(root)
     assert (sample.file, sample.labels, sample.image.shape) == ("a.jpg", ("duck", "cube"), (64, 128, 3))
     assert np.array(sample.boxes) == pytest.approx(np.array(BOXES), abs=1e-3)
-    assert (sample.ignored, sample.truth) == (IGNORED, {"camera": "overhead"})
+    assert (sample.ignored_boxes, sample.truth) == (IGNORED, {"camera": "overhead"})
     assert sample.image[30, 60, 0] > 150 > 50 > sample.image[30, 60, 2]
     assert len(Samples(root)) == 1
     (sample,) = Samples(root / "train")
-    assert (sample.file, sample.labels, sample.boxes, sample.ignored) == ("b.jpg", (), (), ())
+    assert (sample.file, sample.labels, sample.boxes, sample.ignored_boxes) == ("b.jpg", (), (), ())
 
 
 def test_what_cannot_be_written_or_read_is_explained(tmp_path):

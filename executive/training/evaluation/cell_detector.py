@@ -1,4 +1,4 @@
-"""Detector of a cell file, used without a run but with the same requests as in a run."""
+"""Detector of a cell file, which gets the requests of a run without a run."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_detectors
 
 LOOK_INTERVAL = 1.0
-"""Simulated time between two requests [s]; similar to the time between two looks in a run."""
+"""Simulated time between two requests [s], as between two frames in a run."""
 ANSWER_TIMEOUT = 60.0
 """Maximum simulated time from a request to its answer [s]."""
 WHOLE_IMAGE_CAMERA = CameraConfig(
     mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
     table_view=(0, 0, 64, 64), scan_poses=("none",),
 ).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
-"""Camera whose view `full` is searched in one piece for images of any size."""
+"""Camera whose view `full` is the whole image for images of any size."""
 
 
 class CellDetector:
     """Detector of a cell file for measurements of its accuracy.
 
     Args:
-        configs: Section `detectors` of the cell file; a detector may use other detectors.
+        configs: Detectors of the cell file, of which the measured detector may use others.
         name: Name of the detector to measure.
         base: Folder to which paths in the options are relative.
-        camera: Camera of the frames; None: every image is searched as a whole.
-        view: View of `camera` that is searched, `table` or `full`.
-        classes: Classes of the cell; as in a run, detections of other classes are dropped. None: all classes.
+        camera: Camera of the frames; None: the detector searches whole images.
+        view: Searched view of `camera`, `table` or `full`.
+        classes: Classes of the cell, without which detections are dropped as in a run; None: all classes.
 
     Raises:
         InputError: A detector cannot be built.
@@ -42,14 +42,9 @@ class CellDetector:
 
     def __init__(
         self,
-        configs: Mapping[str, DetectorConfig],
-        name: str,
-        *,
-        base: Path,
-        camera: CameraConfig | None = None,
-        view: str = "table",
-        classes: Collection[str] | None = None,
-    ) -> None:
+        configs: Mapping[str, DetectorConfig], name: str, *, base: Path, camera: CameraConfig | None = None,
+        view: str = "table", classes: Collection[str] | None = None,
+    ) -> None:  # fmt: skip
         self.threshold = configs[name].threshold
         self._name = name
         self._view = view if camera else "full"
@@ -77,7 +72,8 @@ class CellDetector:
         finally:
             self._now += LOOK_INTERVAL
         latency = (time.perf_counter() - start_time) * 1000
-        found = tuple(one for one in answer.found if self._classes is None or one.label in self._classes)
+        labels = {detection.label for detection in answer.found} if self._classes is None else self._classes
+        found = tuple(detection for detection in answer.found if detection.label in labels)
         return replace(answer, found=found), latency
 
     def close(self) -> None:

@@ -27,14 +27,14 @@ class ErrorStatistics:
         localizer: Computes the positions of detections; None: positions are not evaluated.
 
     Attributes:
-        counts_by_object_count: Number of fully visible `objects`, of `missed` and `confused` ones, and of
+        counts_by_object_count: Numbers of fully visible `objects`, `missed` and `confused` objects, and
             `false_detections`, by the number of objects in the image.
-        confusion: Number of objects by true and detected class, each also `nothing`.
+        confusion: Number of objects by true and detected class; both can be `nothing`.
         centre_errors: Distances of the centres of correct detections from the true centres [pixel].
-        position_errors: Distances between found and true centres in the world, at the object's height [mm];
-            only of objects that lie completely in the searched region.
-        localization_errors: Distances between true centres and positions of the localizer [mm], of the same
-            objects as `position_errors`.
+        position_errors: Distances between detected and true centres in the world, at the height of the
+            object, of objects that are completely in the searched region [mm].
+        localization_errors: Distances between true centres and positions of the localizer, of objects that
+            are completely in the searched region [mm].
     """
 
     def __init__(self, localizer: Localizer | None = None) -> None:
@@ -63,41 +63,44 @@ class ErrorStatistics:
         counts.update(false_detections=len(false_detections))
 
     @property
-    def objects(self) -> int:
+    def object_count(self) -> int:
         """Number of objects in all images."""
-        return sum(count for (true, _), count in self.confusion.items() if true != NO_OBJECT)
+        return sum(count for (label, _), count in self.confusion.items() if label != NO_OBJECT)
 
     @property
     def precision(self) -> float:
         """Fraction of the detections that are correct; 0 without detections."""
-        found = sum(count for (_, label), count in self.confusion.items() if label != NO_OBJECT)
-        return self._correct_count / max(found, 1)
+        detection_count = sum(count for (_, label), count in self.confusion.items() if label != NO_OBJECT)
+        return self._correct_count / max(detection_count, 1)
 
     @property
     def recall(self) -> float:
         """Fraction of the objects that are detected with their class; 0 without objects."""
-        return self._correct_count / max(self.objects, 1)
+        return self._correct_count / max(self.object_count, 1)
 
     def compute_class_metrics(self) -> dict[str, ClassMetrics]:
         """Return the metrics of every class in the images."""
-        table = self.make_confusion_matrix()
-        figures = {}
-        for label in sorted(set(table) - {NO_OBJECT}):
-            correct_count, objects = self.confusion[label, label], sum(table[label].values())
-            found = sum(row.get(label, 0) for row in table.values())
-            figures[label] = ClassMetrics(objects, correct_count / max(found, 1), correct_count / objects)
-        return figures
+        object_counts, detection_counts = Counter[str](), Counter[str]()
+        for (true_label, detected_label), count in self.confusion.items():
+            object_counts[true_label] += count
+            detection_counts[detected_label] += count
+        metrics = {}
+        for label in sorted(object_counts.keys() - {NO_OBJECT}):
+            precision = self.confusion[label, label] / max(detection_counts[label], 1)
+            recall = self.confusion[label, label] / object_counts[label]
+            metrics[label] = ClassMetrics(object_counts[label], precision, recall)
+        return metrics
 
     def make_confusion_matrix(self) -> dict[str, dict[str, int]]:
         """Return the confusion matrix: number of objects by true class, then by detected class."""
         rows, columns = (
-            sorted({pair[side] for pair in self.confusion}, key=lambda label: (label == NO_OBJECT, label))
-            for side in (0, 1)
+            sorted(labels, key=lambda label: (label == NO_OBJECT, label))
+            for labels in ({row for row, _ in self.confusion}, {column for _, column in self.confusion})
         )
-        return {true: {found: self.confusion[true, found] for found in columns} for true in rows}
+        return {row: {column: self.confusion[row, column] for column in columns} for row in rows}
 
     def estimate_error_rates(self, repeats: RepeatedErrors) -> MeasuredErrorRates | None:
-        """Return the error rates on fully visible objects, or None if there was no answer."""
+        """Return the error rates for fully visible objects, or None if there was no answer."""
         if not self._image_count:
             return None
         counts = sum(self.counts_by_object_count.values(), Counter[str]())
@@ -114,7 +117,8 @@ class ErrorStatistics:
 
     @property
     def _correct_count(self) -> int:
-        return sum(count for (true, found), count in self.confusion.items() if true == found)
+        """Number of objects that are detected with their class."""
+        return sum(count for (row, column), count in self.confusion.items() if row == column)
 
     def _measure_errors(self, match: BoxMatch, index: int, sample: LabelledImage, frame: Frame) -> None:
         """Measure the position errors of a correct detection of the object `index`."""
@@ -128,7 +132,7 @@ class ErrorStatistics:
             position = intersect_plane(frame.matrix, frame.X_WC, match.detection.centre, true_position[2])
             self.position_errors.append(float(np.linalg.norm(position - true_position) * 1000))
         if self._localizer is not None and "centres" in sample.truth:
-            # Without a depth, a run does not localize the object either.
+            # A run also omits objects without a measured depth.
             with contextlib.suppress(NoDepth):
                 position = self._localizer.locate(match.detection, frame)
                 true_centre = np.array(sample.truth["centres"][index])
@@ -136,17 +140,17 @@ class ErrorStatistics:
 
 
 class RepeatedErrors:
-    """Counts the errors that a second look repeats, and separates random from systematic position errors.
+    """Errors that are repeated in a second image, and random and systematic parts of position errors.
 
-    The two images of a scene differ only in the noise of the sensor. Half the mean squared difference of the
-    errors in both is the variance of the random error; their mean product is that of the systematic error.
+    Two images of a scene differ only in the noise of the sensor. The variance of the random error is half the
+    mean squared difference of both errors; the variance of the systematic error is their mean product.
 
     Args:
         localizer: Computes the positions of detections; None: systematic errors are not measured.
 
     Attributes:
         error_count: Number of errors in the first images.
-        repeated_count: Number of errors in the first images that occur also in the second images.
+        repeated_count: Number of errors in the first images that occur in the second images, too.
     """
 
     def __init__(self, localizer: Localizer | None) -> None:
@@ -157,7 +161,7 @@ class RepeatedErrors:
     def add(
         self, first: Sequence[BoxMatch], second: Sequence[BoxMatch], sample: LabelledImage, frame: Frame
     ) -> None:
-        """Count the errors in the first image of a scene, and those that occur also in the second image."""
+        """Count the errors in the first image of a scene, and the errors that the second image repeats."""
         first_by_object = {match.object_index: match for match in first if match.object_index is not None}
         second_by_object = {match.object_index: match for match in second if match.object_index is not None}
         for index, label in enumerate(sample.labels):
@@ -166,20 +170,21 @@ class RepeatedErrors:
             first_match, second_match = first_by_object.get(index), second_by_object.get(index)
             if first_match is None and is_occluded(index, first, sample):
                 continue
-            first_label, second_label = (one and one.detection.label for one in (first_match, second_match))
+            first_label = first_match and first_match.detection.label
+            second_label = second_match and second_match.detection.label
             self.error_count += first_label != label
             self.repeated_count += first_label != label and first_label == second_label
             if first_match and second_match and first_match.is_correct and second_match.is_correct:
                 self._compare(first_match, second_match, sample, frame)
-        false_detections = [match.detection for match in second if match.object_index is None]
+        second_false = [match.detection for match in second if match.object_index is None]
         for false in (match.detection for match in first if match.object_index is None):
-            boxes = [other.box for other in false_detections if other.label == false.label]
+            boxes = [detection.box for detection in second_false if detection.label == false.label]
             self.error_count += 1
             self.repeated_count += bool(compute_ious([false.box], boxes).max(initial=0.0) >= MIN_IOU)
 
     @property
     def repeated_fraction(self) -> float:
-        """Fraction of the errors that a second look repeats, estimated by Laplace's rule of succession."""
+        """Fraction of the errors that the second image repeats, estimated by Laplace's rule of succession."""
         return (self.repeated_count + 1) / (self.error_count + 2)
 
     @property
@@ -194,7 +199,7 @@ class RepeatedErrors:
         return math.sqrt(max(variance, 0.0))
 
     def _compare(self, first: BoxMatch, second: BoxMatch, sample: LabelledImage, frame: Frame) -> None:
-        """Compare the errors of box and position of one object in both images."""
+        """Add the random and systematic errors of one object from its detections in both images."""
         assert first.object_index is not None
         difference = (first.offset - second.offset) * sample.pixel_scale
         self._random_variances += (difference**2 / 2).tolist()

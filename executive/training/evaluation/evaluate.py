@@ -36,25 +36,20 @@ MODEL_NAME = "model"
 
 
 def evaluate(
-    detector: CellDetector,
-    samples: Iterable[LabelledImage],
-    *,
-    threshold: float | None = None,
-    localizer: Localizer | None = None,
-    worst: WorstMistakes | None = None,
-    table: TableConfig | None = None,
-) -> Evaluation:
+    detector: CellDetector, samples: Iterable[LabelledImage], *, threshold: float | None = None,
+    localizer: Localizer | None = None, worst: WorstMistakes | None = None, table: TableConfig | None = None,
+) -> Evaluation:  # fmt: skip
     """Return the accuracy of a detector on labelled images; ignored objects do not count.
 
     Args:
         detector: The detector.
         samples: The images.
         threshold: Minimum confidence of a detection; None: the threshold of the detector.
-        localizer: Computes positions from detections, for comparison with the true positions.
-        worst: Collects the worst mistakes.
-        table: Workspace of which brightness, contrast and colours are measured; None: they are not measured.
+        localizer: Computes positions, which are compared with the true positions; None: no comparison.
+        worst: Collection of the worst mistakes; None: mistakes are not collected.
+        table: Workspace whose brightness, contrast and colours are measured; None: no measurement.
     """
-    errors, repeats = ErrorStatistics(localizer), RepeatedErrors(localizer)
+    errors, repeated_errors = ErrorStatistics(localizer), RepeatedErrors(localizer)
     average_precision = AveragePrecision()
     statistics_of_frames: list[FrameStatistics] = []
     latencies: list[float] = []
@@ -69,14 +64,15 @@ def evaluate(
             continue
         answer_counts[answer.detector] += 1
         latencies.append(latency)
-        average_precision.add([one for one in answer.found if not is_ignored(one, sample)], sample)
+        average_precision.add([entry for entry in answer.found if not is_ignored(entry, sample)], sample)
         min_confidence = answer.error_rates.threshold if threshold is None else threshold
         matches = _match(answer, sample, min_confidence)
         errors.add(matches, sample, frame)
         if sample.second_image is not None:
             with contextlib.suppress(Unavailable):
                 second_answer, _ = detector.detect(replace(frame, image=sample.second_image))
-                repeats.add(matches, _match(second_answer, sample, min_confidence), sample, frame)
+                second_matches = _match(second_answer, sample, min_confidence)
+                repeated_errors.add(matches, second_matches, sample, frame)
         if table is not None and (frame_statistics := compute_frame_statistics(frame, table)):
             statistics_of_frames.append(frame_statistics)
         if worst is not None:
@@ -85,7 +81,7 @@ def evaluate(
     return Evaluation(
         threshold=detector.threshold if threshold is None else threshold,
         images=unavailable_count + answer_counts.total(),
-        objects=errors.objects,
+        objects=errors.object_count,
         precision=errors.precision,
         recall=errors.recall,
         map50=map50,
@@ -101,15 +97,15 @@ def evaluate(
         why=reason,
         answered_by=dict(answer_counts),
         by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
-        reliability=errors.estimate_error_rates(repeats),
+        reliability=errors.estimate_error_rates(repeated_errors),
         frames=FrameRange.compute(statistics_of_frames),
     )
 
 
 def _match(answer: Answer, sample: LabelledImage, min_confidence: float) -> list[BoxMatch]:
-    """Return the matches of the detections from `min_confidence` on, without those of ignored objects."""
-    found = [one for one in answer.found if one.confidence >= min_confidence]
-    return match_detections([one for one in found if not is_ignored(one, sample)], sample)
+    """Return the matches of detections with at least `min_confidence` that show no ignored object."""
+    confident = [entry for entry in answer.found if entry.confidence >= min_confidence]
+    return match_detections([entry for entry in confident if not is_ignored(entry, sample)], sample)
 
 
 def find_label_file(model: Path) -> Path:
@@ -119,12 +115,7 @@ def find_label_file(model: Path) -> Path:
 
 
 def make_model_config(model: Path, labels: Path) -> DetectorConfig:
-    """Return the configuration of a detector for an exported RF-DETR.
-
-    Args:
-        model: The ONNX file.
-        labels: The text file with its class names.
-    """
+    """Return the detector configuration of an exported RF-DETR: an ONNX file and a file of class names."""
     files = {"model_path": str(model.absolute()), "labels": str(labels.absolute())}
     return DetectorConfig.model_validate({"kind": "rfdetr", "floor": MIN_CONFIDENCE, **files})
 
@@ -134,8 +125,8 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
 
     Args:
         model: The ONNX file.
-        labels: The text file with its class names.
-        folder: A split, or a dataset whose first existing split of `samples.SPLITS` is used.
+        labels: The text file with the class names.
+        folder: A split, or a dataset of which the first split in `samples.EVALUATION_SPLITS` is used.
         threshold: Minimum confidence of a detection.
 
     Raises:
@@ -159,20 +150,22 @@ class AveragePrecision:
         self._class_ids: dict[str, int] = {}
         self._has_objects = False
 
-    def add(self, found: Sequence[Detection], sample: LabelledImage) -> None:
-        """Add the detections in one image, with any confidence that the detector reports."""
-        predicted = self._to_detections([one.box for one in found], [one.label for one in found])
-        predicted.confidence = np.array([one.confidence for one in found], dtype=float)
+    def add(self, detections: Sequence[Detection], sample: LabelledImage) -> None:
+        """Add the detections in one image, which may have any confidence."""
+        boxes, labels = [entry.box for entry in detections], [entry.label for entry in detections]
+        predicted = self._to_detections(boxes, labels)
+        predicted.confidence = np.array([entry.confidence for entry in detections], dtype=float)
         self._metric.update([predicted], [self._to_detections(sample.boxes, sample.labels)])
         self._has_objects |= bool(sample.labels)
 
     def compute(self) -> tuple[float, float]:
-        """Return the value at an IoU of 0.5, and its mean over IoUs of 0.5 to 0.95; zeros without objects."""
+        """Return the value at IoU 0.5, and the mean over IoUs from 0.5 to 0.95; zeros without objects."""
         if not self._has_objects:
             return 0.0, 0.0
         result = self._metric.compute()
         return float(result.map50), float(result.map50_95)
 
     def _to_detections(self, boxes: Sequence[Box], labels: Sequence[str]) -> Any:
+        """Return boxes and labels as `supervision.Detections`."""
         ids = [self._class_ids.setdefault(label, len(self._class_ids)) for label in labels]
         return self._detections_type(np.array(boxes, float).reshape(-1, 4), class_id=np.array(ids, dtype=int))

@@ -14,7 +14,7 @@ from executive.geometry import Array
 from executive.training.labelled_image import LabelledImage
 
 MIN_OCCLUDING_IOU = 0.2
-"""Minimum intersection over union (IoU) of two boxes of which one occludes a part of the other object."""
+"""Minimum intersection over union (IoU) of the boxes of two objects of which one occludes the other."""
 MIN_IOU = 0.5
 """Minimum intersection over union (IoU) of two boxes that belong to the same object."""
 
@@ -25,9 +25,9 @@ class BoxMatch:
 
     Attributes:
         detection: The detection.
-        object_index: Index of the object in the image's labels; None: the detection is false.
+        object_index: Index of the object in `LabelledImage.labels`; None for a false detection.
         is_correct: True if the detection has the class of the object.
-        box: Box of the object [pixel]; for a false detection, its own box.
+        box: Box of the object, or of a false detection [pixel].
     """
 
     detection: Detection
@@ -45,23 +45,22 @@ class BoxMatch:
 def match_detections(detections: Sequence[Detection], sample: LabelledImage) -> list[BoxMatch]:
     """Return the match of each detection, in descending order of confidence.
 
-    Greedy assignment: each detection gets the free object of its own class with the highest IoU. Then each
-    unassigned detection gets the free object of any class with the highest IoU.
+    The assignment is greedy: each detection gets the free object of the same class with the highest IoU.
+    Then each unassigned detection gets the free object of any class with the highest IoU.
     """
     ranked = sorted(detections, key=lambda detection: -detection.confidence)
     ious = compute_ious([detection.box for detection in ranked], sample.boxes)
-    rows = [[detection.label == label for label in sample.labels] for detection in ranked]
-    same_class = np.array(rows, dtype=bool)
-    index_by_rank: dict[int, int] = {}
-    for is_allowed in (same_class.reshape(ious.shape), np.ones_like(ious)):
+    is_same_class = [[detection.label == label for label in sample.labels] for detection in ranked]
+    object_indices: dict[int, int] = {}
+    for mask in (np.array(is_same_class, dtype=bool).reshape(ious.shape), np.ones_like(ious)):
         for rank in range(len(ranked)):
-            object_ious = ious[rank] * is_allowed[rank]
-            if rank not in index_by_rank and object_ious.size and object_ious.max() >= MIN_IOU:
-                index_by_rank[rank] = int(object_ious.argmax())
-                ious[:, index_by_rank[rank]] = 0.0
+            object_ious = ious[rank] * mask[rank]
+            if rank not in object_indices and object_ious.max(initial=0.0) >= MIN_IOU:
+                object_indices[rank] = int(object_ious.argmax())
+                ious[:, object_indices[rank]] = 0.0
     matches = []
     for rank, detection in enumerate(ranked):
-        index = index_by_rank.get(rank)
+        index = object_indices.get(rank)
         is_correct = index is not None and sample.labels[index] == detection.label
         box = detection.box if index is None else sample.boxes[index]
         matches.append(BoxMatch(detection, index, is_correct, box))
@@ -69,20 +68,20 @@ def match_detections(detections: Sequence[Detection], sample: LabelledImage) -> 
 
 
 def is_occluded(index: int, matches: Sequence[BoxMatch], sample: LabelledImage) -> bool:
-    """Return True if another detected object occludes the object, which then does not count as missed."""
-    others = [match.detection.box for match in matches if match.object_index not in (None, index)]
-    return bool(compute_ious([sample.boxes[index]], others).max(initial=0.0) >= MIN_OCCLUDING_IOU)
+    """Return True if another detected object occludes the object with the given index."""
+    other_boxes = [match.detection.box for match in matches if match.object_index not in (None, index)]
+    return bool(compute_ious([sample.boxes[index]], other_boxes).max(initial=0.0) >= MIN_OCCLUDING_IOU)
 
 
 def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
-    """Return True if a detection shows an ignored object rather than a labelled one."""
-    iou = compute_ious([detection.box], sample.ignored).max(initial=0.0)
+    """Return True if a detection shows an ignored object, and no labelled object with a higher IoU."""
+    iou = compute_ious([detection.box], sample.ignored_boxes).max(initial=0.0)
     return bool(iou >= MIN_IOU and iou > compute_ious([detection.box], sample.boxes).max(initial=0.0))
 
 
-def compute_ious(boxes: Sequence[Box], others: Sequence[Box]) -> NDArray[np.float32]:
-    """Return the intersection over union of each box and each box of `others`, `(N, M)`."""
+def compute_ious(boxes: Sequence[Box], other_boxes: Sequence[Box]) -> NDArray[np.float32]:
+    """Return the intersection over union of each of N boxes and each of M other boxes, `(N, M)`."""
     # The import takes half a second; only an evaluation needs the package.
     from supervision import box_iou_batch
 
-    return np.asarray(box_iou_batch(np.array(boxes).reshape(-1, 4), np.array(others).reshape(-1, 4)))
+    return np.asarray(box_iou_batch(np.array(boxes).reshape(-1, 4), np.array(other_boxes).reshape(-1, 4)))

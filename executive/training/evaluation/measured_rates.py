@@ -23,12 +23,12 @@ MIN_JITTER = 0.01
 
 @dataclass(frozen=True)
 class CountedRate:
-    """Rate that was measured by counting events.
+    """Measured frequency of an event, with a confidence bound.
 
     Attributes:
         events: Number of events.
         trials: Number of trials.
-        bound: Upper 95 % bound of the rate.
+        bound: Upper 95 % confidence bound of the frequency.
     """
 
     events: int
@@ -37,13 +37,13 @@ class CountedRate:
 
     @staticmethod
     def estimate_proportion(events: int, trials: int) -> CountedRate:
-        """Return the proportion of the trials with an event; its bound is 1 if all trials have one."""
+        """Return the proportion of trials with an event; the bound is 1 if all trials have an event."""
         bound = float(betaincinv(events + 1, trials - events, CONFIDENCE_LEVEL)) if events < trials else 1.0
         return CountedRate(events, trials, bound)
 
     @staticmethod
     def estimate_mean_count(events: int, trials: int) -> CountedRate:
-        """Return the mean number of events per trial; a trial can have several events."""
+        """Return the mean number of events per trial, which can exceed 1."""
         return CountedRate(events, trials, float(gammaincinv(events + 1, CONFIDENCE_LEVEL)) / trials)
 
 
@@ -69,7 +69,7 @@ class MeasuredErrorRates:
 
     @property
     def rates(self) -> StoredErrorRates:
-        """Error rates for the ledger, rounded up: bounds, repeated fraction and standard deviations."""
+        """Error rates for the ledger: confidence bounds, and other values, all rounded up."""
         return StoredErrorRates(
             miss_rate=min(round_up(self.miss_rate.bound), MAX_PROPORTION),
             confusion_rate=min(round_up(self.confusion_rate.bound), MAX_PROPORTION),
@@ -81,7 +81,7 @@ class MeasuredErrorRates:
 
 
 def round_up(value: float, digits: int = 2) -> float:
-    """Return `value` rounded up to `digits` significant digits; a rounded bound must not be smaller."""
+    """Return `value` rounded up to `digits` significant digits, so that a rounded bound stays a bound."""
     if value <= 0:
         return 0.0
     places = digits - 1 - math.floor(math.log10(value))

@@ -20,7 +20,7 @@ class Distribution:
     """Quantiles of a measured quantity, in its unit.
 
     Attributes:
-        median, p95, p99, worst: Median, 95th and 99th percentile, and maximum.
+        median, p95, p99, worst: Median, 95th percentile, 99th percentile, and maximum.
     """
 
     median: float
@@ -54,29 +54,29 @@ class ClassMetrics:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Accuracy of a detector on labelled images; images without an answer count only in `images`.
+    """Accuracy of a detector on labelled images.
 
     Attributes:
         threshold: Minimum confidence of a detection.
-        images: Number of images.
+        images: Number of images, including images without an answer.
         objects: Number of objects in the images with an answer.
         precision: Fraction of the detections with the correct class and an IoU of at least 0.5.
         recall: Fraction of the objects that are detected with their class.
-        map50: Mean average precision at IoU 0.5, over all detections, also below `threshold`.
-        map50_95: Mean average precision, averaged over IoUs from 0.5 to 0.95.
-        centre: Distance between the centres of detected and true box [pixel of the image].
-        position: Distance of the centres in the world, at the height of the object [mm]; None if unknown.
-        localized: Distance of the localizer's position from the true centre of the object [mm].
+        map50: Mean average precision at IoU 0.5 over detections with any confidence.
+        map50_95: Mean average precision over IoUs from 0.5 to 0.95.
+        centre: Distance between the centres of detected and true box [pixel].
+        position: Distance between the centres in the world, at the height of the object [mm].
+        localized: Distance between the localizer's position and the true centre of the object [mm].
         latency: Wall time from a frame to its detections [ms], without the first image.
         by_class: Metrics of each class.
-        confusion: Number of objects by true and detected class, each also `nothing`.
+        confusion: Number of objects by true class, then by detected class; both can be `nothing`.
         unavailable: Number of images without a usable answer of the detector.
         why: Message of the last unusable answer, or "".
-        answered_by: Number of answers by the name of the detector that gave them.
-        by_count: Number of fully visible `objects`, of `missed` and `confused` ones, and of
+        answered_by: Number of answers by name of the answering detector.
+        by_count: Numbers of fully visible `objects`, `missed` and `confused` objects, and
             `false_detections`, by the number of objects in the image.
         reliability: Error rates for the ledger; None if there was no answer.
-        frames: Brightness, contrast and colours of the workspace; None if no image shows all of it.
+        frames: Brightness, contrast and colours of the workspace; None if no image shows it as a whole.
     """
 
     threshold: float

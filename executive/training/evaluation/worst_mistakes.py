@@ -1,4 +1,4 @@
-"""Worst mistakes of a detector, and a contact sheet of them."""
+"""Worst mistakes of a detector, and a contact sheet of the mistakes."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from executive.cell.frame import Box
 from executive.training.evaluation.matching import BoxMatch
 from executive.training.labelled_image import LabelledImage
 
-COLUMNS = 6
+MAX_COLUMN_COUNT = 6
 """Maximum number of tiles in a row of the sheet."""
 TILE_SIZE, CAPTION_HEIGHT, GAP, HEADER_HEIGHT = 240, 40, 10, 34
-"""Side of a tile, height of its caption, gap between tiles, height of the header of the sheet [pixel]."""
+"""Side of a tile, height of a caption, gap between tiles, height of the header of the sheet [pixel]."""
 CROP_SCALE = 2.2
 """Side of the crop of the image, as a multiple of the longer side of the mistake's box."""
 MIN_CROP_SIZE = 40.0
@@ -43,45 +43,45 @@ class Mistake:
     """Missed object, false detection, wrong class, or position error of a correct detection.
 
     Attributes:
-        severity: Visible fraction of a missed object (half of it if truncated), confidence of a wrong
-            detection, or offset of a correct box divided by the longer side of the object's box; 0 to 1.
+        severity: Visible fraction of a missed object (halved if truncated), confidence of a wrong detection,
+            or offset of a correct box divided by the longer side of the true box; 0 to 1.
         text: Short description of the mistake.
         box: Box around the mistake [pixel].
         sample: The labelled image.
-        found: All detections in the image at or above the threshold.
+        detections: All detections in the image at or above the threshold.
     """
 
     severity: float
     text: str
     box: Box
     sample: LabelledImage
-    found: tuple[Detection, ...]
+    detections: tuple[Detection, ...]
 
 
 class WorstMistakes:
-    """Keeps the worst mistakes of all images.
+    """Worst mistakes in all images.
 
     Args:
-        count: Maximum number of mistakes.
+        max_count: Maximum number of mistakes.
 
     Attributes:
-        kept: The mistakes by falling severity; equally severe mistakes in the order in which they were added.
+        mistakes: Mistakes from the most to the least severe.
     """
 
-    def __init__(self, count: int = 24) -> None:
-        self._count = count
-        self.kept: list[Mistake] = []
+    def __init__(self, max_count: int = 24) -> None:
+        self._max_count = max_count
+        self.mistakes: list[Mistake] = []
 
     def add(self, matches: Sequence[BoxMatch], sample: LabelledImage) -> None:
         """Add the mistakes in one image, and drop the least severe ones beyond the maximum number."""
-        self.kept += find_mistakes(matches, sample)
-        self.kept.sort(key=lambda mistake: -mistake.severity)
-        del self.kept[self._count :]
+        self.mistakes += find_mistakes(matches, sample)
+        self.mistakes.sort(key=lambda mistake: -mistake.severity)
+        del self.mistakes[self._max_count :]
 
 
 def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Mistake]:
-    """Yield the mistakes in one image, and every correct detection with the position error of its box."""
-    found = tuple(match.detection for match in matches)
+    """Yield the mistakes in one image; a correct detection is a mistake of the position of the box."""
+    detections = tuple(match.detection for match in matches)
     detected_objects = {match.object_index for match in matches}
     for index, label in enumerate(sample.labels):
         if index not in detected_objects:
@@ -89,7 +89,7 @@ def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterato
             truncation = "" if sample.is_fully_inside(index) else ", truncated"
             visibility = "" if fraction >= 0.995 else f", {fraction:.0%} visible"
             text = f"{label} missed{visibility}{truncation}"
-            yield Mistake(fraction / (2 if truncation else 1), text, sample.boxes[index], sample, found)
+            yield Mistake(fraction / (2 if truncation else 1), text, sample.boxes[index], sample, detections)
     for match in matches:
         box, severity = match.detection.box, match.detection.confidence
         text = f"{match.detection.label} {severity:.2f}"
@@ -103,17 +103,12 @@ def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterato
             text = f"{sample.labels[match.object_index]} detected as {text}"
         left, top, right, bottom = match.box
         enclosing_box = min(box[0], left), min(box[1], top), max(box[2], right), max(box[3], bottom)
-        yield Mistake(severity, text, enclosing_box, sample, found)
+        yield Mistake(severity, text, enclosing_box, sample, detections)
 
 
 def draw_sheet(mistakes: Sequence[Mistake], title: str) -> Picture:
-    """Return a contact sheet with one tile per mistake, `(H, W, 3)` RGB.
-
-    Args:
-        mistakes: Mistakes in the order of their tiles.
-        title: Name of the measurement, for the header.
-    """
-    columns = min(COLUMNS, max(len(mistakes), 3))
+    """Return a contact sheet `(H, W, 3)`, RGB, with a tile for each mistake and `title` in the header."""
+    columns = min(MAX_COLUMN_COUNT, max(len(mistakes), 3))
     rows = max(math.ceil(len(mistakes) / columns), 1)
     column_width, row_height = TILE_SIZE + GAP, TILE_SIZE + CAPTION_HEIGHT + GAP
     width = GAP + columns * column_width
@@ -144,7 +139,7 @@ def _draw_tile(mistake: Mistake) -> Picture:
     image = mistake.sample.image[..., ::-1]  # The annotators expect BGR.
     size, border = (TILE_SIZE, TILE_SIZE), BACKGROUND[::-1]
     tile = cv2.warpAffine(image, matrix, size, flags=cv2.INTER_CUBIC, borderValue=border)
-    detected = sv.BoxAnnotator, [detection.box for detection in mistake.found], DETECTED_COLOUR
+    detected = sv.BoxAnnotator, [detection.box for detection in mistake.detections], DETECTED_COLOUR
     layers: Any = (detected, (sv.BoxCornerAnnotator, mistake.sample.boxes, TRUE_COLOUR))
     for annotator, boxes, colour in layers:
         tile_boxes = ((np.array(boxes).reshape(-1, 2, 2) - corner) * zoom).reshape(-1, 4)
@@ -158,11 +153,11 @@ def _write_text(
     image: Picture, text: str, corner: tuple[int, int], colour: Colour, max_width: int = TILE_SIZE
 ) -> None:
     """Write a text with its lower left corner at `corner` [pixel], truncated to `max_width` [pixel]."""
-    shown = text
-    while _measure_text(shown) > max_width and len(text) > 1:
+    written_text = text
+    while _measure_text(written_text) > max_width and len(text) > 1:
         text = text[:-1]
-        shown = f"{text}..."
-    cv2.putText(image, shown, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, 1, cv2.LINE_AA)
+        written_text = f"{text}..."
+    cv2.putText(image, written_text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, 1, cv2.LINE_AA)
 
 
 def _measure_text(text: str) -> int:

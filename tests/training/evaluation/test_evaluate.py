@@ -68,7 +68,7 @@ def test_a_wrong_class_at_the_right_position_counts_as_miss_and_false_detection(
 
 
 def test_what_is_ignored_or_under_the_threshold_does_not_count(saying, sample, both):
-    half_hidden = evaluate(saying((*both, ("cube", 0.9, sample.ignored[0]))), [sample])
+    half_hidden = evaluate(saying((*both, ("cube", 0.9, sample.ignored_boxes[0]))), [sample])
     assert (half_hidden.precision, half_hidden.recall, half_hidden.objects) == (1, 1, 2)
     doubtful = saying((("cube", 0.4, sample.boxes[0]), both[1]))
     measured = evaluate(doubtful, [sample])
@@ -137,7 +137,7 @@ def test_the_cells_localizer_is_held_against_the_true_middle(saying, sample, bot
 def test_the_worst_misses_are_gathered(saying, sample, both):
     worst = WorstMistakes()
     evaluate(saying(both[:1]), [sample], worst=worst)
-    assert [mistake.text for mistake in worst.kept] == ["duck missed", "cube off by 0.0 px"]
+    assert [mistake.text for mistake in worst.mistakes] == ["duck missed", "cube off by 0.0 px"]
 
 
 def test_a_spread_names_its_quantiles():

@@ -49,10 +49,10 @@ def test_an_object_goes_to_its_own_class_then_to_the_most_confident(sample):
 
 
 def test_an_ignored_object_is_one_that_a_box_fits_better_than_any_other(sample):
-    (half_hidden,), on_cube = sample.ignored, Detection("cube", 0.9, sample.boxes[0])
+    (half_hidden,), on_cube = sample.ignored_boxes, Detection("cube", 0.9, sample.boxes[0])
     assert is_ignored(Detection("cube", 0.9, half_hidden), sample)
     assert not is_ignored(on_cube, sample)
-    assert not is_ignored(on_cube, replace(sample, ignored=(right_by(sample.boxes[0], 3),)))
+    assert not is_ignored(on_cube, replace(sample, ignored_boxes=(right_by(sample.boxes[0], 3),)))
 
 
 def test_every_kind_of_mistake_has_a_text_and_a_weight(sample, knowing):
@@ -75,7 +75,7 @@ def test_the_worst_come_first_and_the_others_are_forgotten(knowing):
     worst = WorstMistakes(3)
     for share in (0.55, 0.95, 0.75, 0.65):
         worst.add([], knowing(visible_fraction=[share, 0.5]))
-    assert [mistake.severity for mistake in worst.kept] == [0.95, 0.75, 0.65]
+    assert [mistake.severity for mistake in worst.mistakes] == [0.95, 0.75, 0.65]
 
 
 def test_the_sheet_shows_the_true_and_the_found_box(sample):
