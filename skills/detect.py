@@ -61,7 +61,7 @@ class Detect(Skill):
         except Unavailable as error:
             raise self.failure("unavailable", str(error)) from error
         on_table = (box for box in answer.doubtful if not is_detection_in_bin(cell, box, frame))
-        if not answer.found and self.doubtful == "fail" and (best := next(on_table, None)):
+        if not answer.confident and self.doubtful == "fail" and (best := next(on_table, None)):
             raise self.failure("unsure", answer.describe_doubt(best))
         self.detections = Detections(
             **vars(answer), frame=frame, view=self.view, area=camera.get_view_box(self.view)

@@ -53,7 +53,7 @@ PARTS: dict[str, list[tuple[str, str, str]]] = {
         ("request = detector.request(frame, view)", "cell/protocols.py", "Request"),
         ("answer = request.result()", "cell/detection.py", "Answer"),
         ("answer.error_rates", "cell/error_rates.py", "ErrorRates"),
-        ("detection = answer.found[0]", "cell/detection.py", "Detection"),
+        ("detection = answer.confident[0]", "cell/detection.py", "Detection"),
         ("detections = Detections(...)", "cell/detection.py", "Detections"),
     ],
     "Localizer": [

@@ -39,19 +39,19 @@ class Detection:
 class Answer:
     """Detections of a detector in a frame.
 
-    A detector puts all detections into `found`. The cell moves doubtful and unknown detections to the other
-    attributes before a skill reads the answer (`executive.perception.detectors.screening`).
+    A detector puts all detections into `confident`. Before a skill reads the answer, the cell moves doubtful
+    and unknown detections to the other attributes (`executive.perception.detectors.screening`).
 
     Attributes:
         detector: Name of the detector in the cell file.
-        found: Confident detections of known classes, most confident first.
+        confident: Confident detections of known classes, most confident first.
         error_rates: Error rates of the detector.
         doubtful: Detections below the threshold, or whose second class has more than half the confidence.
         unknown: Detections above the threshold with labels that the cell file does not declare.
     """
 
     detector: str
-    found: tuple[Detection, ...]
+    confident: tuple[Detection, ...]
     error_rates: ErrorRates
     doubtful: tuple[Detection, ...] = ()
     unknown: tuple[Detection, ...] = ()

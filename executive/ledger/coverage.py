@@ -15,7 +15,7 @@ from executive.ledger.belief import compute_repeat_probability, make_viewpoint_k
 GRID_PITCH = 0.02
 """Distance between neighbouring grid points [m], smaller than the smallest object."""
 GRID_MARGIN = 0.4
-"""Width of the grid outside the workspace [m], which includes the positions of dropped and pushed objects."""
+"""Width of the margin of the grid around the workspace [m]; dropped and pushed objects stay on the grid."""
 PRIOR_OUTSIDE = 0.01
 """Prior probability of an object at a grid point outside the workspace before any drop or push."""
 PRIOR_OUTSIDE_AFTER_CHANGE = 0.1

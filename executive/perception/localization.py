@@ -64,7 +64,7 @@ class CellLocalizer:
         Raises:
             NoDepth: A detection cannot be localized.
         """
-        found = [self._observe(detections, detection) for detection in detections.found]
+        found = [self._observe(detections, detection) for detection in detections.confident]
         doubtful = []
         for detection in detections.doubtful:
             try:

@@ -104,7 +104,7 @@ def encode_answer(answer: Answer) -> dict[str, Any]:
     """Return the answer of a detector as a mapping."""
     return {
         "detector": answer.detector,
-        "found": list(map(encode_detection, answer.found)),
+        "confident": list(map(encode_detection, answer.confident)),
         "reliability": list(astuple(answer.error_rates)),
         "doubtful": list(map(encode_detection, answer.doubtful)),
         "unknown": list(map(encode_detection, answer.unknown)),
@@ -114,7 +114,7 @@ def encode_answer(answer: Answer) -> dict[str, Any]:
 def decode_answer(value: Any) -> Answer:
     """Return the answer that `encode_answer` encoded."""
     found, doubtful, unknown = (
-        tuple(map(decode_detection, value[key])) for key in ("found", "doubtful", "unknown")
+        tuple(map(decode_detection, value[key])) for key in ("confident", "doubtful", "unknown")
     )
     return Answer(value["detector"], found, ErrorRates(*value["reliability"]), doubtful, unknown)
 

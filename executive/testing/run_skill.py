@@ -149,5 +149,5 @@ def describe_argument(argument: object) -> str:
     if isinstance(argument, Frame):
         return f"frame {argument.id}"
     if isinstance(argument, Detections):
-        return f"{len(argument.found)} found in frame {argument.frame.id}"
+        return f"{len(argument.confident)} found in frame {argument.frame.id}"
     return ""

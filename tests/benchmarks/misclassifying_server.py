@@ -75,9 +75,9 @@ class MisclassifyingRequest:
         answer = self.other.result()
         found = tuple(
             replace(one, label=self.given_class) if one.label == self.true_class else one
-            for one in answer.found
+            for one in answer.confident
         )
-        return replace(answer, found=found)
+        return replace(answer, confident=found)
 
 
 @dataclass(frozen=True)

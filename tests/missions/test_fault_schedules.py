@@ -59,7 +59,7 @@ def detector_adds_false_box(seed: int) -> Effect:
     box = (float(u), float(v), float(u) + 26.0, float(v) + 26.0)
 
     def add(answer: Answer) -> Answer:
-        return replace(answer, found=(*answer.found, Detection("cube", 0.9, box)))
+        return replace(answer, confident=(*answer.confident, Detection("cube", 0.9, box)))
 
     return make_detector_effect("detector_adds_false_box", add)
 
@@ -68,7 +68,9 @@ def detector_swaps_classes() -> Effect:
     """Exchange the classes cube and sphere in an answer."""
 
     def swap(answer: Answer) -> Answer:
-        return replace(answer, found=tuple(replace(one, label=SWAPPED[one.label]) for one in answer.found))
+        return replace(
+            answer, confident=tuple(replace(one, label=SWAPPED[one.label]) for one in answer.confident)
+        )
 
     return make_detector_effect("detector_swaps_classes", swap)
 

@@ -50,7 +50,7 @@ def found_by(detector, frame, view):
     detector._setting.clock.now += 0.05
     assert request.ready
     detector.close()
-    return request.result().found
+    return request.result().confident
 
 
 def spots(size, left, top, view):
@@ -102,7 +102,7 @@ def test_an_answer_shows_after_the_latency_with_its_detector_and_the_cells_names
     answer = request.result()
     detector.close()
     assert (answer.detector, answer.error_rates) == ("eye", config.error_rates)
-    assert [found.label for found in answer.found] == ["cube"]
+    assert [found.label for found in answer.confident] == ["cube"]
 
 
 WRONG = [

@@ -31,12 +31,14 @@ def test_detections_are_divided_by_confidence_second_class_and_label() -> None:
     cube, weak, torn = detect(), detect(confidence=0.4), detect(confidence=0.7, second_confidence=0.4)
     mug, weak_mug = detect("mug"), detect("mug", confidence=0.4)
     answer = screen_answer(Answer("eye", (cube, mug, torn, weak, weak_mug), RATES), FRAME, "table", ["cube"])
-    assert (answer.found, answer.doubtful, answer.unknown) == ((cube,), (torn, weak), (mug,))
+    assert (answer.confident, answer.doubtful, answer.unknown) == ((cube,), (torn, weak), (mug,))
 
 
 def test_a_box_that_the_arm_hides_is_left_out() -> None:
     shown, hidden = detect(right=12.0), detect(right=16.0)
-    assert screen_answer(Answer("eye", (shown, hidden), RATES), FRAME, "table", ["cube"]).found == (shown,)
+    assert screen_answer(Answer("eye", (shown, hidden), RATES), FRAME, "table", ["cube"]).confident == (
+        shown,
+    )
 
 
 def raise_unavailable() -> Answer:

@@ -19,7 +19,7 @@ def test_an_answer_becomes_visible_after_the_detectors_latency(fake: FakeCell) -
     fake.world.put("cube", 0.5, 0.0)
     result = run_skill(Detect(), fake)
     detections = result.outputs["detections"]
-    assert (result.status, [found.label for found in detections.found]) == ("SUCCESS", ["cube"])
+    assert (result.status, [found.label for found in detections.confident]) == ("SUCCESS", ["cube"])
     assert result.ticks == 12, "0.05 s at 240 Hz"
     assert (detections.detector, detections.error_rates.miss_rate) == ("embedded", 0.03)
 
@@ -39,7 +39,11 @@ def test_only_what_is_sure_is_found(
     fake.detector.answers = lambda look, true: answer
     result = run_skill(Detect(**params), fake)
     detections = result.outputs["detections"]
-    assert (result.status, len(detections.found), len(detections.doubtful)) == ("SUCCESS", found, doubtful)
+    assert (result.status, len(detections.confident), len(detections.doubtful)) == (
+        "SUCCESS",
+        found,
+        doubtful,
+    )
 
 
 @pytest.mark.parametrize(
@@ -86,14 +90,14 @@ def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:
         "hidden", "the arm hides part of the workspace from camera overhead", 0,
     )  # fmt: skip
     result = run_skill(Detect(hidden="pass"), fake)
-    assert [found.label for found in result.outputs["detections"].found] == ["cube"]
+    assert [found.label for found in result.outputs["detections"].confident] == ["cube"]
 
 
 def test_what_is_seen_of_things_behind_the_arm_is_not_believed(fake: FakeCell) -> None:
     behind, beside = (Detection("cube", 0.9, (x, 200, x + 20, 220)) for x in (300, 400))
     fake.detector.answers = lambda look, true: [behind, beside]
     fake.camera.occluded_regions.append((290, 190, 310, 230))
-    assert run_skill(Detect(hidden="pass"), fake).outputs["detections"].found == (beside,)
+    assert run_skill(Detect(hidden="pass"), fake).outputs["detections"].confident == (beside,)
 
 
 def test_a_moved_camera_is_noticed_in_every_look(fake: FakeCell) -> None:

@@ -34,7 +34,7 @@ def look(made, view="table"):
     request = made.cell.detectors["embedded"].request(frame, view)
     while not request.ready:
         made.advance()
-    return frame, list(request.result().found)
+    return frame, list(request.result().confident)
 
 
 def labels(made, view="table"):

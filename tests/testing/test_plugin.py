@@ -23,11 +23,11 @@ from skills.detect import Detect
 def test_a_look_sees_what_lies_there(fake_cell, run_skill):
     fake_cell.world.put("cube", 0.5, 0.0)
     result = run_skill(Detect, fake_cell)
-    assert [one.label for one in result.outputs["detections"].found] == ["cube"]
+    assert [one.label for one in result.outputs["detections"].confident] == ["cube"]
 
 
 def test_the_next_table_is_empty_again(fake_cell, run_skill):
-    assert run_skill(Detect, fake_cell).outputs["detections"].found == ()
+    assert run_skill(Detect, fake_cell).outputs["detections"].confident == ()
 
 
 def test_a_mission_runs(run_mission):

@@ -84,7 +84,7 @@ class NoisyDetector:
     def _add_errors(self, answer: Answer, frame: Frame, view: str) -> Answer:
         """Return the answer with random errors, which depend on the seed, the frame and the view."""
         random = np.random.default_rng([self._setting.seed, frame.id, len(view)])
-        kept = [detection for detection in answer.found if random.random() >= self._config.miss_rate]
+        kept = [detection for detection in answer.confident if random.random() >= self._config.miss_rate]
         found = [self._shift_box(self._replace_class(detection, random), random) for detection in kept]
         false_count = random.poisson(self._config.false_detections)
         found += [self._make_false_detection(frame, view, random) for _ in range(false_count)]

@@ -29,12 +29,12 @@ MAX_RIVAL_RATIO = 0.5
 
 
 def screen_answer(answer: Answer, frame: Frame, view: str, labels: Collection[str]) -> Answer:
-    """Return an answer with its detections divided into `found`, `doubtful` and `unknown`.
+    """Return an answer with its detections divided into `confident`, `doubtful` and `unknown`.
 
     Boxes that the arm occludes, and detections with unknown labels below the threshold, are omitted.
 
     Args:
-        answer: Answer with all detections in `found`.
+        answer: Answer with all detections in `confident`.
         frame: The searched frame.
         view: Name of the searched region, for an error message.
         labels: Class names in the cell file.
@@ -43,23 +43,25 @@ def screen_answer(answer: Answer, frame: Frame, view: str, labels: Collection[st
         Crowded: There are more than `MAX_BOXES` boxes.
         Unavailable: A box, a confidence or a label is invalid.
     """
-    if len(answer.found) > MAX_BOXES:
+    if len(answer.confident) > MAX_BOXES:
         raise Crowded(
-            f"detector {answer.detector} found {len(answer.found)} boxes in the view {view}, which "
+            f"detector {answer.detector} found {len(answer.confident)} boxes in the view {view}, which "
             f"cannot all be objects; at most {MAX_BOXES} are allowed: raise `floor` of the detector in "
             "the cell file, or use another detector"
         )
-    if invalid := next((one for one in answer.found if not _is_valid(one)), None):
+    if invalid := next((one for one in answer.confident if not _is_valid(one)), None):
         raise Unavailable(
             f"detector {answer.detector} returned an invalid box: {invalid.label[:MAX_LABEL_LENGTH]!r} "
             f"{invalid.confidence:g} at {invalid.box}"
         )
     threshold = answer.error_rates.threshold
-    visible = [one for one in answer.found if frame.compute_visible_fraction(one.box) >= MIN_VISIBLE_FRACTION]
+    visible = [
+        one for one in answer.confident if frame.compute_visible_fraction(one.box) >= MIN_VISIBLE_FRACTION
+    ]
     known = [one for one in visible if one.label in labels]
     return replace(
         answer,
-        found=tuple(one for one in known if _is_confident(one, threshold)),
+        confident=tuple(one for one in known if _is_confident(one, threshold)),
         doubtful=tuple(one for one in known if not _is_confident(one, threshold)),
         unknown=tuple(one for one in visible if one.label not in labels and one.confidence >= threshold),
     )

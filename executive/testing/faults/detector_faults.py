@@ -29,16 +29,16 @@ def _raise_unavailable(answer: Answer) -> Answer:
 def _reduce_confidence(answer: Answer) -> Answer:
     """Return an answer whose confidences are below the threshold."""
     max_confidence = UNSURE_CONFIDENCE_FRACTION * answer.error_rates.threshold
-    detections = sorted((*answer.found, *answer.doubtful), key=lambda detection: -detection.confidence)
+    detections = sorted((*answer.confident, *answer.doubtful), key=lambda detection: -detection.confidence)
     doubtful = tuple(
         replace(detection, confidence=min(detection.confidence, max_confidence)) for detection in detections
     )
-    return replace(answer, found=(), doubtful=doubtful, unknown=())
+    return replace(answer, confident=(), doubtful=doubtful, unknown=())
 
 
 def _remove_detections(answer: Answer) -> Answer:
     """Return an answer without detections."""
-    return replace(answer, found=(), doubtful=(), unknown=())
+    return replace(answer, confident=(), doubtful=(), unknown=())
 
 
 def make_detector_effect(

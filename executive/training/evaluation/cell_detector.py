@@ -72,9 +72,9 @@ class CellDetector:
         finally:
             self._now += LOOK_INTERVAL
         latency = (time.perf_counter() - start_time) * 1000
-        labels = {detection.label for detection in answer.found} if self._classes is None else self._classes
-        found = tuple(detection for detection in answer.found if detection.label in labels)
-        return replace(answer, found=found), latency
+        labels = {entry.label for entry in answer.confident} if self._classes is None else self._classes
+        detections = tuple(entry for entry in answer.confident if entry.label in labels)
+        return replace(answer, confident=detections), latency
 
     def close(self) -> None:
         """Release the resources of the detectors."""

@@ -64,7 +64,7 @@ def evaluate(
             continue
         answer_counts[answer.detector] += 1
         latencies.append(latency)
-        average_precision.add([entry for entry in answer.found if not is_ignored(entry, sample)], sample)
+        average_precision.add([entry for entry in answer.confident if not is_ignored(entry, sample)], sample)
         min_confidence = answer.error_rates.threshold if threshold is None else threshold
         matches = _match(answer, sample, min_confidence)
         errors.add(matches, sample, frame)
@@ -104,7 +104,7 @@ def evaluate(
 
 def _match(answer: Answer, sample: LabelledImage, min_confidence: float) -> list[BoxMatch]:
     """Return the matches of detections with at least `min_confidence` that show no ignored object."""
-    confident = [entry for entry in answer.found if entry.confidence >= min_confidence]
+    confident = [entry for entry in answer.confident if entry.confidence >= min_confidence]
     return match_detections([entry for entry in confident if not is_ignored(entry, sample)], sample)
 
 

@@ -87,14 +87,14 @@ def test_every_detector_of_the_file_sees_everything_with_its_own_latency(load: L
     first = run_skill(Detect(), fake)
     assert first.ticks == 24, "0.1 s at 240 Hz"
     sure = run_skill(Detect(detector="sure"), fake).outputs["detections"]
-    assert len(sure.found) == len(first.outputs["detections"].found) == 4
+    assert len(sure.confident) == len(first.outputs["detections"].confident) == 4
 
 
 def test_a_look_at_the_table_alone_shows_nothing_beside_it() -> None:
     fake = FakeCell()
     fake.world.put("cube", 0.5, 0.0)
     fake.world.put("cube", *fake.cell.bins["red_bin"].position[:2])
-    seen = [run_skill(Detect(view=view), fake).outputs["detections"].found for view in ("table", "full")]
+    seen = [run_skill(Detect(view=view), fake).outputs["detections"].confident for view in ("table", "full")]
     assert [len(boxes) for boxes in seen] == [1, 2]
 
 

@@ -40,16 +40,16 @@ def answers(seed=1, view="table", **errors):
 def test_without_errors_it_says_what_the_other_says_in_its_own_name_with_its_own_figures():
     answer = answers()[0]
     assert (answer.detector, answer.error_rates.miss_rate) == ("noisy", 1e-9)
-    assert [one.label for one in answer.found] == list(CLASSES)
+    assert [one.label for one in answer.confident] == list(CLASSES)
 
 
 def test_it_overlooks_as_many_as_it_says():
-    share = 1 - np.mean([len(answer.found) for answer in answers(miss_rate=0.2)]) / len(THINGS)
+    share = 1 - np.mean([len(answer.confident) for answer in answers(miss_rate=0.2)]) / len(THINGS)
     assert share == pytest.approx(0.2, abs=0.02)
 
 
 def test_it_confuses_as_many_as_it_says_and_is_then_not_confident():
-    found = [one for answer in answers(confusion_rate=0.1) for one in answer.found]
+    found = [one for answer in answers(confusion_rate=0.1) for one in answer.confident]
     wrong = [one for one in found if one.confidence != 0.9]
     assert len(wrong) / len(found) == pytest.approx(0.1, abs=0.015)
     assert max(one.confidence for one in wrong) <= 0.75
@@ -58,7 +58,7 @@ def test_it_confuses_as_many_as_it_says_and_is_then_not_confident():
 
 def test_its_boxes_are_off_by_as_much_as_it_says_and_keep_their_size():
     moved = {thing.label: thing.centre for thing in THINGS}
-    found = [one for answer in answers(jitter=5.0) for one in answer.found]
+    found = [one for answer in answers(jitter=5.0) for one in answer.confident]
     shifts = [np.subtract(one.centre, moved[one.label]) for one in found]
     assert np.std(shifts, axis=0) == pytest.approx([5.0, 5.0], rel=0.05)
     assert np.mean(shifts, axis=0) == pytest.approx([0.0, 0.0], abs=0.3)
@@ -67,7 +67,7 @@ def test_its_boxes_are_off_by_as_much_as_it_says_and_keep_their_size():
 
 @pytest.mark.parametrize(("view", "part"), [("table", TABLE), ("full", (0, 0, 640, 480))])
 def test_what_it_invents_lies_in_the_searched_part(view, part):
-    found = [one for answer in answers(false_detections=0.5, view=view) for one in answer.found]
+    found = [one for answer in answers(false_detections=0.5, view=view) for one in answer.confident]
     invented = [one for one in found if one.confidence != 0.9]
     assert len(invented) / LOOKS == pytest.approx(0.5, abs=0.06)
     centres = np.array([one.centre for one in invented])

@@ -111,11 +111,11 @@ def assert_unavailable(detector, *patterns):
 def test_a_box_is_returned_in_the_frames_pixels_and_renamed(make, server, api, view):
     detector = make(**APIS[api])
     answer = search(detector, spot(channel=2), view)
-    ((label, box),) = [(found.label, found.box) for found in answer.found]
+    ((label, box),) = [(found.label, found.box) for found in answer.confident]
     assert (label, answer.detector) == ("sphere", "server")
     assert box == pytest.approx((300, 200, 330, 220), abs=1.0)
-    assert [found.label for found in search(detector, spot(channel=0)).found] == ["cube"]
-    assert len(search(detector, spot(20, 20), view).found) == (view == "full")
+    assert [found.label for found in search(detector, spot(channel=0)).confident] == ["cube"]
+    assert len(search(detector, spot(20, 20), view).confident) == (view == "full")
     path, headers, body = server.asked[-1]
     assert headers["Authorization"] == f"Bearer {SECRET}"
     assert all(SECRET not in path and SECRET.encode() not in body for path, _, body in server.asked)
@@ -132,7 +132,7 @@ def test_an_image_takes_the_requests_and_a_full_frame_the_images_that_the_option
 ):
     detector = make(**{**APIS[api], "full": "tiles", "deadline": 5.0})
     server.loaded.clear()
-    (found,) = search(detector, spot(180, 240), "full").found
+    (found,) = search(detector, spot(180, 240), "full").confident
     assert found.box == pytest.approx((180, 240, 210, 260), abs=1.0)
     # A server that has not loaded the model is asked to load it.
     assert len(server.asked) == 9 * requests + (api == "v1")
@@ -166,9 +166,9 @@ def test_an_output_that_a_workflow_lacks_is_named_with_those_that_it_has(make, s
 
 def test_what_is_below_the_floor_is_left_out_and_a_class_nobody_asked_for_is_not(detector, server):
     server.faults = lambda look: "doubtful"
-    assert search(detector, spot()).found == ()
+    assert search(detector, spot()).confident == ()
     server.faults = lambda look: "strangers"
-    assert "cube" in [found.label for found in search(detector, spot()).found]
+    assert "cube" in [found.label for found in search(detector, spot()).confident]
 
 
 REFUSED = {
@@ -240,7 +240,7 @@ def test_a_server_that_is_gone_and_comes_back(detector, server):
         server.over.wait(5)
         server.start()
     server.faults = lambda look: ""
-    assert len(search(detector, spot()).found) == 1
+    assert len(search(detector, spot()).confident) == 1
 
 
 @pytest.mark.slow

@@ -185,7 +185,7 @@ class TrustsTheDetector(Skill):
         request = next(iter(cell.detectors.values())).request(cell.camera.capture(), "table")
         while not request.ready:
             yield
-        _ = request.result().found[0]
+        _ = request.result().confident[0]
 
 
 class FailsWithoutSentence(Pause):

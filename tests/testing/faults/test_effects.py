@@ -149,7 +149,7 @@ def test_a_detector_answers_late_or_not_or_sees_nothing(
         with pytest.raises(Unavailable, match=r"the detector is dead \(injected fault\)"):
             request.result()
     else:
-        assert len(request.result().found) == found
+        assert len(request.result().confident) == found
 
 
 def test_an_unsure_detector_sees_everything_and_believes_nothing() -> None:
@@ -157,7 +157,7 @@ def test_an_unsure_detector_sees_everything_and_believes_nothing() -> None:
     request = ask(cell)
     answered(cell, request)
     answer = request.result()
-    assert (answer.found, [one.label for one in answer.doubtful]) == ((), list(PLACES))
+    assert (answer.confident, [one.label for one in answer.doubtful]) == ((), list(PLACES))
     threshold = answer.error_rates.threshold
     assert [one.confidence for one in answer.doubtful] == pytest.approx([0.9 * threshold] * 3)
 
@@ -252,7 +252,7 @@ def test_an_occluded_object_is_not_seen_and_occlusion_is_recorded_once_per_contr
     assert run_skill(Detect, cell).reason == "hidden"
     assert not cell.cell.camera.sees_table() and not cell.cell.camera.capture().visible.any()
     assert [one.name for one in cell.events] == ["workspace_occluded"]
-    assert run_skill(Detect, cell, inputs={"hidden": "pass"}).outputs["detections"].found == ()
+    assert run_skill(Detect, cell, inputs={"hidden": "pass"}).outputs["detections"].confident == ()
 
 
 def test_no_detection_can_be_localized() -> None:
@@ -287,7 +287,7 @@ def test_the_object_of_a_node_is_what_the_ledger_takes_for_its_item() -> None:
         script = [during("*/Approach", effects.object_removed())]
         cell = FaultyCell(cell.fake, script)
         look = run_skill(Detect, cell).outputs["detections"]
-        places = [Observation(one, np.array([*PLACES[one.label], 0.025]), 0.003) for one in look.found]
+        places = [Observation(one, np.array([*PLACES[one.label], 0.025]), 0.003) for one in look.confident]
         items = {one.label: one.item for one in cell.cell.ledger.observe(look, places)}
         item = items["sphere"]
         cell.inner.world.objects[1].position[0] += near

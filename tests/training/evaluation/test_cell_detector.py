@@ -77,7 +77,7 @@ def test_an_answer_is_waited_for_on_the_clock(build, frame):
 
 def test_what_the_cell_does_not_handle_is_no_object_of_its(build, frame):
     answer, _ = build(classes=("cube",))[0].detect(frame)
-    assert answer.found == FOUND[:1]
+    assert answer.confident == FOUND[:1]
 
 
 def test_an_unavailable_detector_says_why_and_one_that_never_answers_is_given_up(build, frame):
