@@ -187,16 +187,17 @@ def _open_images(
         with progress(f"rendering {cell.cell}") as update:
             if scenes.is_varied:
                 generate_dataset(
-                    {cell.cell: cell}, Path(folder), images=scenes.image_count, seed=scenes.seed,
-                    layout="coco", workers=scenes.workers, valid_fraction=1.0, progress=update,
+                    {cell.cell: cell}, Path(folder), image_count=scenes.image_count, seed=scenes.seed,
+                    layout="coco", worker_count=scenes.workers, valid_fraction=1.0, progress=update,
                 )  # fmt: skip
                 images = Samples(Path(folder))
             else:
                 object_counts = (0, find_max_object_count(cell, MAX_OBJECT_COUNT))
                 table = cell.table.model_copy(update={"objects": object_counts})
                 images = render_run_frames(
-                    cell.model_copy(update={"table": table}), images=scenes.image_count, seed=scenes.seed,
-                    workers=scenes.workers, progress=update, scene=load_scene(scenes.scene, cell),
+                    cell.model_copy(update={"table": table}), image_count=scenes.image_count,
+                    seed=scenes.seed, worker_count=scenes.workers, progress=update,
+                    scene=load_scene(scenes.scene, cell),
                 )  # fmt: skip
         yield images
 

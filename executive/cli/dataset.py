@@ -36,7 +36,7 @@ def command(
         configs = load_cells(cells)
         with show_progress("rendering") as progress:
             generate_dataset(
-                configs, out, images=images, seed=seed, layout=layout, workers=workers, valid_fraction=valid,
-                progress=progress,
+                configs, out, image_count=images, seed=seed, layout=layout, worker_count=workers,
+                valid_fraction=valid, progress=progress,
             )  # fmt: skip
         click.echo(f"{out}: {images} images", err=True)

@@ -28,19 +28,19 @@ EXPECTED_OBJECTS = 3.0
 def make_look_event(look: Detections, observations: Sequence[Observation]) -> FrameSearched:
     """Return the event of a look; `observations` are its localized detections."""
 
-    def list_objects(*, confident: bool) -> list[DetectedObject]:
+    def list_objects(*, is_confident: bool) -> list[DetectedObject]:
         return [
             DetectedObject(
                 observation.detection.label, round(observation.detection.confidence, 4),
                 round_values(observation.detection.box, 2), round_values(observation.position, 4),
                 observation.contradiction,
             )
-            for observation in observations if observation.is_confident == confident
+            for observation in observations if observation.is_confident == is_confident
         ]  # fmt: skip
 
     return FrameSearched(
-        look.frame.id, look.frame.camera, look.detector, look.view, list_objects(confident=True),
-        list_objects(confident=False), [detection.label for detection in look.unknown],
+        look.frame.id, look.frame.camera, look.detector, look.view, list_objects(is_confident=True),
+        list_objects(is_confident=False), [detection.label for detection in look.unknown],
     )  # fmt: skip
 
 

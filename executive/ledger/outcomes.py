@@ -24,7 +24,7 @@ FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 def find_final_state(
     record: Record, certainty: Certainty, *, has_route: bool, is_completed: bool, has_touched_item: bool
 ) -> tuple[State, str] | None:
-    """Return the final state of an item and the reason, or None if the present state is final.
+    """Return the final state of an item and the reason, or None if the current state is final.
 
     The first rule that applies determines the state:
 
@@ -35,10 +35,11 @@ def find_final_state(
        if the tool has touched another item at the expected height.
     5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
     6. Any other dropped item, and an item on the table whose position is empty, is lost.
-    7. An item without a route is skipped.
-    8. If the mission was completed, a certain item without a failed attempt or a contradiction is skipped,
+    7. An item that is already rejected stays rejected.
+    8. An item without a route is skipped.
+    9. If the mission was completed, a certain item without a failed attempt or a contradiction is skipped,
        because a quota was reached or the operator quit.
-    9. Any other item is rejected.
+    10. Any other item is rejected.
 
     Args:
         record: The item.

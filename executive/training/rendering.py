@@ -31,18 +31,18 @@ BLOCK_SIZE = 40
 
 
 def generate_dataset(
-    configs: Mapping[str, CellConfig], out: Path, *, images: int, seed: int, layout: str, workers: int,
-    valid_fraction: float, progress: ReportProgress,
+    configs: Mapping[str, CellConfig], out: Path, *, image_count: int, seed: int, layout: str,
+    worker_count: int, valid_fraction: float, progress: ReportProgress,
 ) -> None:  # fmt: skip
     """Write a dataset of random scenes; the scenes alternate between the cells.
 
     Args:
         configs: Cells by name.
         out: Folder of the dataset.
-        images: Number of images.
+        image_count: Number of images.
         seed: Seed of the random scenes.
         layout: `coco` or `yolo`.
-        workers: Number of processes that render.
+        worker_count: Number of rendering processes.
         valid_fraction: Fraction of the images that are in the split `valid`, 0 to 1: the last images.
         progress: Called after each block of `BLOCK_SIZE` images.
 
@@ -61,13 +61,14 @@ def generate_dataset(
         for key, message in find_missing_models(cell):
             raise InputError(f"{name}: {'.'.join(map(str, key))}: {message}")
     write_annotations(out, layout, [], classes)
-    train_count = images - round(images * valid_fraction)
-    render_block = partial(_render_dataset_images, cells, out, layout, seed, train_count)
-    write_annotations(out, layout, _render_in_blocks(render_block, images, workers, progress), classes)
+    train_count = image_count - round(image_count * valid_fraction)
+    render = partial(_render_dataset_images, cells, out, layout, seed, train_count)
+    entries = _render_in_blocks(render, image_count, worker_count, progress)
+    write_annotations(out, layout, entries, classes)
 
 
 def render_run_frames(
-    config: CellConfig, *, images: int, seed: int, workers: int, progress: ReportProgress,
+    config: CellConfig, *, image_count: int, seed: int, worker_count: int, progress: ReportProgress,
     scene: SceneConfig = DECLARED_SCENE,
 ) -> list[LabelledImage]:  # fmt: skip
     """Return full frames of a cell's camera, each of a random initial scene of a run.
@@ -76,26 +77,27 @@ def render_run_frames(
 
     Args:
         config: The cell.
-        images: Number of frames.
+        image_count: Number of frames.
         seed: Seed of the random scenes.
-        workers: Number of processes that render.
+        worker_count: Number of rendering processes.
         progress: Called after each block of `BLOCK_SIZE` frames.
         scene: Differences of the simulated world from the cell file.
     """
-    return _render_in_blocks(partial(_render_frames, config, scene, seed), images, workers, progress)
+    render = partial(_render_frames, config, scene, seed)
+    return _render_in_blocks(render, image_count, worker_count, progress)
 
 
 def _render_in_blocks(
-    render_block: Callable[[range], dict[int, ResultT]], count: int, workers: int, progress: ReportProgress
+    render: Callable[[range], dict[int, ResultT]], count: int, worker_count: int, progress: ReportProgress
 ) -> list[ResultT]:
-    """Return the results of `render_block` for images 0 to `count` - 1, in order, from worker processes."""
-    results: dict[int, ResultT] = {}
-    with WorkerPool(workers) as pool:
-        blocks = [range(count)[first : first + BLOCK_SIZE] for first in range(0, count, BLOCK_SIZE)]
-        for task in as_completed([pool.submit(render_block, block) for block in blocks]):
+    """Return the results of `render` for images 0 to `count` - 1, in order, from worker processes."""
+    numbers, results = range(count), dict[int, ResultT]()
+    blocks = [numbers[first : first + BLOCK_SIZE] for first in numbers[::BLOCK_SIZE]]
+    with WorkerPool(worker_count) as pool:
+        for task in as_completed([pool.submit(render, block) for block in blocks]):
             results.update(task.result())
             progress(len(results), count)
-    return [results[number] for number in sorted(results)]
+    return [results[number] for number in numbers]
 
 
 def _draw_samples(

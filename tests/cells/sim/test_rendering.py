@@ -131,7 +131,7 @@ def make(out: Path, workers: int = 1, images: int = 1, **cells: CellConfig) -> l
     """Make a small data set and return what was reported on the way."""
     reported: list[tuple[int, int]] = []
     generate_dataset(
-        cells, out, images=images, seed=3, layout="coco", workers=workers, valid_fraction=0.25,
+        cells, out, image_count=images, seed=3, layout="coco", worker_count=workers, valid_fraction=0.25,
         progress=lambda made, total: reported.append((made, total)),
     )  # fmt: skip
     return reported
@@ -159,7 +159,9 @@ def test_data_sets_and_frames_are_the_same_for_any_number_of_workers(
     assert [(one / file).read_bytes() == (two / file).read_bytes() for file in files] == [True] * len(files)
     assert list(json.loads((one / "valid/truth.json").read_text())) == ["overhead_000003.jpg"]
     frames, again = (
-        render_run_frames(overhead, images=3, seed=3, workers=workers, progress=lambda taken, total: None)
+        render_run_frames(
+            overhead, image_count=3, seed=3, worker_count=workers, progress=lambda taken, total: None
+        )
         for workers in (1, 2)
     )
     assert [frame.file for frame in frames] == [f"overhead_00000{number}" for number in range(3)]
