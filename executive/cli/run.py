@@ -84,7 +84,7 @@ def command(
         terminal_view = None if quiet else _make_view()
         with _serve_page(live) as page:
             views = [GuardedView(view) for view in (terminal_view, page) if view is not None]
-            record = RecordOptions(views, paused)
+            record = RecordOptions(views, starts_paused=paused)
             run_options = RunOptions(
                 seed, requests or None, has_keyboard=page is None or has_keyboard, gui=gui,
                 is_realtime=realtime, scene=scene,

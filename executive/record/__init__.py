@@ -1,1 +1,1 @@
-"""Record of a run: observers of its events, run directory, result, replay and resumption."""
+"""Record of a run: run directory, journal, pictures, result and diagnosis; replay and resumption."""

@@ -10,19 +10,21 @@ from pathlib import Path
 
 @contextlib.contextmanager
 def replace_atomically(path: Path) -> Iterator[Path]:
-    """Yield a temporary file that replaces `path` after the `with` block, or is removed after an exception.
+    """Yield the path of a temporary file that replaces `path` after the `with` block.
+
+    After an exception in the block, the temporary file is removed.
 
     Raises:
         OSError: The file cannot be written; `path` is unchanged.
     """
-    temporary = path.with_name(f".{path.name}.part")
+    temporary_path = path.with_name(f".{path.name}.part")
     try:
-        temporary.touch()
-        yield temporary
-        temporary.replace(path)
+        temporary_path.touch()
+        yield temporary_path
+        temporary_path.replace(path)
     except BaseException:
         with contextlib.suppress(OSError):
-            temporary.unlink()
+            temporary_path.unlink()
         raise
 
 
@@ -32,7 +34,7 @@ def write_atomically(path: Path, text: str) -> None:
     Raises:
         OSError: The file cannot be written; `path` is unchanged.
     """
-    with replace_atomically(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+    with replace_atomically(path) as temporary_path, temporary_path.open("w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())

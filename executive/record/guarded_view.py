@@ -1,4 +1,4 @@
-"""Wrapper of a view that keeps errors of the view from the run."""
+"""Wrapper of a view that protects the run from errors of the view."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class GuardedView:
     """Forwards all calls to a view until its first error, and then closes the view; implements `View`.
 
     Args:
-        view: The view.
+        view: The wrapped view.
 
     Attributes:
         problem: Message about the first error of the view, or "".
@@ -44,6 +44,7 @@ class GuardedView:
         self._forward(lambda: self._view.show_message(message))
 
     def _forward(self, call: Callable[[], None]) -> None:
+        """Call the view; after its first error, close the view and ignore all later calls."""
         if self.problem:
             return
         try:

@@ -20,16 +20,14 @@ LOCK_LIST = Path("/proc/locks")
 
 
 class Journal:
-    """Observer that appends each event to a file, which is locked for other processes.
+    """Observer that appends the recorded events to a file, which it locks for other processes.
 
-    Commands to the tool, placements of items and the end of the run are synced to the disk before the run
-    continues. Therefore the journal shows after a power cut which item the tool may hold, and which items are
-    in a bin.
+    The journal syncs each command to the tool, each placement of an item, and the end of the run to the disk.
+    After a power cut, it therefore shows which item the tool may hold, and which items are in a bin.
 
     Args:
-        path: The file.
-        resume: True to remove an incomplete last line of an existing journal and append to the journal; False
-            to create a journal.
+        path: The journal file.
+        resume: True to append to an existing journal, without its incomplete last line; False to create one.
 
     Raises:
         InputError: Another process writes the file, the file of a new journal is not empty, or the file
@@ -41,19 +39,19 @@ class Journal:
         self._has_failed = False
         self._is_synced = True
         with explain_os_errors(InputError, f'cannot open the journal "{path}"'):
-            file = os.open(path, os.O_RDWR | os.O_APPEND | (0 if resume else os.O_CREAT), 0o644)
+            fd = os.open(path, os.O_RDWR | os.O_APPEND | (0 if resume else os.O_CREAT), 0o644)
             try:
-                _lock(file, path)
-                if not resume and os.fstat(file).st_size:
+                _lock(fd, path)
+                if not resume and os.fstat(fd).st_size:
                     raise InputError(
                         f'"{path}" is the journal of another run; a new run needs its own directory: name '
                         "another folder with --runs DIR"
                     )
-                self._length = _repair_end(file) if resume else 0
+                self._file_size = _repair_end(fd) if resume else 0
             except BaseException:
-                os.close(file)
+                os.close(fd)
                 raise
-        self._file: int | None = file
+        self._fd: int | None = fd
 
     def __call__(self, timed: TimedEvent) -> None:
         """Append an event if its kind is recorded.
@@ -63,21 +61,21 @@ class Journal:
                 Later events are ignored without an exception, so that the run can brake the arm.
             Fault: JSON cannot represent the event; only this event is missing in the journal.
         """
-        if self._file is None or self._has_failed or not timed.event.is_recorded:
+        if self._fd is None or self._has_failed or not timed.event.is_recorded:
             return
         line = encode_event(timed)
         try:
-            self._write(self._file, line)
+            self._write(self._fd, line)
             event = timed.event
             is_placement = isinstance(event, ItemChanged) and event.state == "placed"
             if is_placement or isinstance(event, ToolCommanded | RunEnded):
-                self._sync(self._file)
+                self._sync(self._fd)
         except OSError as error:
             self._has_failed = True
-            # Remove an incomplete line, which could not be read.
+            # An incomplete line would make the journal unreadable.
             with contextlib.suppress(OSError):
-                if os.fstat(self._file).st_size > self._length:
-                    os.ftruncate(self._file, self._length)
+                if os.fstat(self._fd).st_size > self._file_size:
+                    os.ftruncate(self._fd, self._file_size)
             raise RecordLost(
                 f'the journal "{self._path}" cannot be written: {describe_os_error(error)}; '
                 "the run stops, because without a journal it could not be explained"
@@ -89,42 +87,42 @@ class Journal:
         Raises:
             Fault: The file may lack its last lines, and no earlier `RecordLost` reported the loss.
         """
-        if self._file is None:
+        if self._fd is None:
             return
-        file, self._file = self._file, None
+        fd, self._fd = self._fd, None
         advice = "check what the tool holds and what is in the bins"
         try:
             with explain_os_errors(Fault, f'the journal "{self._path}" may lack its last lines', advice):
                 if not self._is_synced and not self._has_failed:
-                    self._sync(file)
+                    self._sync(fd)
         finally:
-            # The sync has reported any error of the disk.
+            # `_sync` has already raised an exception if the disk has an error.
             with contextlib.suppress(OSError):
-                os.close(file)
+                os.close(fd)
 
-    def _write(self, file: int, line: bytes) -> None:
+    def _write(self, fd: int, line: bytes) -> None:
         """Write a line without a buffer, so that the file contains all lines if the process crashes."""
         unwritten = line
         while unwritten:
-            # If the disk is nearly full, the system may write a part only.
-            unwritten = unwritten[os.write(file, unwritten) :]
-        self._length += len(line)
+            # If the disk is nearly full, the system may write only a part of the line.
+            unwritten = unwritten[os.write(fd, unwritten) :]
+        self._file_size += len(line)
         self._is_synced = False
 
-    def _sync(self, file: int) -> None:
+    def _sync(self, fd: int) -> None:
         """Sync the file to the disk, and raise an OSError if another program changed the file."""
-        os.fsync(file)
+        os.fsync(fd)
         self._is_synced = True
-        status = os.fstat(file)
+        status = os.fstat(fd)
         # Writing to a deleted file causes no error, but its content is lost when the file is closed.
         if not self._path.exists():
             raise FileNotFoundError(errno.ENOENT, "another program deleted it during the run")
         if not os.path.samestat(status, self._path.stat()):
             raise FileExistsError(errno.EEXIST, "another program replaced it during the run")
-        if status.st_size != self._length:
+        if status.st_size != self._file_size:
             raise OSError(
                 errno.EIO,
-                f"another program changed its length from {self._length} to {status.st_size} bytes during "
+                f"another program changed its length from {self._file_size} to {status.st_size} bytes during "
                 "the run",
             )
 
@@ -146,7 +144,7 @@ def find_run_start(events: Sequence[TimedEvent], path: Path, advice: str) -> Run
     """Return the event of the start of the run in the directory `path`.
 
     Raises:
-        InputError: The journal lacks the start of the run; the message ends with `advice`.
+        InputError: The events lack the start of the run; `advice` is the end of the message.
     """
     for timed in events:
         if isinstance(timed.event, RunStarted):
@@ -155,38 +153,38 @@ def find_run_start(events: Sequence[TimedEvent], path: Path, advice: str) -> Run
 
 
 def find_run_end(events: Sequence[TimedEvent]) -> RunEnded | None:
-    """Return the last event if it is the end of the run, or None if the run was interrupted or is running.
+    """Return the last event if it is the end of the run; None if the run was interrupted or is running.
 
-    In a resumed run, an earlier end does not count.
+    An end before a resumption of the run is not the last event.
     """
-    last = events[-1].event if events else None
-    return last if isinstance(last, RunEnded) else None
+    last_event = events[-1].event if events else None
+    return last_event if isinstance(last_event, RunEnded) else None
 
 
 def _measure_valid_length(content: bytes) -> int:
-    """Return the length of the complete lines of a journal [bytes]; the last one may lack its line feed."""
-    written = content.rstrip(b"\0")
-    last_line_start = written.rfind(b"\n") + 1
+    """Return the length of a journal up to its last complete line [bytes], which may lack a line feed."""
+    content = content.rstrip(b"\0")
+    last_line_start = content.rfind(b"\n") + 1
     try:
-        from_json(written[last_line_start:])
+        from_json(content[last_line_start:])
     except ValueError:
         return last_line_start
-    return len(written)
+    return len(content)
 
 
-def _repair_end(file: int) -> int:
+def _repair_end(fd: int) -> int:
     """Remove an incomplete last line of a journal, add a missing line feed, and return the length [bytes]."""
-    with open(file, "rb", closefd=False) as journal:
+    with open(fd, "rb", closefd=False) as journal:
         content = journal.read()
     length = _measure_valid_length(content)
-    os.ftruncate(file, length)
+    os.ftruncate(fd, length)
     if length and content[length - 1 : length] != b"\n":
-        length += os.write(file, b"\n")
-    os.fsync(file)
+        length += os.write(fd, b"\n")
+    os.fsync(fd)
     return length
 
 
-def _lock(file: int, path: Path) -> None:
+def _lock(fd: int, path: Path) -> None:
     """Lock the open journal for this process until the file is closed.
 
     Raises:
@@ -194,24 +192,24 @@ def _lock(file: int, path: Path) -> None:
         OSError: The file system does not support locks.
     """
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
-        holder = _find_lock_holder(file)
-        writer, stop = (f"process {holder}", f'"kill {holder}"') if holder else ("another process", "Ctrl-C")
+        pid = _find_lock_holder(fd)
+        writer, command = (f"process {pid}", f'"kill {pid}"') if pid else ("another process", "Ctrl-C")
         raise InputError(
             f'the run directory "{path.parent}" is in use: {writer} writes its journal, and two runs cannot '
-            f"share it; wait until that run has ended, or stop it with {stop}"
+            f"share it; wait until that run has ended, or stop it with {command}"
         ) from error
 
 
-def _find_lock_holder(file: int) -> int | None:
-    """Return the id of the process that holds the lock on `file`, or None if the id is unknown."""
-    status = os.fstat(file)
+def _find_lock_holder(fd: int) -> int | None:
+    """Return the id of the process that has locked the file, or None if the id is unknown."""
+    status = os.fstat(fd)
     file_id = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}:{status.st_ino}"
     with contextlib.suppress(OSError):
         for line in LOCK_LIST.read_text().splitlines():
-            # 1: FLOCK  ADVISORY  WRITE 4711 fe:00:5309462 0 EOF
-            fields = line.split()
-            if fields[1:2] == ["FLOCK"] and fields[5] == file_id and int(fields[4]) > 0:
-                return int(fields[4])
+            # A line is `1: FLOCK  ADVISORY  WRITE 4711 fe:00:5309462 0 EOF`, with process id and file id.
+            match line.split():
+                case [_, "FLOCK", _, _, pid, locked_file, *_] if locked_file == file_id and int(pid) > 0:
+                    return int(pid)
     return None

@@ -14,7 +14,7 @@ from executive.events import JOURNAL_FORMAT, Event, InputRead, RunStarted, Timed
 from executive.replay.recorded_cell import check_input
 
 MAX_TICK = 10**9
-"""Maximum number of control steps of a run: 48 days in simulation."""
+"""Maximum number of control steps of a run; 48 days at 240 control steps per second."""
 CLOCK_TOLERANCE = 1e-5
 """Maximum difference between the clock of an event and the time of its control step [s]."""
 
@@ -25,10 +25,11 @@ EVENT_CLASSES: Mapping[str, type[Event]] = {
 }
 """Classes of the recorded events by kind, which is the name of the class."""
 
-_TIME_KEYS = ("kind", "tick", "clock")
+_COMMON_KEYS = ("kind", "tick", "clock")
+"""Keys in the lines of all events: kind of the event, control step, and time [s]."""
 
 _KEYS_BY_KIND: Mapping[str, KeysView[str]] = {
-    kind: dict.fromkeys([*_TIME_KEYS, *(field.name for field in fields(cls))]).keys()
+    kind: dict.fromkeys([*_COMMON_KEYS, *(field.name for field in fields(cls))]).keys()
     for kind, cls in EVENT_CLASSES.items()
 }
 """Keys in the line of an event, by the kind of the event."""
@@ -39,26 +40,26 @@ _ADAPTER_BY_KIND: Mapping[str, TypeAdapter[Event]] = {k: TypeAdapter(cls) for k,
 def make_journal_schema() -> dict[str, JsonValue]:
     """Return the JSON Schema of one line of a journal."""
     definitions: dict[str, JsonValue] = {}
-    for name, adapter in _ADAPTER_BY_KIND.items():
+    for kind, adapter in _ADAPTER_BY_KIND.items():
         schema = adapter.json_schema(ref_template="#/definitions/{model}")
         definitions |= schema.pop("$defs", {})
-        time = {
-            "kind": {"const": name},
+        common_properties = {
+            "kind": {"const": kind},
             "tick": {"type": "integer", "minimum": 0, "maximum": MAX_TICK},
             "clock": {"type": "number", "minimum": 0},
         }
-        schema["properties"] = time | schema.get("properties", {})
-        definitions[name] = schema | {"required": list(_KEYS_BY_KIND[name]), "additionalProperties": False}
+        schema["properties"] = common_properties | schema.get("properties", {})
+        definitions[kind] = schema | {"required": list(_KEYS_BY_KIND[kind]), "additionalProperties": False}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": f"An event of a journal, format {JOURNAL_FORMAT}",
-        "oneOf": [{"$ref": f"#/definitions/{name}"} for name in EVENT_CLASSES],
+        "oneOf": [{"$ref": f"#/definitions/{kind}"} for kind in EVENT_CLASSES],
         "definitions": definitions,
     }
 
 
 def encode_event(timed: TimedEvent) -> bytes:
-    """Return the line of an event with its line feed, in UTF-8.
+    """Return the line of an event in a journal, in UTF-8 with a line feed.
 
     Raises:
         Fault: JSON cannot represent a value of the event.
@@ -66,7 +67,7 @@ def encode_event(timed: TimedEvent) -> bytes:
     kind = type(timed.event).__name__
     entry = {"kind": kind, "tick": timed.tick, "clock": timed.clock, **vars(timed.event)}
     try:
-        # A lone surrogate, from a file name that is not UTF-8, becomes a question mark.
+        # A file name that is not UTF-8 contains lone surrogates, which become question marks.
         return (_ENCODER.encode(entry) + "\n").encode(errors="replace")
     except (TypeError, ValueError, RecursionError) as error:
         raise Fault(f"JSON cannot represent an event of kind {kind}: {error}") from error
@@ -81,7 +82,7 @@ def decode_event(line: bytes) -> TimedEvent:
     entry = from_json(line, allow_inf_nan=False)
     if not isinstance(entry, dict):
         raise ValueError("it contains no JSON object")
-    kind, tick, clock = (entry.get(key) for key in _TIME_KEYS)
+    kind, tick, clock = (entry.get(key) for key in _COMMON_KEYS)
     if not isinstance(kind, str) or kind not in _ADAPTER_BY_KIND:
         raise ValueError(f'"kind" is {kind!r}; allowed are {", ".join(EVENT_CLASSES)}')
     if isinstance(tick, bool) or not isinstance(tick, int) or not 0 <= tick <= MAX_TICK:
@@ -89,52 +90,54 @@ def decode_event(line: bytes) -> TimedEvent:
     if isinstance(clock, bool) or not isinstance(clock, int | float) or clock < 0:
         raise ValueError(f'"clock" is {clock!r}, not a time in seconds')
     keys = _KEYS_BY_KIND[kind]
-    if differing := entry.keys() ^ keys:
-        problem = "has no" if differing <= keys else "has the unknown"
-        raise ValueError(f'{kind} {problem} key "{min(differing)}"; its keys are {", ".join(keys)}')
+    # The symmetric difference contains the missing keys and the unknown keys.
+    if wrong_keys := entry.keys() ^ keys:
+        problem = "has no" if wrong_keys <= keys else "has the unknown"
+        raise ValueError(f'{kind} {problem} key "{min(wrong_keys)}"; its keys are {", ".join(keys)}')
     try:
         event = _ADAPTER_BY_KIND[kind].validate_json(line)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        raise ValueError(f'"{place}" of {kind}: {first["msg"][:1].lower()}{first["msg"][1:]}') from error
+        details = error.errors(include_url=False)[0]
+        field, message = ".".join(map(str, details["loc"])), details["msg"]
+        raise ValueError(f'"{field}" of {kind}: {message[:1].lower()}{message[1:]}') from error
     return TimedEvent(tick, float(clock), event)
 
 
-def decode_events(lines: Iterable[bytes], name: str) -> list[TimedEvent]:
-    """Return the events of the lines of a journal.
+def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
+    """Return the events in the lines of a journal.
 
     Raises:
         InputError: A line contains no event, or the time of an event contradicts its control step; the
-            message begins with `name` and the number of the line.
+            message begins with `file_name` and the number of the line.
     """
     events: list[TimedEvent] = []
-    period = clock_offset = 0.0
+    control_period = clock_offset = 0.0
     for number, line in enumerate(lines, start=1):
         try:
             timed = decode_event(line)
             event = timed.event
             if isinstance(event, RunStarted):
-                period = event.step
-            if period and abs(timed.clock - timed.tick * period - clock_offset) > CLOCK_TOLERANCE:
+                control_period = event.step
+            step_time = timed.tick * control_period + clock_offset
+            if control_period and abs(timed.clock - step_time) > CLOCK_TOLERANCE:
                 raise ValueError(f'"tick" {timed.tick} and "clock" {timed.clock} contradict each other')
             if isinstance(event, InputRead) and event.name == "clock" and not event.exception:
-                clock_offset = _read_clock_offset(event.value)
+                clock_offset = _check_clock_offset(event.value)
             elif isinstance(event, InputRead) and not event.exception:
                 check_input(event.name, event.value)
         except ValueError as error:
             if number == 1 and (message := _describe_old_format(line)):
-                raise InputError(f"{name}: {message}") from error
+                raise InputError(f"{file_name}: {message}") from error
             raise InputError(
-                f"{name}:{number}: this line is no event ({error}); the file was changed or damaged after "
-                "the run, because a run only appends to its journal; restore a copy of the file"
+                f"{file_name}:{number}: this line is no event ({error}); the file was changed or damaged "
+                "after the run, because a run only appends to its journal; restore a copy of the file"
             ) from error
         events.append(timed)
     return events
 
 
-def _read_clock_offset(value: JsonValue) -> float:
-    """Return the value of the input `clock`: time of the cell's clock minus time of all control steps [s].
+def _check_clock_offset(value: JsonValue) -> float:
+    """Return the recorded difference between the cell's clock and the time of all control steps [s].
 
     Raises:
         ValueError: The value is not a number.
@@ -145,7 +148,7 @@ def _read_clock_offset(value: JsonValue) -> float:
 
 
 def _describe_old_format(line: bytes) -> str:
-    """Return a message if the first line of a journal has format 1, which contains no version, else ""."""
+    """Return a message if the first line of a journal is the start of a run in format 1, else ""."""
     try:
         entry = from_json(line)
     except ValueError:
@@ -160,12 +163,8 @@ def _describe_old_format(line: bytes) -> str:
     )
 
 
-def _as_json(value: object) -> object:
-    """Convert a value to a type that the JSON encoder supports.
-
-    Raises:
-        TypeError: JSON has no equivalent of the value.
-    """
+def _to_json_type(value: object) -> object:
+    """Convert a value to a type that the JSON encoder supports, or raise a TypeError."""
     if isinstance(value, Mapping):
         return dict(value)
     if is_dataclass(value):
@@ -173,4 +172,5 @@ def _as_json(value: object) -> object:
     raise TypeError(f"JSON has no equivalent of a {type(value).__name__}")
 
 
-_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False, default=_as_json)
+_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False, default=_to_json_type)
+"""Encoder of events, which are dataclasses with mappings."""

@@ -22,7 +22,8 @@ MAX_STORED_LOOKS = 24
 MAX_PICTURES = 200
 """Maximum number of pictures of a run, so that a long run does not fill the disk."""
 
-_UNPLACED_STATES = ("held", "dropped", "rejected", "skipped", "lost")
+_LISTED_STATES = ("held", "dropped", "rejected", "skipped", "lost")
+"""States of items, except `placed`, that a picture lists."""
 
 
 class PictureRecorder:
@@ -41,10 +42,10 @@ class PictureRecorder:
         self._timeline = Timeline(keeps_history=False)
         self._last_frame: Frame | None = None
         self._looks: dict[int, tuple[Frame, FrameSearched]] = {}
-        self._selected_frame: int | None = None
-        self._unshown_frame: int | None = None
+        self._selected_frame_id: int | None = None
+        self._undrawn_frame_id: int | None = None
         self._picture_count = 0
-        self._missing_counts: Counter[str] = Counter()
+        self._missing_picture_counts: Counter[str] = Counter()
 
     def __call__(self, timed: TimedEvent) -> None:
         """Store a look, or draw a picture after a selection or a failure."""
@@ -55,7 +56,7 @@ class PictureRecorder:
         elif isinstance(event, FrameSearched):
             self._add_look(event)
         elif isinstance(event, TargetSelected):
-            self._selected_frame = event.frame
+            self._selected_frame_id = event.frame
             self._draw(timed, event.frame, event, None)
         elif isinstance(event, NodeEnded) and event.skill and event.status == "FAILURE":
             self._draw_failure(timed, event)
@@ -69,51 +70,53 @@ class PictureRecorder:
     @property
     def problem(self) -> str:
         """Message about missing pictures, or ""."""
-        missing = ", ".join(f"{count} {reason}" for reason, count in self._missing_counts.items())
+        missing = ", ".join(f"{count} {reason}" for reason, count in self._missing_picture_counts.items())
         return self._drawer.problem or (f"missing pictures: {missing}" if missing else "")
 
     def _add_look(self, look: FrameSearched) -> None:
+        """Store a look with its frame, and remove the oldest look if the store is full."""
         if self._last_frame is None or self._last_frame.id != look.frame:
             return
         self._looks[look.frame] = self._last_frame, look
-        self._unshown_frame = look.frame
+        self._undrawn_frame_id = look.frame
         if len(self._looks) > MAX_STORED_LOOKS:
-            # The look of the last selection is kept, because it is drawn again if the attempt fails.
-            del self._looks[next(frame for frame in self._looks if frame != self._selected_frame)]
+            # The look of the last selection is kept, because it is drawn again if the item is missed.
+            del self._looks[next(frame_id for frame_id in self._looks if frame_id != self._selected_frame_id)]
 
     def _draw_failure(self, timed: TimedEvent, failure: NodeEnded) -> None:
+        """Draw the selection of the item of a failed skill, or else the last look if it was not yet drawn."""
         selection = self._timeline.targets.get(failure.item)
         if selection is not None:
             self._draw(timed, selection.frame, selection, failure)
-        elif self._unshown_frame is not None:
-            self._draw(timed, self._unshown_frame, None, failure)
+        elif self._undrawn_frame_id is not None:
+            self._draw(timed, self._undrawn_frame_id, None, failure)
 
     def _draw(
-        self, timed: TimedEvent, frame: int, selection: TargetSelected | None, failure: NodeEnded | None
+        self, timed: TimedEvent, frame_id: int, selection: TargetSelected | None, failure: NodeEnded | None
     ) -> None:
         """Queue the picture of a frame with the target that was selected in it, and with a failure."""
-        if frame == self._unshown_frame:
-            self._unshown_frame = None
-        look = self._looks.get(frame)
+        if frame_id == self._undrawn_frame_id:
+            self._undrawn_frame_id = None
+        look = self._looks.get(frame_id)
         if look is None:
-            self._missing_counts[f"of looks before the last {MAX_STORED_LOOKS}"] += 1
+            self._missing_picture_counts[f"of looks before the last {MAX_STORED_LOOKS}"] += 1
         elif self._picture_count == MAX_PICTURES:
-            self._missing_counts[f"after the first {MAX_PICTURES}"] += 1
+            self._missing_picture_counts[f"after the first {MAX_PICTURES}"] += 1
         elif not self._drawer.queue(
-            _make_file_name(timed, selection, failure), self._make_scene(timed, look, selection, failure)
+            _make_file_name(timed, selection, failure), self._make_content(timed, look, selection, failure)
         ):
-            self._missing_counts["because of a full queue"] += 1
+            self._missing_picture_counts["because of a full queue"] += 1
         else:
             self._picture_count += 1
 
-    def _make_scene(
+    def _make_content(
         self,
         timed: TimedEvent,
         look: tuple[Frame, FrameSearched],
         selection: TargetSelected | None,
         failure: NodeEnded | None,
     ) -> PictureContent:
-        frame, searched = look
+        frame, search = look
         timeline = self._timeline
         item = selection.item if selection else ""
         history = timeline.items.by_name.get(item)
@@ -121,12 +124,12 @@ class PictureRecorder:
         return PictureContent(
             image=frame.image,
             visible=frame.visible,
-            detections=[_to_detection(found) for found in searched.confident],
-            selected=_find_selected(selection, searched.confident, position),
+            detections=[_to_detection(detected) for detected in search.confident],
+            selected=_find_selected_index(selection, search.confident, position),
             mission=timeline.started.mission if timeline.started else "",
             clock=timed.clock,
             camera=frame.camera,
-            detector=searched.detector,
+            detector=search.detector,
             age=timed.clock - frame.stamp,
             phase=" + ".join(
                 to_skill_name(last.node) for last in timeline.find_running_activations() if last.skill
@@ -144,26 +147,26 @@ class PictureRecorder:
 def _group_items(timeline: Timeline) -> dict[str, list[str]]:
     """Return the placed items by bin, then other items by state, in the order of their last state changes."""
     placed: dict[str, list[str]] = defaultdict(list)
-    others: dict[str, list[str]] = defaultdict(list)
+    unplaced: dict[str, list[str]] = defaultdict(list)
     for item in sorted(timeline.items.by_name.values(), key=lambda item: item.last_change_number):
         state = item.last_change.state
         if state == "placed":
             placed[item.last_change.bin].append(item.last_change.item)
-        elif state in _UNPLACED_STATES:
-            others["in the tool" if state == "held" else state].append(item.last_change.item)
-    return placed | others
+        elif state in _LISTED_STATES:
+            unplaced["in the tool" if state == "held" else state].append(item.last_change.item)
+    return placed | unplaced
 
 
 def find_picture(folder: Path, item: str, reason: str) -> Path | None:
-    """Return the last picture of a failure or a selection in `folder`, or None if it is missing.
+    """Return the file of the last picture of a failure or a selection, or None without such a picture.
 
     Args:
         folder: Folder of the pictures.
         item: Item of the failed attempt; "" for a failure without an item.
         reason: Reason of the failure; "" for the last selection of the item.
     """
-    subject = "_".join(filter(None, (item, reason)))
-    pictures = [file for file in folder.glob("*.jpg") if file.stem.partition("_")[2] == subject]
+    name_after_tick = "_".join(filter(None, (item, reason)))
+    pictures = [file for file in folder.glob("*.jpg") if file.stem.partition("_")[2] == name_after_tick]
     return max(pictures, key=lambda file: int(file.stem.partition("_")[0]), default=None)
 
 
@@ -173,22 +176,22 @@ def _make_file_name(timed: TimedEvent, selection: TargetSelected | None, failure
     return "_".join(filter(None, parts)) + ".jpg"
 
 
-def _find_selected(
-    selection: TargetSelected | None, found: Sequence[DetectedObject], position: Sequence[float] | None
+def _find_selected_index(
+    selection: TargetSelected | None, detected: Sequence[DetectedObject], position: Sequence[float] | None
 ) -> int | None:
     """Return the index of the detection of the selected item, or None if the index is unknown.
 
-    This detection is the nearest to the position of the item. Its label may differ from the class of the
-    item, which the ledger derives from all looks.
+    The detection that is nearest to the position of the item is returned, whatever its label: the ledger
+    derives the class of an item from all looks.
     """
     if selection is None:
         return None
-    if position is not None and found:
-        return min(range(len(found)), key=lambda index: math.dist(found[index].position, position))
-    candidates = [index for index, detected in enumerate(found) if detected.label == selection.label]
-    return candidates[0] if len(candidates) == 1 else None
+    if position is not None and detected:
+        return min(range(len(detected)), key=lambda index: math.dist(detected[index].position, position))
+    indices = [index for index, each in enumerate(detected) if each.label == selection.label]
+    return indices[0] if len(indices) == 1 else None
 
 
-def _to_detection(found: DetectedObject) -> Detection:
-    left, top, right, bottom = found.box
-    return Detection(found.label, found.confidence, (left, top, right, bottom))
+def _to_detection(detected: DetectedObject) -> Detection:
+    left, top, right, bottom = detected.box
+    return Detection(detected.label, detected.confidence, (left, top, right, bottom))

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
 
 _NODES_ADAPTER = TypeAdapter(list[OutlineNode])
+"""Decoder of `tree.json`."""
 
 
 def read_mission_of_run(
@@ -40,9 +41,10 @@ def read_mission_of_run(
     """
     from executive.mission.load import load_mission
 
+    # The recorded cell file already contains the overrides of the cell.
     overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
-    given_cell = RecordedCell(read_cell(path), Path(start.base) / "cell.yaml")
-    return load_mission(mission or path / "mission.yaml", skills, overrides, cell=given_cell)
+    recorded_cell = RecordedCell(read_cell(path), Path(start.base) / "cell.yaml")
+    return load_mission(mission or path / "mission.yaml", skills, overrides, cell=recorded_cell)
 
 
 def read_cell(path: Path) -> CellConfig:
@@ -58,7 +60,7 @@ def read_cell(path: Path) -> CellConfig:
 
 
 def format_tree(nodes: Sequence[OutlineNode]) -> str:
-    """Return the outline of a tree as JSON; values that JSON cannot represent become strings."""
+    """Return the text of `tree.json`; values that JSON cannot represent become strings."""
     return to_json(list(nodes), inf_nan_mode="strings", fallback=str, indent=1).decode() + "\n"
 
 
@@ -68,8 +70,8 @@ def read_tree(path: Path) -> list[OutlineNode]:
     Raises:
         InputError: The file cannot be read or contains no outline.
     """
-    hint = "since version 0.1 every run writes this file beside its journal"
-    with explain_os_errors(InputError, f'cannot read the tree "{path}"', hint):
+    advice = "since version 0.1 every run writes this file beside its journal"
+    with explain_os_errors(InputError, f'cannot read the tree "{path}"', advice):
         content = path.read_bytes()
     try:
         return _NODES_ADAPTER.validate_json(content)

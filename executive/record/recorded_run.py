@@ -58,12 +58,12 @@ class RecordOptions:
 
     Attributes:
         views: Views of the run.
-        paused: True to pause the run before its first control step.
-        saves_pictures: True to save pictures, and to keep the log of the world after the end of the run.
+        starts_paused: True to pause the run before its first control step.
+        saves_pictures: True to save pictures, and to keep the log of the simulated world for a film.
     """
 
     views: Sequence[View] = ()
-    paused: bool = False
+    starts_paused: bool = False
     saves_pictures: bool = True
 
 
@@ -92,27 +92,29 @@ def record_run(
     start_time = time.perf_counter()
     run = assemble(loaded, skills, options)
     with closing(run):
-        if record.paused:
+        if record.starts_paused:
             run.control.pause()
         directory = make_run_directory(run, loaded, options, runs_folder)
         recorder = Recorder(directory, saves_pictures=record.saves_pictures)
-        recording = RecordedRun(run, loaded, skills, directory, recorder, record.views)
-        result = recording.execute(options.seed, start_time)
+        recorded_run = RecordedRun(run, loaded, skills, directory, recorder, record.views)
+        result = recorded_run.execute(options.seed, start_time)
     if not record.saves_pictures and result.status in FINAL_STATUSES:
-        # The log of the world is needed only for a resumption and for a film.
+        # Only a resumption and a film need the log of the simulated world.
         directory.world_log.unlink(missing_ok=True)
     return result
 
 
-def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, runs: Path) -> RunDirectory:
-    """Make the directory of a run below `runs`, with its mission, cell and scene; return the directory.
+def make_run_directory(
+    run: Run, loaded: LoadedMission, options: RunOptions, runs_folder: Path
+) -> RunDirectory:
+    """Make and return the directory of a run below `runs_folder`, with the mission, the cell and the scene.
 
     Raises:
         InputError: The directory cannot be made, or a file cannot be written.
     """
     scene = "" if options.scene is None else read_source(options.scene).text
     directory = RunDirectory.create(
-        runs, mission=loaded.mission.name, seed=options.seed, start_time=datetime.now()
+        runs_folder, mission=loaded.mission.name, seed=options.seed, start_time=datetime.now()
     )
     directory.save_inputs(
         mission=loaded.text,
@@ -156,7 +158,7 @@ class RecordedRun:
     def execute(self, seed: int, start_time: float) -> Result:
         """Execute the run, write its result into the run directory, and return the result.
 
-        `start_time` is the time of `time.perf_counter` at which the assembly of the run began [s].
+        `start_time` is the value of `time.perf_counter()` before the assembly of the run [s].
 
         Raises:
             ExecutiveError: The result cannot be written.
@@ -169,7 +171,7 @@ class RecordedRun:
         except ExecutiveError as error:
             problems.append(str(error))
             if result.status != "FAULT":
-                # Without the file, only the output of `--json` contains the result.
+                # The output of `--json`, which then is the only result, must report the problem.
                 result = replace(result, status="FAULT", reason="fault", message=str(error), node="")
         if any(problems):
             for view in self.views:
@@ -208,8 +210,8 @@ class RecordedRun:
         )
 
     def _execute_with_observers(self) -> tuple[RunEnded, Mapping[str, int] | None]:
-        """Execute the run with all observers, close the observers, and return the end and the true counts."""
-        run, completed = self.run, False
+        """Execute the run with all observers, and close them; return its end and the audit."""
+        run, has_completed = self.run, False
         observers: list[Observer] = [self._timeline, *self.views]
         try:
             for view in self.views:
@@ -222,12 +224,12 @@ class RecordedRun:
                 for observer in observers:
                     observer(timed)
             run.add_recorder(self.recorder)
-            outcome = run.execute(), run.count_ground_truth()
-            completed = True
+            end_and_audit = run.execute(), run.count_ground_truth()
+            has_completed = True
         finally:
             with contextlib.ExitStack() as closing:
-                # After an exception, do not wait for the pictures.
-                closing.callback(self.recorder.close, wait=completed)
+                # An exception is reported at once, without waiting for the pictures.
+                closing.callback(self.recorder.close, wait=has_completed)
                 for view in self.views:
                     closing.callback(view.close)
-        return outcome
+        return end_and_audit

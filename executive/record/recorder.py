@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from executive.errors import Fault
 from executive.events import TimedEvent
@@ -19,27 +19,19 @@ class Recorder:
         directory: The run directory.
         saves_pictures: True to save pictures.
         resume: True to append to the journal of an interrupted run.
-        journal: Class of the journal.
 
     Raises:
         InputError: The journal cannot be opened.
     """
 
-    def __init__(
-        self,
-        directory: RunDirectory,
-        *,
-        saves_pictures: bool = True,
-        resume: bool = False,
-        journal: Callable[..., Journal] = Journal,
-    ) -> None:
+    def __init__(self, directory: RunDirectory, *, saves_pictures: bool = True, resume: bool = False) -> None:
         self._trace = Trace()
-        self._journal = journal(directory.journal, resume=resume)
+        self._journal = Journal(directory.journal, resume=resume)
         self._pictures = PictureRecorder(directory.pictures) if saves_pictures else None
         self._problem = ""
 
     def __call__(self, timed: TimedEvent) -> None:
-        """Record an event, in the trace first, because the trace cannot raise an exception."""
+        """Record an event; first in the trace, which must be complete if the journal raises an exception."""
         self._trace(timed)
         self._journal(timed)
         if self._pictures is not None:
@@ -55,9 +47,9 @@ class Recorder:
             self._trace(timed)
 
     def close(self, *, wait: bool = True) -> None:
-        """Sync the journal to the disk and, if `wait` is True, draw all queued pictures; may be called again.
+        """Sync the journal to the disk and, if `wait` is True, draw all queued pictures.
 
-        Afterwards `problem` describes the missing parts of the record.
+        Afterwards `problem` describes the missing parts of the record. Further calls have no effect.
         """
         try:
             self._journal.close()
@@ -74,5 +66,5 @@ class Recorder:
     @property
     def problem(self) -> str:
         """Message about the missing parts of the record, or ""."""
-        pictures = "" if self._pictures is None else self._pictures.problem
-        return "; ".join(filter(None, (self._problem, pictures)))
+        picture_problem = "" if self._pictures is None else self._pictures.problem
+        return "; ".join(filter(None, (self._problem, picture_problem)))

@@ -35,8 +35,8 @@ class ReplayResult:
     Attributes:
         decisions: Number of equal decisions.
         ticks: Number of control steps of the replay.
-        recorded: First recorded decision that the replay did not repeat, without its message, or None.
-        replayed: First decision of the replay that differs from the record, or None.
+        recorded: First recorded decision that the replay did not repeat, or None; its message is "".
+        replayed: First decision of the replay that differs from the record, or None; its message is "".
         edited: True if the replayed mission differs from the recorded mission.
         unanswered: Message about the input without a recorded value that ended the replay, or "".
         is_complete: True if the replay repeated all recorded control steps.
@@ -66,9 +66,9 @@ class ReplayResult:
         return f"{text}: {self.unanswered}; only a new run can show the consequences of this difference"
 
     def as_json(self) -> dict[str, JsonValue]:
-        """Return the attributes as JSON; a decision has its tick, clock, kind and non-empty fields."""
-        decisions = {"recorded": _as_json(self.recorded), "replayed": _as_json(self.replayed)}
-        return {**vars(self), **decisions}
+        """Return the attributes as JSON; the entry of a decision has its tick, clock, kind and fields."""
+        decisions = {"recorded": _to_json(self.recorded), "replayed": _to_json(self.replayed)}
+        return vars(self) | decisions
 
 
 def replay_run(
@@ -90,14 +90,14 @@ def replay_run(
         InputError: The directory contains no run that can be replayed.
     """
     log = InputLog.from_events(events)
-    run = log.start
-    if run is None or not log.inputs:
+    start = log.start
+    if start is None or not log.inputs:
         raise InputError(
             f'"{path}" contains no run that can be replayed: its journal contains no inputs of a run'
         )
-    loaded = read_mission_of_run(path, run, skills, mission)
+    loaded = read_mission_of_run(path, start, skills, mission)
     edited = mission is not None and loaded.text != (path / "mission.yaml").read_text(encoding="utf-8")
-    return replay_and_compare(loaded, skills, log, run.seed, edited=edited)
+    return replay_and_compare(loaded, skills, log, start.seed, edited=edited)
 
 
 def replay_and_compare(
@@ -125,13 +125,13 @@ class _Comparison:
 
     Attributes:
         equal_count: Number of equal decisions.
-        difference: First recorded decision and first replayed decision that differ; None for
-            a side without a further decision, (None, None) without a difference.
+        difference: First recorded and first replayed decision that differ. Each is None if the record or the
+            replay has no further decision; both are None without a difference.
         missing_input_message: Message about an input without a recorded value before the first difference,
             or "".
-        is_complete: False if the first other decision of the replay is in a recorded control step, or if the
-            replay ended before the last recorded decision.
-        run: Run of the replay, which is stopped at the first difference.
+        is_complete: False if a decision in a recorded control step differs, or if the replay ended before the
+            last recorded decision.
+        run: Run of the replay; the comparison stops it at the first difference.
     """
 
     run: ResumedRun
@@ -140,16 +140,16 @@ class _Comparison:
         self._log = log
         self._edited = edited
         self._recorded = [decision for timed in log.events if (decision := _to_decision(timed, edited))]
-        # The last control step of an interrupted run may be incomplete.
-        self._has_ended = any(isinstance(timed.event, RunEnded) for timed in log.events)
-        self._is_finished = False
+        # Without a recorded end, the last control step may be incomplete, and is then not compared.
+        self._has_recorded_end = any(isinstance(timed.event, RunEnded) for timed in log.events)
+        self._has_found_difference = False
         self.equal_count = 0
         self.difference: tuple[TimedEvent | None, TimedEvent | None] = (None, None)
         self.missing_input_message = ""
         self.is_complete = True
 
     def __call__(self, timed: TimedEvent) -> None:
-        if self._is_finished:
+        if self._has_found_difference:
             return
         decision = _to_decision(timed, self._edited)
         if decision is None:
@@ -158,16 +158,17 @@ class _Comparison:
         if recorded == decision:
             self.equal_count += 1
             return
-        self._is_finished, self.missing_input_message = True, self.run.replayed_cell.missing_input_message
-        # After the last recorded control step, the replay only halts.
+        self._has_found_difference = True
+        self.missing_input_message = self.run.replayed_cell.missing_input_message
+        # In the steps after the record, the replay only halts its skills.
         self.is_complete = decision.tick > self._log.last_tick
-        if self._has_ended or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):
+        if self._has_recorded_end or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):
             self.difference = (recorded, decision)
         self.run.control.stop()
 
     def compare_end(self) -> None:
         """Compare the end of the replay with the end of the record; called after the replay."""
-        if self._is_finished or self.equal_count == len(self._recorded):
+        if self._has_found_difference or self.equal_count == len(self._recorded):
             return
         self.is_complete = False
         next_decision = self._recorded[self.equal_count]
@@ -181,10 +182,10 @@ class _Comparison:
 
 
 def _to_decision(timed: TimedEvent, edited: bool) -> TimedEvent | None:
-    """Return an event without the fields that are not compared, or None if the event is no decision.
+    """Return an event without the fields that are not compared; None for an event that is not compared.
 
-    In an edited mission, control nodes make no decisions. Messages are not compared, because their wording
-    may change.
+    The events of control nodes are not compared if the mission was edited. Messages are never compared,
+    because their wording may change.
     """
     event = timed.event
     match event:
@@ -207,7 +208,8 @@ def _to_decision(timed: TimedEvent, edited: bool) -> TimedEvent | None:
     return replace(timed, event=event)
 
 
-def _as_json(decision: TimedEvent | None) -> dict[str, JsonValue] | None:
+def _to_json(decision: TimedEvent | None) -> dict[str, JsonValue] | None:
+    """Return tick, clock, kind and non-empty fields of a decision; None without a decision."""
     if decision is None:
         return None
     fields = {key: value for key, value in vars(decision.event).items() if value}
@@ -221,7 +223,7 @@ def _describe_decision(decision: TimedEvent | None) -> str:
     if decision is None:
         return "no further decision"
     event = decision.event
-    shown = {key: value for key, value in vars(event).items() if value and key not in ("outputs", "skill")}
-    values = ", ".join(f"{key} {value}" for key, value in shown.items())
+    fields = {key: value for key, value in vars(event).items() if value and key not in ("outputs", "skill")}
+    values = ", ".join(f"{key} {value}" for key, value in fields.items())
     text = f"at {decision.clock:.3f} s (step {decision.tick}) {type(event).__name__}: {values}"
     return shorten_quotations(escape_control_characters(text))

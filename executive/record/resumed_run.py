@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from executive.run.assembly import RunOptions
     from executive.skill import Skill
 
-UNREPEATED_EVENTS = (RunStarted, MotionPlanned, RequestGiven)
-"""Kinds of events that a replay does not repeat."""
+EVENTS_WITHOUT_REPLAY = (RunStarted, MotionPlanned, RequestGiven)
+"""Kinds of events that a replay does not emit."""
 
 
 def resume_run(
@@ -46,7 +46,7 @@ def resume_run(
     Args:
         path: The run directory.
         skills: Installed skills by name.
-        options: Options of the resumed run; seed, requests and scene are those of the interrupted run.
+        options: Options of the resumed run; the interrupted run determines seed, requests and scene.
         record: Options of the record.
 
     Raises:
@@ -63,38 +63,41 @@ def resume_run(
     try:
         events = read_journal(directory.journal)
         log, start = InputLog.from_events(events), find_run_start(events, path, "run the mission again")
-        has_ended, seed = _has_ended(directory, events), start.seed
+        lacks_only_result = _check_end(directory, events)
         loaded = read_mission_of_run(path, start, skills)
-        # The control step of a halt or fault is not compared, so that a corrected skill can repeat the step.
-        comparable = log if log.halt is None else log.select_before(log.halt.tick)
-        replay = replay_and_compare(loaded, skills, comparable, seed)
+        # The step of a halt or fault is not compared, so that a corrected skill can execute it differently.
+        compared_log = log if log.halt is None else log.select_before(log.halt.tick)
+        replay = replay_and_compare(loaded, skills, compared_log, start.seed)
         if not replay.is_equal:
             raise InputError(
                 f'the run in "{path}" cannot be resumed: {replay.difference}. The executive or a '
                 "skill has changed since the run; install the earlier version, or run the mission again"
             )
-        options = replace(options, seed=seed, requests=start.requests, scene=directory.scene)
+        options = replace(options, seed=start.seed, requests=start.requests, scene=directory.scene)
         run = assemble_resumed(
             loaded, skills, options, log, directory.world_log,
-            is_complete=replay.is_complete, has_ended=has_ended,
+            is_complete=replay.is_complete, has_ended=lacks_only_result,
         )  # fmt: skip
     except BaseException:
         recorder.close(wait=False)
         raise
     with closing(run):
-        if record.paused:
+        if record.starts_paused:
             run.control.pause()
-        replayed = run.replayed_cell.log
-        recorder.add_to_trace(replayed.events)
-        earlier = [timed for timed in replayed.events if isinstance(timed.event, UNREPEATED_EVENTS)]
-        recording = RecordedRun(
-            run, loaded, skills, directory, recorder, record.views, earlier, _describe_gap(run.replayed_cell)
+        replayed_events = run.replayed_cell.log.events
+        recorder.add_to_trace(replayed_events)
+        earlier_events = [
+            timed for timed in replayed_events if isinstance(timed.event, EVENTS_WITHOUT_REPLAY)
+        ]
+        message = _describe_missing_commands(run.replayed_cell)
+        recorded_run = RecordedRun(
+            run, loaded, skills, directory, recorder, record.views, earlier_events, message
         )
-        return recording.execute(seed, start_time)
+        return recorded_run.execute(start.seed, start_time)
 
 
-def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
-    """Return True if a run ended as SUCCESS or FAILURE without a result file.
+def _check_end(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
+    """Check the end of a run; return True if it ended as SUCCESS or FAILURE and lacks only its result file.
 
     Raises:
         InputError: The end of the run prevents a resumption.
@@ -112,13 +115,14 @@ def _has_ended(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
     return end.status in FINAL_STATUSES
 
 
-def _describe_gap(replayed: ReplayedCell) -> str:
+def _describe_missing_commands(replayed_cell: ReplayedCell) -> str:
     """Return a warning if the journal may lack commands to arm or tool, else ""."""
-    last = replayed.last_interruption
-    if last is None or last.last_action != UNKNOWN_ACTION:
+    interruption = replayed_cell.last_interruption
+    if interruption is None or interruption.last_action != UNKNOWN_ACTION:
         return ""
-    count = last.resume_tick - last.complete_step_count
+    count = interruption.resume_tick - interruption.complete_step_count
+    duration = count * replayed_cell.log.control_period
     return (
-        f"the journal ends {count} control steps ({count * replayed.log.control_period:.2f} s) before the "
+        f"the journal ends {count} control steps ({duration:.2f} s) before the "
         "log of the world and may lack commands to the tool; the scene is observed before the run continues"
     )

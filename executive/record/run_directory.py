@@ -1,4 +1,4 @@
-"""Run directory: its name and files, its creation, and the search for a run directory."""
+"""Run directory: names of its files, creation of the directory, and search for a directory."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ SCENE_FILE = "scene.yaml"
 NO_SPACE_ERRORS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 """Values of `errno` for a full disk, an exceeded quota and a too large file."""
 _OTHER_FOLDER_ADVICE = "name another folder with --runs DIR"
+"""Advice if the folder of the runs cannot be used."""
 
 
 class RunDirectory:
@@ -65,7 +66,7 @@ class RunDirectory:
         name = f"{start_time.strftime('%H-%M-%S')}_{mission}_s{seed}"
         with convert_os_errors(f'make a run directory below "{runs}"'):
             day.mkdir(parents=True, exist_ok=True)
-            path = _make_unique(day, name)
+            path = _make_unique_folder(day, name)
         return RunDirectory(path)
 
     def save_inputs(
@@ -92,12 +93,12 @@ class RunDirectory:
             InputError: A file cannot be written; each existing file is complete.
         """
         with convert_os_errors(f'write to the run directory "{self.path}"'):
-            # Libraries must not replace files of the record; the other files are written afterwards.
-            for reference, text in (libraries or {}).items():
-                library = self.path / reference
-                if library not in (self.journal, self.result) and self.pictures not in library.parents:
-                    library.parent.mkdir(parents=True, exist_ok=True)
-                    write_atomically(library, text)
+            # A library must not replace a file of the record: mission and cell are therefore written later.
+            for relative_path, text in (libraries or {}).items():
+                path = self.path / relative_path
+                if path not in (self.journal, self.result) and self.pictures not in path.parents:
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    write_atomically(path, text)
             write_atomically(self.path / "mission.yaml", mission)
             for name, content in (("params.yaml", params), ("cell.yaml", cell)):
                 text = yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True)
@@ -117,7 +118,7 @@ def check_runs_folder(runs: Path) -> None:
     """
     with convert_os_errors(f'make a run directory below "{runs}"'):
         runs.mkdir(parents=True, exist_ok=True)
-        # Only an attempt shows whether the file system is read-only.
+        # A read-only file system is detected only when a directory is made.
         with TemporaryDirectory(prefix=".try-", dir=runs):
             pass
 
@@ -152,7 +153,7 @@ def find_run(name: str, runs: Path) -> Path:
     )
 
 
-def _make_unique(day: Path, name: str) -> Path:
+def _make_unique_folder(day: Path, name: str) -> Path:
     """Make and return the folder `day/name`, or the first of `day/name-2`, `-3`, ... that does not exist."""
     number = 1
     while True:

@@ -1,4 +1,4 @@
-"""Trace of a run: a hash of all its decisions, by which runs can be compared."""
+"""Trace of a run: a hash of all its decisions for the comparison of runs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import json
 from executive.events import ItemChanged, NodeEnded, NodeStarted, TargetSelected, TimedEvent
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)
+"""Encoder with a unique text for each value, so that equal decisions have equal hashes."""
 
 
 class Trace:

@@ -247,7 +247,7 @@ def test_a_run_passes_on_everything_it_was_asked_for(project):
     assert project.load == [("sort", {"a": "1", "b": "x=y"})]
     ((options, runs, record),) = project.run
     assert options == RunOptions(7, ("cube", "duck"), is_realtime=True)
-    assert (runs, record.paused, len(record.views)) == (Path("out"), False, 1)
+    assert (runs, record.starts_paused, len(record.views)) == (Path("out"), False, 1)
     assert json.loads(shown.stdout) == to_json(RESULT), "nothing else is on standard output"
     assert "repeat: executive run sort --seed 7" in shown.stderr
     invoke("run", "sort")
