@@ -25,7 +25,7 @@ from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.rfdetr import RfdetrOptions
 from executive.perception.detectors.roboflow.server_options import RoboflowOptions
 from executive.plugins import load_skills
-from executive.tree.keys import KeySection, Kind
+from executive.tree.keys import KeyKind, KeySection
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import load_control_nodes
 
@@ -50,9 +50,9 @@ KINDS = {
     "list": "list", "value": "any value", "values": "names with values", "variables": "names with `$name`",
     "paths": "file, or list of files", "params": "names with params", "routes": "classes with bins",
     "trees": "names with subtrees", "args": "list of names, or names with values", "label": "name",
-    Kind.NODE: "node", Kind.NODES: "list of nodes", Kind.REASONS: "reason, or list of reasons",
-    Kind.VARIABLE: "name of a variable", Kind.ELEMENTS: "list, or `$name`",
-    Kind.SECTION: "section", Kind.SECTIONS: "section, or list of sections",
+    KeyKind.NODE: "node", KeyKind.NODES: "list of nodes", KeyKind.REASONS: "reason, or list of reasons",
+    KeyKind.VARIABLE: "name of a variable", KeyKind.ELEMENTS: "list, or `$name`",
+    KeyKind.SECTION: "section", KeyKind.SECTIONS: "section, or list of sections",
     "float": "number", "int": "whole number", "str": "text", "str | None": "text",
 }  # fmt: skip
 """Kinds of values of the keys of files and control nodes, and types of params, in words."""
@@ -116,7 +116,7 @@ def _key_rows(owner: str, node: type[ControlNode | KeySection], prefix: str = ""
         value = KINDS.get(key.kind) or _value(key.make_validator().json_schema())
         value += f", at most {key.max_count}" if key.max_count else ""
         yield [written, value, _default(key.default), key.doc]
-        if key.kind in (Kind.SECTION, Kind.SECTIONS):
+        if key.kind in (KeyKind.SECTION, KeyKind.SECTIONS):
             yield from _key_rows(name, key.section, f"{name}.")
 
 

@@ -17,11 +17,10 @@ from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.wiring import find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.blackboard import Blackboard
-from executive.tree.node import ControlNode, NodeContext
+from executive.tree.node import NodeContext, TreeNode
 from executive.tree.node_registry import ControlNodes, load_control_nodes
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 
-TreeNode = ControlNode | SkillLeaf
 """Node of the built tree: a py_trees behaviour with a `path` and a `failure`."""
 
 

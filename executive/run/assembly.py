@@ -10,7 +10,7 @@ from executive.cell.protocols import Operator
 from executive.cell.workcell import CellOptions, ResumePoint, Workcell
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.events import Observer, RequestGiven, RunStarted
-from executive.mission.build import TreeNode, build_tree
+from executive.mission.build import build_tree
 from executive.mission.load import LoadedMission
 from executive.plugins import load_cell_kind
 from executive.replay.input_log import InputLog, Interruption
@@ -24,6 +24,7 @@ from executive.run.run_control import RunControl
 from executive.run.versions import list_versions
 from executive.skill import Skill
 from executive.tree.blackboard import Blackboard
+from executive.tree.node import TreeNode
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from py_trees.common import Status
 from executive.cell.protocols import Cell
 from executive.errors import Fault
 from executive.events import Observer, RunEnded, RunResumed
-from executive.mission.build import TreeNode
 from executive.replay.input_log import UNKNOWN_ACTION, Interruption
 from executive.replay.replayed_cell import ReplayedCell
 from executive.run.lookahead_planner import LookaheadPlanner
@@ -21,6 +20,7 @@ from executive.run.run_control import RunControl
 from executive.run.scene_recovery import recover_scene
 from executive.run.versions import list_versions
 from executive.tree.halting import halt
+from executive.tree.node import TreeNode
 from executive.tree.skill_leaf import SkillLeaf
 
 

@@ -12,12 +12,12 @@ from py_trees.common import Status
 from executive.cell.workcell import Workcell
 from executive.errors import ExecutiveError, Fault, Stopped
 from executive.events import FaultRaised, Observer, RunEnded, RunHalted, RunStarted
-from executive.mission.build import TreeNode
 from executive.run.outcome import HALTED, LoopEnd, catch_problems, check_items, finalize_items, to_loop_end
 from executive.run.run_context import RunContext
 from executive.run.run_control import RunControl
 from executive.run.signals import halt_on_signals
 from executive.tree.halting import halt
+from executive.tree.node import TreeNode
 
 
 class Run:

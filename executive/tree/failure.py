@@ -1,4 +1,4 @@
-"""Failures of nodes, and the names by which missions refer to them: `Skill.reason` and `label.reason`."""
+"""Failures of nodes, and reasons of failures as missions write them: `Skill.reason` and `label.reason`."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Reason:
-    """Name by which a mission refers to failures: `Grasp.missed`.
+    """Reason of failures as a mission writes it, with the source: `Grasp.missed`.
 
     Attributes:
         source: Name of a skill, keyword of a control node, or label of a node.
-        reason: Declared cause of a failure of the source.
+        reason: Declared reason of the source, without the source: `missed`.
     """
 
     source: str
@@ -43,13 +43,11 @@ class Failure:
     def __str__(self) -> str:
         return f"{self.source}.{self.reason}"
 
-    def matches(self, names: Iterable[Reason]) -> bool:
-        """Return True if one of the names denotes this failure."""
-        return any(
-            name.reason == self.reason and (name.source == self.source or name.source in self.labels)
-            for name in names
-        )
+    def matches(self, reasons: Iterable[Reason]) -> bool:
+        """Return True if one of `reasons` denotes this failure."""
+        sources = (self.source, *self.labels)
+        return any(reason.reason == self.reason and reason.source in sources for reason in reasons)
 
     def with_label(self, label: str) -> Failure:
-        """Return the failure as passed on by a node with this label; "" for a node without label."""
+        """Return the failure with the label of a node that passed it on; `label` "" adds no label."""
         return replace(self, labels=(*self.labels, label)) if label else self

@@ -14,46 +14,46 @@ from executive.tree.node import ControlNode
 
 
 class Fallback(ControlNode):
-    """Run the children in order until one succeeds; fail with the failure of the last.
+    """Run the children in order until a child succeeds; fail with the failure of the last child.
 
     The node has memory: a child that failed is not run again.
     """
 
     keyword = "fallback"
-    keyword_hints: ClassVar = {"selector": "It is called fallback here."}
+    keyword_hints: ClassVar = {"selector": "Write fallback."}
     symbol, shape = "?", "octagon"
 
     do: Children = key(shorthand=True, doc="Alternatives, in order.")
 
     def start(self) -> None:
         """Begin with the first child."""
-        self._next = 0
+        self._child_index = 0
 
     def step(self) -> Status:
-        """Tick the current child; continue with the next in the same tick."""
+        """Tick the current child; after a failure, tick the next child in the same tick."""
         while True:
-            child = self.do[self._next]
+            child = self.do[self._child_index]
             status = self.run_child(child)
             if status is not Status.FAILURE:
                 return status
             failure = self.get_failure(child)
-            self._next += 1
-            if self._next == len(self.do):
+            self._child_index += 1
+            if self._child_index == len(self.do):
                 return self.fail(failure)
-            self.report_choice(f"choice {self._next + 1} of {len(self.do)}", failure)
+            self.report_choice(f"choice {self._child_index + 1} of {len(self.do)}", failure)
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; each child is entered in the states after a failure of the previous."""
+        """Return the possible ends; each child is entered after a failure of the previous child."""
         success = halted = None
         failures: Mapping[PossibleFailure, FlowState] = {}
         entry: FlowState | None = state
-        for choice in self.do:
+        for child in self.do:
             if entry is None:
                 break
-            flow = flow_of(choice, entry)
+            flow = flow_of(child, entry)
             success, halted = join_states((success, flow.success)), join_states((halted, flow.halted))
             failures = flow.failures
-            entry = join_states(end.after_handling(failure) for failure, end in failures.items())
+            entry = join_states(end.with_handled_failure(failure) for failure, end in failures.items())
         return Flow(success, failures, halted)
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
@@ -61,16 +61,16 @@ class Fallback(ControlNode):
         return min(map(min_time_of, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause: an earlier child cannot fail."""
+        """Return the cause: a child before `child` cannot fail."""
         del child
         return "an earlier child never fails"
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return a text with the failures of all other children."""
-        others = ", ".join(f"{reason} ({message})" for reason, message in failure.last_messages.items())
-        return f"all {len(self.do)} choices failed" + (f"; the others failed with {others}" if others else "")
+        causes = ", ".join(f"{name} ({message})" for name, message in failure.last_messages.items())
+        return f"all {len(self.do)} choices failed" + (f"; the others failed with {causes}" if causes else "")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield all children except the first, each with its number in a text."""
-        for number, choice in enumerate(self.do[1:], 2):
-            yield f"choice {number}", choice
+        """Yield the name `choice 2` with the second child, and so on to the last child."""
+        for number, child in enumerate(self.do[1:], 2):
+            yield f"choice {number}", child

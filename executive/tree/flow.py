@@ -12,24 +12,24 @@ from executive.tree.failure import Reason
 from executive.tree.keys import Child
 
 UNKNOWN_NAME = "*"
-"""Source or reason of a failure of unknown origin."""
+"""Source or reason of a failure whose source or reason is unknown."""
 
 
 @dataclass(frozen=True)
 class PossibleToolState:
-    """A possible state of the tool, and its history.
+    """A possible state of the tool, and the cause of the state.
 
     Attributes:
-        tool: EMPTY or HOLDING.
-        cause: Path of the skill that caused this state; "" for the beginning of the run.
+        state: EMPTY or HOLDING.
+        cause: Path of the skill that caused the state; "" for the beginning of the run.
         handled_failure: Last failure that a control node handled in this state of the tool, or "".
-        is_arm_moved: True if the arm may have moved in this state of the tool.
+        has_arm_moved: True if the arm may have moved in this state of the tool.
     """
 
-    tool: ToolState
+    state: ToolState
     cause: str = ""
     handled_failure: str = ""
-    is_arm_moved: bool = False
+    has_arm_moved: bool = False
 
 
 ToolStates = frozenset[PossibleToolState] | None
@@ -38,59 +38,93 @@ ToolStates = frozenset[PossibleToolState] | None
 
 @dataclass(frozen=True)
 class FlowState:
-    """Facts that hold on every execution path to a point in the tree.
+    """State of a run at a point in the tree, as far as the mission determines it.
 
     Attributes:
-        written: Variables that are certainly written; None if unknown, so that every variable may be read.
-        tools: All possible states of the tool; None if unknown.
+        written_variables: Variables that are written on every execution path to the point; None if unknown,
+            so that every variable may be read.
+        tool_states: All possible states of the tool; None if unknown.
     """
 
-    written: frozenset[str] | None
-    tools: ToolStates
+    written_variables: frozenset[str] | None
+    tool_states: ToolStates
 
     def join(self, other: FlowState) -> FlowState:
-        """Return the facts that hold in both states: the common variables, and all possible tool states."""
+        """Return the state at a point that execution paths through both states reach."""
         if self == other:
             return self
-        written = self.written if other.written is None else other.written
-        if self.written is not None and other.written is not None:
-            written = self.written & other.written
-        are_tools_known = self.tools is not None and other.tools is not None
-        tools = (self.tools or frozenset()) | (other.tools or frozenset()) if are_tools_known else None
-        return FlowState(written, tools)
+        known = [state.written_variables for state in (self, other) if state.written_variables is not None]
+        tool_states = None
+        if self.tool_states is not None and other.tool_states is not None:
+            tool_states = self.tool_states | other.tool_states
+        return FlowState(frozenset.intersection(*known) if known else None, tool_states)
 
     def with_variables(self, names: Iterable[str]) -> FlowState:
-        """Return the state after these variables are written."""
-        return self if self.written is None else replace(self, written=self.written.union(names))
+        """Return the state after variables with these names are written."""
+        written = self.written_variables
+        return self if written is None else replace(self, written_variables=written.union(names))
 
     def without_variable(self, name: str) -> FlowState:
-        """Return the state after a variable is removed."""
-        return self if self.written is None else replace(self, written=self.written - {name})
+        """Return the state after the variable `name` is removed."""
+        written = self.written_variables
+        return self if written is None else replace(self, written_variables=written - {name})
 
-    def with_tools(self, tools: ToolStates) -> FlowState:
+    def with_tool_states(self, tool_states: ToolStates) -> FlowState:
         """Return the state with other possible states of the tool."""
-        return replace(self, tools=tools)
+        return replace(self, tool_states=tool_states)
 
-    def after_handling(self, failure: PossibleFailure) -> FlowState:
+    def with_handled_failure(self, failure: PossibleFailure) -> FlowState:
         """Return the state after a control node handled `failure`, which led to this state."""
-        tools = [replace(possible, handled_failure=str(failure)) for possible in self.tools or ()]
-        return self if self.tools is None else self.with_tools(frozenset(tools))
+        tools = [replace(tool, handled_failure=str(failure)) for tool in self.tool_states or ()]
+        return self if self.tool_states is None else self.with_tool_states(frozenset(tools))
 
-    def after_motion(self) -> FlowState:
+    def with_arm_moved(self) -> FlowState:
         """Return the state after a motion of the arm."""
-        tools = [replace(possible, is_arm_moved=True) for possible in self.tools or ()]
-        return self if self.tools is None else self.with_tools(frozenset(tools))
+        tools = [replace(tool, has_arm_moved=True) for tool in self.tool_states or ()]
+        return self if self.tool_states is None else self.with_tool_states(frozenset(tools))
 
-    def find_tool_state(self, tool: ToolState) -> PossibleToolState | None:
-        """Return a possible state in which the tool is EMPTY or HOLDING as given; None if there is none."""
-        found = [possible for possible in self.tools or () if possible.tool is tool]
-        return min(found, key=lambda possible: (possible.cause, possible.handled_failure)) if found else None
+    def apply_precondition(self, required_state: ToolState, path: str) -> FlowState:
+        """Return the state with the possible states of the tool that fulfil the precondition of a skill.
+
+        `required_state` ANY is no precondition. A precondition that no state fulfils counts as fulfilled, so
+        that later skills cause no further findings.
+        """
+        if required_state is ANY or self.tool_states is None:
+            return self
+        fulfilling = frozenset(tool for tool in self.tool_states if tool.state is required_state)
+        return self.with_tool_states(fulfilling or frozenset({PossibleToolState(required_state, path)}))
+
+    def apply_success(self, declared_state: ToolState, path: str) -> FlowState:
+        """Return the state after success of a skill that declares a state of the tool; ANY: no change."""
+        tools = self.tool_states
+        if declared_state is ANY or (
+            tools is not None and all(tool.state is declared_state for tool in tools)
+        ):
+            return self
+        return self.with_tool_states(frozenset({PossibleToolState(declared_state, path)}))
+
+    def apply_failure(self, declared_state: ToolState | None, path: str) -> FlowState:
+        """Return the state after a failure or halt of a skill that declares a state of the tool for this end.
+
+        `declared_state` None leaves the states of the tool unchanged; ANY adds EMPTY and HOLDING.
+        """
+        if declared_state is None or self.tool_states is None:
+            return self
+        if declared_state is ANY:
+            unknown = {PossibleToolState(state, path) for state in (EMPTY, HOLDING)}
+            return self.with_tool_states(self.tool_states | unknown)
+        return self.with_tool_states(frozenset({PossibleToolState(declared_state, path)}))
+
+    def find_tool_state(self, state: ToolState) -> PossibleToolState | None:
+        """Return a possible state of the tool that is `state` (EMPTY or HOLDING), or None."""
+        matching = (tool for tool in self.tool_states or () if tool.state is state)
+        return min(matching, key=lambda tool: (tool.cause, tool.handled_failure), default=None)
 
 
 INITIAL_STATE = FlowState(frozenset(), frozenset({PossibleToolState(ToolState.EMPTY)}))
 """State at the start of a run: no variables are written, and the tool is empty."""
 
-UNKNOWN = FlowState(None, None)
+UNKNOWN_STATE = FlowState(None, None)
 """State after a part of the tree whose effects are unknown."""
 
 
@@ -110,23 +144,18 @@ class PossibleFailure:
     origin: str
     labels: frozenset[str] = frozenset()
 
-    def may_match(self, names: Iterable[Reason]) -> bool:
-        """Return True if one of the names may denote this failure."""
-        return any(self._matches(name, unknown_matches=True) for name in names)
-
-    def must_match(self, names: Iterable[Reason]) -> bool:
-        """Return True if one of the names certainly denotes this failure."""
-        return any(self._matches(name, unknown_matches=False) for name in names)
-
-    def _matches(self, name: Reason, unknown_matches: bool) -> bool:
-        """Return True if a name denotes this failure.
-
-        With `unknown_matches`, an unknown source or reason of this failure matches every name.
-        """
-        sources = {self.source, *self.labels}
-        return (name.reason == self.reason or (unknown_matches and self.reason == UNKNOWN_NAME)) and (
-            name.source in sources or (unknown_matches and self.source == UNKNOWN_NAME)
+    def may_match(self, reasons: Iterable[Reason]) -> bool:
+        """Return True if one of `reasons` may denote this failure, whose source or reason may be unknown."""
+        return any(
+            self.reason in (reason.reason, UNKNOWN_NAME)
+            and (self.source == UNKNOWN_NAME or reason.source in {self.source, *self.labels})
+            for reason in reasons
         )
+
+    def must_match(self, reasons: Iterable[Reason]) -> bool:
+        """Return True if one of `reasons` certainly denotes this failure."""
+        sources = {self.source, *self.labels}
+        return any(reason.reason == self.reason and reason.source in sources for reason in reasons)
 
     def __str__(self) -> str:
         return f"{self.source}.{self.reason}"
@@ -147,14 +176,20 @@ class Flow:
     halted: FlowState | None
 
     def with_label(self, label: str) -> Flow:
-        """Return the same possible ends of a node with a label; "" for no label."""
+        """Return the flow of a node with a label, whose failures carry the label; "" for no label."""
         if not label:
             return self
         failures: dict[PossibleFailure, FlowState] = {}
         for failure, state in self.failures.items():
-            named = replace(failure, labels=failure.labels | {label})
-            failures[named] = state.join(failures.get(named, state))
+            labelled_failure = replace(failure, labels=failure.labels | {label})
+            failures[labelled_failure] = state.join(failures.get(labelled_failure, state))
         return replace(self, failures=failures)
+
+
+def make_unknown_flow(source: str, path: str) -> Flow:
+    """Return the possible ends of a node whose effects are unknown; `source` fails at the path `path`."""
+    failure = PossibleFailure(source, UNKNOWN_NAME, path)
+    return Flow(UNKNOWN_STATE, {failure: UNKNOWN_STATE}, UNKNOWN_STATE)
 
 
 FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]
@@ -164,80 +199,44 @@ FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]
 def find_fixed_point(
     flow_of: FlowFunction, child: Child, state: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
 ) -> tuple[Flow, FlowState]:
-    """Return the possible ends of a child that is entered repeatedly, and the facts that hold at every entry.
+    """Return the possible ends of a child that is entered repeatedly, and the joined state of all entries.
 
-    `get_next_entry` returns the state at the next entry, given the possible ends of the child; None if the
-    child is not entered again.
+    `state` is the state at the first entry. `get_next_entry` returns the state at the next entry, given the
+    possible ends of the child; None if the child is not entered again.
     """
     entry = state
     while True:
         flow = flow_of(child, entry)
         # Each iteration removes variables or adds states of the tool, so the loop ends.
-        widened = entry.join(get_next_entry(flow) or entry)
-        if widened == entry:
+        joined_entry = entry.join(get_next_entry(flow) or entry)
+        if joined_entry == entry:
             return flow, entry
-        entry = widened
+        entry = joined_entry
 
 
 def join_states(states: Iterable[FlowState | None]) -> FlowState | None:
-    """Return the facts that hold in all states; a state None cannot occur and is ignored; None if all are."""
-    reached = [state for state in states if state is not None]
-    return reduce(FlowState.join, reached) if reached else None
+    """Join the states that can occur; None stands for a state that cannot occur."""
+    possible_states = [state for state in states if state is not None]
+    return reduce(FlowState.join, possible_states) if possible_states else None
 
 
-def apply_precondition(tools: ToolStates, required: ToolState, path: str) -> ToolStates:
-    """Return the possible states of the tool that fulfil the precondition of a skill.
-
-    A precondition that no state fulfils counts as fulfilled, so that one mistake is reported only once.
-
-    Args:
-        tools: Possible states of the tool before the skill.
-        required: State that the skill requires; ANY for no precondition.
-        path: Path of the skill.
-    """
-    if required is ANY or tools is None:
-        return tools
-    fulfilling = frozenset(possible for possible in tools if possible.tool is required)
-    return fulfilling or frozenset({PossibleToolState(required, path)})
-
-
-def get_tools_after_success(tools: ToolStates, after: ToolState, path: str) -> ToolStates:
-    """Return the possible states of the tool after success; `after` is the declared state, ANY: no change."""
-    if after is ANY or (tools is not None and all(possible.tool is after for possible in tools)):
-        return tools
-    return frozenset({PossibleToolState(after, path)})
-
-
-def get_tools_after_failure(tools: ToolStates, after: ToolState | None, path: str) -> ToolStates:
-    """Return the possible states of the tool after a failure of a skill.
-
-    `after` is the declared state; None leaves the states unchanged, ANY adds EMPTY and HOLDING.
-    """
-    if after is None or tools is None:
-        return tools
-    if after is ANY:
-        return tools | {PossibleToolState(EMPTY, path), PossibleToolState(HOLDING, path)}
-    return frozenset({PossibleToolState(after, path)})
-
-
-def find_tools_at_end(flow: Flow, entry: FlowState, may_be_halted: bool) -> ToolStates:
+def find_end_tool_states(flow: Flow, entry: FlowState, can_be_halted: bool) -> ToolStates:
     """Return the possible states of the tool at the end of a branch that was entered in the state `entry`."""
-    halts = (flow.halted, entry) if may_be_halted else ()
-    end = join_states((flow.success, *flow.failures.values(), *halts))
-    return entry.tools if end is None else end.tools
+    halt_states = (flow.halted, entry) if can_be_halted else ()
+    return (join_states((flow.success, *flow.failures.values(), *halt_states)) or entry).tool_states
 
 
-def combine_tools(before: ToolStates, ends: Iterable[ToolStates]) -> ToolStates:
+def combine_tool_states(entry: ToolStates, branch_ends: Iterable[ToolStates]) -> ToolStates:
     """Return the possible states of the tool after parallel branches, at most one of which uses the tool.
 
-    `before` are the states before the branches, `ends` the states at the end of each branch.
+    `entry` are the states before the branches, `branch_ends` the states at the end of each branch.
     """
-    changed = [end for end in ends if _remove_history(end) != _remove_history(before)]
-    if any(end is None for end in changed):
+    changed = [states for states in branch_ends if _remove_history(states) != _remove_history(entry)]
+    if any(states is None for states in changed):
         return None
-    return frozenset(possible for end in changed for possible in end or ()) if changed else before
+    return frozenset(tool for states in changed for tool in states or ()) if changed else entry
 
 
-def _remove_history(tools: ToolStates) -> frozenset[tuple[ToolState, str]] | None:
+def _remove_history(tool_states: ToolStates) -> frozenset[tuple[ToolState, str]] | None:
     """Return the possible states of the tool and their causes, without handled failures and motions."""
-    return None if tools is None else frozenset((possible.tool, possible.cause) for possible in tools)
+    return None if tool_states is None else frozenset((tool.state, tool.cause) for tool in tool_states)

@@ -22,7 +22,7 @@ class ForEach(Loop):
     """
 
     keyword = "for_each"
-    keyword_hints: ClassVar = {"for": "It is called for_each here."}
+    keyword_hints: ClassVar = {"for": "Write for_each."}
     symbol = "∀"
 
     each: VariableName = key(list_key="in", doc="Variable that holds the current element.")
@@ -32,9 +32,9 @@ class ForEach(Loop):
     @property
     def detail(self) -> str:
         """The variable and its list as a text."""
-        source = self.in_
-        elements = f"${source}" if isinstance(source, VariableName) else f"[{', '.join(map(str, source))}]"
-        return f"${self.each} in {elements}"
+        if isinstance(self.in_, VariableName):
+            return f"${self.each} in ${self.in_}"
+        return f"${self.each} in [{', '.join(map(str, self.in_))}]"
 
     def start(self) -> None:
         """Read the list and its first element.
@@ -43,20 +43,20 @@ class ForEach(Loop):
             Fault: The variable with the list was never written, or its value is not a list.
         """
         super().start()
-        self._elements, self._next = self._read_list(), 0
+        self._elements, self._element_index = self._read_list(), 0
         if self._elements:
             self._write_element()
 
     def step(self) -> Status:
-        """Tick the body; take the next element in the same tick if the iteration took at least one tick."""
-        while self._next < len(self._elements):
+        """Tick the body; begin the next iteration in the same tick if `begin_iteration` allows it."""
+        while self._element_index < len(self._elements):
             status = self.run_iteration(self.do)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
                 return self.fail(self.get_failure(self.do))
-            self._next += 1
-            if self._next == len(self._elements):
+            self._element_index += 1
+            if self._element_index == len(self._elements):
                 break
             self._write_element()
             if not self.begin_iteration():
@@ -68,44 +68,42 @@ class ForEach(Loop):
         self.blackboard.remove(self.each)
 
     def _write_element(self) -> None:
-        element = self._elements[self._next]
+        element, number = self._elements[self._element_index], self._element_index + 1
         self.blackboard.write({self.each: element})
-        self.report_choice(f"element {self._next + 1} of {len(self._elements)}: {_describe_element(element)}")
+        self.report_choice(f"element {number} of {len(self._elements)}: {_describe_element(element)}")
 
     def _read_list(self) -> tuple[object, ...]:
-        source = self.in_
-        if not isinstance(source, VariableName):
-            return source
-        if source not in self.blackboard:
+        variable = self.in_
+        if not isinstance(variable, VariableName):
+            return variable
+        if variable not in self.blackboard:
             raise Fault(
-                f"{self.name}: it reads ${source}, which no node has written yet; "
+                f"{self.name}: it reads ${variable}, which no node has written yet; "
                 f"written so far: {', '.join(self.blackboard) or 'nothing'}",
                 self.path,
             )
-        value = self.blackboard[source]
+        value = self.blackboard[variable]
         if not isinstance(value, list | tuple):
             raise Fault(
-                f"{self.name}: ${source} holds a {type(value).__name__}, not a list; "
+                f"{self.name}: ${variable} holds a {type(value).__name__}, not a list; "
                 "name a variable that holds a list, or write the elements in the mission",
                 self.path,
             )
         return tuple(value)
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: the body is entered until its entry states reach a fixed point."""
+        """Return the possible ends; the body is entered again in the state after its success."""
         if self.in_ == ():
             return Flow(state, {}, None)
-        is_known = not isinstance(self.in_, VariableName)
-        body, entry = find_fixed_point(
-            flow_of, self.do, state.with_variables([self.each]), lambda flow: flow.success
-        )
-        success = join_states((body.success, None if is_known else state))
-        failures = {failure: after.without_variable(self.each) for failure, after in body.failures.items()}
-        # The loop may wait for the next tick before it enters the body, and can be halted then.
-        halted = join_states((body.halted, entry))
+        entry = state.with_variables([self.each])
+        body_flow, entry = find_fixed_point(flow_of, self.do, entry, lambda flow: flow.success)
+        # A list in a variable may be empty.
+        success = join_states((body_flow.success, state if isinstance(self.in_, VariableName) else None))
+        # While the loop waits for the next tick before an iteration, it can be halted.
+        halted = join_states((body_flow.halted, entry))
         return Flow(
             success and success.without_variable(self.each),
-            failures,
+            {failure: end.without_variable(self.each) for failure, end in body_flow.failures.items()},
             halted and halted.without_variable(self.each),
         )
 

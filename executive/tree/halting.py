@@ -1,7 +1,7 @@
 """Halt of a tree: every running node is stopped once, even if the clean-up of another node fails.
 
-py_trees stops at the first exception of a `terminate`, which leaves siblings running, and also calls the
-`terminate` of nodes that have ended; the executive halts with the function `halt` instead.
+The function `halt` replaces the `stop` of py_trees, because `stop` also calls `terminate` of nodes that have
+ended, and leaves nodes running after the first exception of a `terminate`.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ def halt(root: Behaviour) -> list[str]:
             try:
                 node.stop(Status.INVALID)
             except Exception as error:
-                place = (error.node if isinstance(error, Fault) else "") or node.name
-                problems.append(f"{place}: {error}")
+                node_name = (error.node if isinstance(error, Fault) else "") or node.name
+                problems.append(f"{node_name}: {error}")
                 # A node whose clean-up failed counts as ended: no node is halted twice.
                 node.status = Status.INVALID
     return problems

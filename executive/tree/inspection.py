@@ -20,8 +20,7 @@ class NodeFinding:
     """A mistake in the mission that a control node finds.
 
     Attributes:
-        place: Key of the node, or failure name under one of its keys, that contains the mistake; "" for the
-            node itself.
+        place: Place of the mistake: a key of the node, or a reason under a key; "" for the node itself.
         code: Code of the finding, such as `short-timeout`.
         message: Description of the mistake, one sentence.
         hint: Description of a remedy, or "".
@@ -36,7 +35,7 @@ class NodeFinding:
 
 
 class NodeFacts(Protocol):
-    """Facts about a control node in a mission, and about its children, that the checker has found."""
+    """Facts of the checker about a control node in a mission and about the children of the node."""
 
     @property
     def is_halted_by_sibling(self) -> bool:
@@ -49,10 +48,10 @@ class NodeFacts(Protocol):
         """Return the name of a child in paths."""
 
     def describe_place(self, reason: Reason, reported: Reason) -> str:
-        """Return the place of a failure name for a finding about the failure name `reported`: `line 12`."""
+        """Return the place of `reason`, as text for a finding at the place of `reported`: `line 12`."""
 
     def is_literal(self, key: str) -> bool:
-        """Return True if the node gives the value of a key literally, not through a param or an argument."""
+        """Return True if the value of a key is written at the node, not in a param or an argument."""
 
     def get_min_time(self, child: Child) -> float:
         """Return a lower bound of the time in which a child can succeed [s]."""
@@ -66,12 +65,13 @@ class NodeFacts(Protocol):
 
 @dataclass(frozen=True)
 class PropagatedFailure:
-    """A failure that ended a run, as seen by a control node that passed it on or caused it.
+    """A failure that ended a run, described for a control node that passed the failure on or caused it.
 
     Attributes:
         child: The child that passed the failure on; None if the node itself caused the failure.
-        reason: Name of the failure: `Grasp.missed`.
-        names: All names of the failure at this node: `Skill.reason`, and one `label.reason` per label.
+        name: Name of the failure: `Grasp.missed`.
+        reasons: All reasons that denote the failure at this node: `Skill.reason`, and one `label.reason` per
+            label.
         handled_counts: Number of failures that the node handled before, by name.
         last_messages: The last message of each handled failure, by name.
         last_handled: Name of the failure that the node handled last, or "".
@@ -81,8 +81,8 @@ class PropagatedFailure:
     """
 
     child: Child | None
-    reason: str
-    names: frozenset[Reason]
+    name: str
+    reasons: frozenset[Reason]
     handled_counts: Mapping[str, int]
     last_messages: Mapping[str, str]
     last_handled: str
@@ -91,8 +91,9 @@ class PropagatedFailure:
     has_child_failed: Callable[[Child], bool]
 
     def is_one_of(self, reasons: Sequence[Reason]) -> bool:
-        """Return True if one of `reasons` is a name of the failure."""
-        return any(Reason(name.source, name.reason) in self.names for name in reasons)
+        """Return True if one of `reasons` denotes the failure."""
+        # The checker uses a subclass with a position; its instances are never equal to a `Reason`.
+        return any(Reason(reason.source, reason.reason) in self.reasons for reason in reasons)
 
 
 @dataclass(frozen=True)
@@ -100,9 +101,9 @@ class Advice:
     """A change of the mission after which a failure would not end the run.
 
     Attributes:
-        text: Description of the change, without the line number, which the diagnosis adds.
-        key: Key of the node that is to be changed, or "".
-        child: Child that is to be changed; None for the node itself.
+        text: Description of the change without the line number, which the diagnosis adds.
+        key: Key of the node that the author should change, or "".
+        child: Child that the author should change; None for the node itself.
     """
 
     text: str
@@ -111,5 +112,5 @@ class Advice:
 
 
 def format_reasons(reasons: Sequence[Reason]) -> str:
-    """Return a text with all failure names: `Grasp.missed, look.unsure`."""
+    """Return a text with all reasons: `Grasp.missed, look.unsure`."""
     return ", ".join(map(str, reasons))

@@ -26,8 +26,8 @@ class Invert(ControlNode):
         return Status.SUCCESS if status is Status.FAILURE else status
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: those of the body with success and failure exchanged."""
-        body = flow_of(self.do, state)
+        """Return the possible ends of the body, with success and failure exchanged."""
+        flow = flow_of(self.do, state)
         inverted = PossibleFailure(self.keyword, "inverted", self.path)
-        failures = {} if body.success is None else {inverted: body.success}
-        return Flow(join_states(body.failures.values()), failures, body.halted)
+        failures = {} if flow.success is None else {inverted: flow.success}
+        return Flow(join_states(flow.failures.values()), failures, flow.halted)

@@ -15,7 +15,7 @@ from pydantic import Field, TypeAdapter
 from executive.tree.failure import Reason
 
 Child: TypeAlias = Behaviour
-"""Child of a control node; in the checker and the diagnosis, a `StandIn` that represents it."""
+"""Child of a control node; in the checker and the diagnosis, a `StandIn` that represents the child."""
 
 
 class VariableName(str):
@@ -23,12 +23,14 @@ class VariableName(str):
 
 
 Children: TypeAlias = tuple[Child, ...]
+"""Type of a key with a list of nodes."""
 Reasons: TypeAlias = tuple[Reason, ...]
+"""Type of a key with a list of reasons."""
 Elements: TypeAlias = tuple[object, ...] | VariableName
-"""A list from the mission file, or the name of the variable that holds a list."""
+"""Type of a key with a list of values, or with the name of a variable that holds a list."""
 
 
-class Kind(Enum):
+class KeyKind(Enum):
     """Kind of the value of a key, derived from the type annotation of its attribute."""
 
     NODE = auto()
@@ -49,13 +51,13 @@ class Key:
         doc: Meaning of the key, one sentence.
         default: Value if the key is missing; `...` for a required key.
         ge, gt: Inclusive and exclusive lower bound of a number, or None.
-        max_key: For a number: key whose number of nodes is the maximum of the number, or "".
+        max_key: For a number: key with a list of nodes, whose length is the maximum of the number; or "".
         max_count: For a list of nodes: maximum number of nodes, or None.
         is_shorthand: True if the key may be omitted and its value written directly under the keyword.
         is_sibling: True if the key is written at the level of the keyword, as `catch` beside `try`.
-        is_in_path: False if the paths of the nodes under the key do not contain the key.
-        raising_key: For a list of reasons: key of the nodes that raise these failures.
-        list_key: For a variable: key of the list whose elements the variable holds in turn, or "".
+        is_in_path: True if the paths of the nodes under the key contain the key.
+        raising_key: For a list of reasons: key with the nodes whose failures the reasons denote.
+        list_key: For a variable that holds the elements of a list in turn: key with the list; or "".
         name: Name of the key in the mission file.
         attribute: Name of the attribute in the class.
         kind: Kind of the value.
@@ -75,7 +77,7 @@ class Key:
     list_key: str = ""
     name: str = ""
     attribute: str = ""
-    kind: Kind = Kind.CONSTANT
+    kind: KeyKind = KeyKind.CONSTANT
     value_type: object = None
 
     @property
@@ -85,7 +87,7 @@ class Key:
 
     @property
     def section(self) -> type[KeySection]:
-        """The class of the section or sections under the key."""
+        """Class of the sections under the key."""
         return cast("type[KeySection]", self.value_type)
 
     def make_validator(self, max_value: int | None = None) -> TypeAdapter[object]:
@@ -107,7 +109,7 @@ def key(
     raising_key: str = "do",
     list_key: str = "",
 ) -> Any:
-    """Return the declaration of a key, to be assigned to an attribute; see `Key` for the arguments.
+    """Declare a key in the body of a class; the arguments are attributes of `Key`, without `is_`.
 
     The name of the key is the name of the attribute, without a trailing underscore.
     """
@@ -119,7 +121,7 @@ class KeyOwner:
 
     Attributes:
         keys: Declarations of the keys, by their names in the mission file.
-        any_of: Names of keys of which a mission must give at least one; empty for no such rule.
+        any_of: Names of keys; a mission must give at least one of them. Empty if there is no such rule.
     """
 
     keys: ClassVar[Mapping[str, Key]] = {}
@@ -127,68 +129,72 @@ class KeyOwner:
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        declared = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
-        hints = get_type_hints(cls, include_extras=True) if declared else {}
-        if missing := [name for name in declared if name not in hints]:
-            name = f"{cls.__qualname__}.{missing[0]}"
-            raise TypeError(f"{name} has no annotation: write its type before `= key(...)`")
+        declarations = {name: value for name, value in vars(cls).items() if isinstance(value, Key)}
+        annotations = get_type_hints(cls, include_extras=True) if declarations else {}
         keys = dict(cls.keys)
-        for attribute, value in declared.items():
-            complete = _complete_declaration(value, attribute, hints[attribute])
-            keys[complete.name] = complete
+        for attribute, declaration in declarations.items():
+            if attribute not in annotations:
+                name = f"{cls.__qualname__}.{attribute}"
+                raise TypeError(f"{name} has no annotation: write its type before `= key(...)`")
+            key = _complete_declaration(declaration, attribute, annotations[attribute])
+            keys[key.name] = key
             delattr(cls, attribute)
         cls.keys = keys
 
-    def set_keys(self, values: Mapping[str, object]) -> None:
-        """Set the attributes of all keys to `values`, by the names of the attributes, or to their defaults.
+    def set_key_values(self, values: Mapping[str, object]) -> None:
+        """Set the attributes of all keys to values by attribute, or else to the defaults of the keys.
 
         Raises:
             TypeError: A required value is missing, or an attribute in `values` belongs to no key.
         """
         remaining = dict(values)
-        for declaration in self.keys.values():
-            value = remaining.pop(declaration.attribute, declaration.default)
+        for key in self.keys.values():
+            value = remaining.pop(key.attribute, key.default)
             if value is ...:
-                raise TypeError(f"{type(self).__name__} needs a value for {declaration.attribute}")
-            setattr(self, declaration.attribute, tuple(value) if isinstance(value, list) else value)
+                raise TypeError(f"{type(self).__name__} needs a value for {key.attribute}")
+            setattr(self, key.attribute, tuple(value) if isinstance(value, list) else value)
         if remaining:
             raise TypeError(f"{type(self).__name__} has no key {', '.join(remaining)}")
 
 
 class KeySection(KeyOwner):
-    """Base class of the mappings under a key of a control node; a subclass declares the keys of a mapping."""
+    """Base class of the sections (mappings) under a key of a control node; a subclass declares their keys."""
 
     def __init__(self, **values: object) -> None:
-        self.set_keys(values)
+        self.set_key_values(values)
 
 
 def _complete_declaration(declaration: Key, attribute: str, annotation: object) -> Key:
     """Return the declaration with the name, kind and type that its attribute and annotation determine."""
     if get_origin(annotation) in (Union, types.UnionType) and types.NoneType in get_args(annotation):
-        parts = tuple(part for part in get_args(annotation) if part is not types.NoneType)
-        annotation = Union[parts]  # noqa: UP007
-    base = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
-    element = get_args(base)[0] if get_origin(base) is tuple else None
-    kinds: dict[object, Kind] = {
-        Child: Kind.NODE,
-        Children: Kind.NODES,
-        Reasons: Kind.REASONS,
-        VariableName: Kind.VARIABLE,
+        member_types = tuple(member for member in get_args(annotation) if member is not types.NoneType)
+        annotation = Union[member_types]  # noqa: UP007
+    value_type = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+    element_type = get_args(value_type)[0] if get_origin(value_type) is tuple else None
+    kinds: dict[object, KeyKind] = {
+        Child: KeyKind.NODE,
+        Children: KeyKind.NODES,
+        Reasons: KeyKind.REASONS,
+        VariableName: KeyKind.VARIABLE,
     }
-    kind = Kind.ELEMENTS if base == Elements else kinds.get(base, Kind.CONSTANT)
-    if isinstance(base, type) and issubclass(base, KeySection):
-        kind = Kind.SECTION
-    elif isinstance(element, type) and issubclass(element, KeySection):
-        kind, base = Kind.SECTIONS, element
-    return replace(declaration, name=attribute.rstrip("_"), attribute=attribute, kind=kind, value_type=base)
+    kind = KeyKind.ELEMENTS if value_type == Elements else kinds.get(value_type, KeyKind.CONSTANT)
+    if isinstance(value_type, type) and issubclass(value_type, KeySection):
+        kind = KeyKind.SECTION
+    elif isinstance(element_type, type) and issubclass(element_type, KeySection):
+        kind, value_type = KeyKind.SECTIONS, element_type
+    name = attribute.rstrip("_")
+    return replace(declaration, name=name, attribute=attribute, kind=kind, value_type=value_type)
 
 
 @cache
 def _make_validator(
-    declared: object, ge: float | None, gt: float | None, le: float | None
+    value_type: object, ge: float | None, gt: float | None, le: float | None
 ) -> TypeAdapter[object]:
-    """Return the validator of the type `declared`, whose numbers must lie within the bounds."""
-    parts = get_args(declared) if get_origin(declared) in (Union, types.UnionType) else (declared,)
+    """Return the validator of a type whose numbers must be `>= ge`, `> gt` and `<= le`; None: no bound."""
+    is_union = get_origin(value_type) in (Union, types.UnionType)
     bounds = Field(ge=ge, gt=gt, le=le)
-    bounded = [Annotated[part, bounds] if part in (int, float) else part for part in parts]
-    return TypeAdapter(cast("type[object]", Union[tuple(bounded)]))  # noqa: UP007
+    member_types = tuple(
+        Annotated[member, bounds] if member in (int, float) else member
+        for member in (get_args(value_type) if is_union else (value_type,))
+    )
+    return TypeAdapter(cast("type[object]", Union[member_types]))  # noqa: UP007

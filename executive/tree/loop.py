@@ -16,23 +16,23 @@ class Loop(ControlNode):
     next iteration begins in the same tick, so that a loop causes no idle ticks.
 
     Attributes:
-        was_running: True if the current iteration was RUNNING at the end of a tick.
+        has_tick_passed: True if at least one tick has ended during the current iteration.
     """
 
     symbol, shape = "↻", "hexagon"
 
     def start(self) -> None:
         """Begin the first iteration."""
-        self.was_running = False
+        self.has_tick_passed = False
 
     def run_iteration(self, child: Child) -> Status:
         """Tick a child as part of the current iteration."""
         status = self.run_child(child)
         if status is Status.RUNNING:
-            self.was_running = True
+            self.has_tick_passed = True
         return status
 
     def begin_iteration(self) -> bool:
         """Begin the next iteration; return True if it may run in the current tick."""
-        was_running, self.was_running = self.was_running, False
-        return was_running
+        may_run, self.has_tick_passed = self.has_tick_passed, False
+        return may_run

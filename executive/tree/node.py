@@ -2,7 +2,7 @@
 
 A control node is one class in one file, registered by an entry point. The class declares its keys and
 implements `start` and `step` for the run, `compute_flow` and `min_time` for the checker, and `explain` for
-the diagnosis. `tick_once` makes one call per level of the tree, and visits no child that has ended.
+the diagnosis.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.halting import halt
 from executive.tree.inspection import Advice, MinTimeFunction, NodeFacts, NodeFinding, PropagatedFailure
-from executive.tree.keys import Child, KeyOwner, KeySection, Kind
+from executive.tree.keys import Child, KeyKind, KeyOwner, KeySection
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,37 @@ class NodeContext:
     emit: Emit = discard_event
 
 
-class ControlNode(KeyOwner, Behaviour):
+class TreeNode(Behaviour):
+    """Base class of control nodes and of leaves with skills: `tick_once` also serves the ticks of py_trees.
+
+    Attributes:
+        path: Unique path from the root of the tree.
+        label: Label of the node in the mission, or "".
+        blackboard: Variables of the run.
+        failure: The failure while the status is FAILURE; else None.
+        subtrees: Names of the subtrees whose root is this node, the outermost first.
+    """
+
+    subtrees: tuple[str, ...] = ()
+
+    def __init__(self, context: NodeContext, name: str) -> None:
+        super().__init__(context.label or name)
+        self.path, self.label, self.blackboard = context.path, context.label, context.blackboard
+        self.failure: Failure | None = None
+        self._emit = context.emit
+
+    def update(self) -> Status:
+        """Continue by one tick and return the status."""
+        self.tick_once()
+        return self.status
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Continue by one tick, then yield this node."""
+        self.tick_once()
+        yield self
+
+
+class ControlNode(KeyOwner, TreeNode):
     """Base class of control nodes.
 
     Attributes:
@@ -53,13 +83,10 @@ class ControlNode(KeyOwner, Behaviour):
         reasons: Declared reasons of the failures that the node itself causes.
         symbol: Character before the name of the node in drawings.
         shape: Shape of the node in Graphviz drawings.
-        remedy: Advice to the mission author: how this node, around a failing node, handles the failure; "" if
-            this node handles no failures.
-        keyword_hints: Hints for authors who write a keyword of another language, by that keyword.
-        path: Unique path from the root of the tree.
-        label: Label of the node in the mission, or "".
-        failure: The failure while the status is FAILURE; else None.
-        subtrees: Names of the subtrees whose root is this node, the outermost first.
+        remedy: Advice to put this node around a failing node, so that this node handles the failure; the name
+            of the failing node follows. "" if this node handles no failures.
+        keyword_hints: Hint for each wrong keyword that authors may write instead of `keyword`.
+        clock: Clock of the run.
     """
 
     keyword: ClassVar[str] = ""
@@ -68,15 +95,11 @@ class ControlNode(KeyOwner, Behaviour):
     shape: ClassVar[str] = "ellipse"
     remedy: ClassVar[str] = ""
     keyword_hints: ClassVar[Mapping[str, str]] = {}
-    subtrees: tuple[str, ...] = ()
 
     def __init__(self, context: NodeContext, **values: object) -> None:
-        super().__init__(context.label or self.keyword)
-        self.path, self.label = context.path, context.label
-        self.clock, self.blackboard = context.clock, context.blackboard
-        self.failure: Failure | None = None
-        self._emit = context.emit
-        self.set_keys(values)
+        super().__init__(context, self.keyword)
+        self.clock = context.clock
+        self.set_key_values(values)
         self.children = [child for key in self.keys for child in self.list_children(key)]
         for child in self.children:
             child.parent = self
@@ -84,20 +107,17 @@ class ControlNode(KeyOwner, Behaviour):
 
     def list_children(self, key_name: str) -> list[Child]:
         """Return the nodes under a key, including those in the sections of the key."""
-        key = self.keys[key_name]
-        return _find_nodes(getattr(self, key.attribute))
+        return _find_nodes(getattr(self, self.keys[key_name].attribute))
 
     @property
     def detail(self) -> str:
         """The constants of the node that differ from their defaults, as a text for outlines."""
-        constants = [key for key in self.keys.values() if key.kind is Kind.CONSTANT]
-        values = {key.name: getattr(self, key.attribute) for key in constants}
-        return ", ".join(
-            f"{name}: {value}" for name, value in values.items() if value != self.keys[name].default
-        )
+        constants = [key for key in self.keys.values() if key.kind is KeyKind.CONSTANT]
+        values = [(key, getattr(self, key.attribute)) for key in constants]
+        return ", ".join(f"{key.name}: {value}" for key, value in values if value != key.default)
 
     def describe_trigger(self, child: Child) -> str:
-        """Return a text with the failures after which a child runs: `on Grasp.missed`; else ""."""
+        """Return a text with the failures after which a child runs, such as `on Grasp.missed`, or ""."""
         del child
         return ""
 
@@ -107,7 +127,7 @@ class ControlNode(KeyOwner, Behaviour):
         """Begin an activation; called before the first `step`."""
 
     def step(self) -> Status:
-        """Continue by one tick; return RUNNING, SUCCESS or FAILURE. Before FAILURE, set `failure`."""
+        """Continue by one tick; return RUNNING, SUCCESS, or FAILURE after a call of `fail`."""
         raise NotImplementedError
 
     def clean_up(self) -> None:
@@ -116,7 +136,7 @@ class ControlNode(KeyOwner, Behaviour):
     # Methods for the checker.
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends of the node from a state; `flow_of` returns those of a child."""
+        """Return the possible ends of the node that is entered in `state`; `flow_of` does so for a child."""
         raise NotImplementedError
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
@@ -125,18 +145,18 @@ class ControlNode(KeyOwner, Behaviour):
         return 0.0
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
-        """Yield mistakes in the mission that only this class can find."""
+        """Yield mistakes in the use of this control node in the mission."""
         del facts
         yield from ()
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause for which a child can never run; "" if another finding reports the cause."""
+        """Return the cause if a child can never run; "" if another finding reports the cause."""
         del child
         return ""
 
     @property
     def first_child(self) -> Child | None:
-        """The child that begins before all others in the first tick of the node; None if unknown."""
+        """The child that runs first in each activation of the node; None if unknown."""
         return None
 
     @property
@@ -146,18 +166,18 @@ class ControlNode(KeyOwner, Behaviour):
 
     @property
     def children_halted_by_sibling(self) -> tuple[Child, ...]:
-        """Children that the node halts when another child has ended, so that they may run without end."""
+        """Children that the node halts when another child has ended; an endless loop is allowed in them."""
         return ()
 
     # Methods for the diagnosis.
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the cause for which the node did not handle a failure; "" for a node that handles none."""
+        """Return the reason why the node did not handle a failure; "" if the node never handles failures."""
         del failure
         return ""
 
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int] | None:
-        """Return the number of the failed attempt and the number of allowed attempts; None if it has none."""
+        """Return the number of the failed attempt and the number of allowed attempts, or None."""
         del failure
         return None
 
@@ -167,7 +187,7 @@ class ControlNode(KeyOwner, Behaviour):
         yield from ()
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield the children that run only after a failure or at the end, each after its name in reports."""
+        """Yield (name in reports, child) for the children that run only after a failure or at the end."""
         yield from ()
 
     # Methods that subclasses call.
@@ -202,11 +222,11 @@ class ControlNode(KeyOwner, Behaviour):
         return Status.FAILURE
 
     def fail_with_reason(self, reason: str, message: str) -> Status:
-        """Fail with a reason of this node itself: set `failure`, and return FAILURE."""
+        """Fail with one of the `reasons` of this class: set `failure`, and return FAILURE."""
         return self.fail(Failure(reason, message, self.keyword, self.path))
 
     def report_choice(self, choice: str, cause: Failure | None = None) -> None:
-        """Emit an event with the next step of the node, and with the failure that caused the step, if any."""
+        """Emit an event with a decision of the node, and with the failure that caused it, or None."""
         reason, message = (str(cause), cause.message) if cause else ("", "")
         self._emit(BranchChosen(self.path, choice, reason, message))
 
@@ -222,17 +242,6 @@ class ControlNode(KeyOwner, Behaviour):
         status = self.step()
         if status is not Status.RUNNING:
             self._end(status)
-
-    def update(self) -> Status:
-        """Continue by one tick and return the status."""
-        self.tick_once()
-        status: Status = self.status
-        return status
-
-    def tick(self) -> Iterator[Behaviour]:
-        """Continue by one tick, then yield this node."""
-        self.tick_once()
-        yield self
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
         """Halt the running nodes below this node, then end with `new_status`.
@@ -264,15 +273,16 @@ class ControlNode(KeyOwner, Behaviour):
         """
         for key in self.keys.values():
             value = getattr(self, key.attribute)
-            if key.kind is Kind.CONSTANT and value != key.default:
+            if key.kind is KeyKind.CONSTANT and value != key.default:
                 max_value = len(self.list_children(key.max_key)) if key.max_key else None
                 try:
                     key.make_validator(max_value).validate_python(value, strict=True)
-                except ValidationError as problems:
-                    errors = problems.errors()
-                    problem = next((error for error in errors if "than" in error["type"]), errors[0])["msg"]
+                except ValidationError as invalid:
+                    # In a union of types, an exceeded bound explains more than the errors of the other types.
+                    errors = sorted(invalid.errors(), key=lambda error: "than" not in error["type"])
                     name = f"{self.keyword}.{key.name}"
-                    raise InputError(f"{self.path}: {name} cannot be {value!r}: {problem}") from None
+                    message = f"{self.path}: {name} cannot be {value!r}: {errors[0]['msg']}"
+                    raise InputError(message) from None
 
 
 def _find_nodes(value: object) -> list[Child]:

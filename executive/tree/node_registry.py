@@ -14,10 +14,13 @@ from executive.tree.blackboard import Blackboard
 from executive.tree.node import ControlNode, NodeContext
 
 ENTRY_POINT_GROUP = "executive.control_nodes"
+"""Group of the entry points of control nodes."""
 
 ControlNodes: TypeAlias = Mapping[str, type[ControlNode]]
+"""Classes of control nodes by keyword."""
 
 _KEYWORD_PATTERN = re.compile("[a-z][a-z0-9_]*")
+"""Pattern of keywords: a lower-case identifier."""
 
 
 def load_control_nodes() -> ControlNodes:
@@ -31,25 +34,26 @@ def load_control_nodes() -> ControlNodes:
 
 @cache
 def _load_classes(entries: tuple[PluginEntry, ...]) -> ControlNodes:
-    nodes = {entry.name: entry.load() for entry in entries}
+    node_classes = {entry.name: entry.load() for entry in entries}
     for entry in entries:
-        if problem := _find_problem(entry.name, nodes[entry.name]):
+        if problem := _find_problem(entry.name, node_classes[entry.name]):
             raise InputError(f'the entry point "{entry.name}" ({entry.value}) {problem}')
-    return nodes
+    return node_classes
 
 
-def _find_problem(keyword: str, node: object) -> str:
-    """Return an error message if the class `node` cannot be used as a control node, else ""."""
-    if not (isinstance(node, type) and issubclass(node, ControlNode)):
+def _find_problem(keyword: str, node_class: object) -> str:
+    """Return an error message if `node_class` cannot be used as a control node, else ""."""
+    if not (isinstance(node_class, type) and issubclass(node_class, ControlNode)):
         return "is not a ControlNode subclass"
-    if not _KEYWORD_PATTERN.fullmatch(keyword) or node.keyword != keyword:
-        return f'must have the name of its class, in lower case: the class has the keyword "{node.keyword}"'
+    class_keyword = node_class.keyword
+    if not _KEYWORD_PATTERN.fullmatch(keyword) or class_keyword != keyword:
+        return f'must have the name of its class, in lower case: the class has the keyword "{class_keyword}"'
     for method in ("step", "compute_flow"):
-        if getattr(node, method) is getattr(ControlNode, method):
+        if getattr(node_class, method) is getattr(ControlNode, method):
             return f"has no method {method}"
     # Some attributes of py_trees behaviours exist only on instances.
     instance = ControlNode(NodeContext("", cast("Clock", None), Blackboard()))
-    clashes = [key.attribute for key in node.keys.values() if hasattr(instance, key.attribute)]
-    if clashes or "as" in node.keys:
-        return f'cannot have the key "{(clashes or ["as"])[0]}": the name is taken'
+    for key in node_class.keys.values():
+        if key.name == "as" or hasattr(instance, key.attribute):
+            return f'cannot have the key "{key.name}": the name is used already'
     return ""

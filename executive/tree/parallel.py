@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal
 
 from py_trees.common import Status
@@ -12,17 +12,17 @@ from executive.tree.flow import (
     Flow,
     FlowFunction,
     FlowState,
-    PossibleFailure,
-    combine_tools,
-    find_tools_at_end,
+    ToolStates,
+    combine_tool_states,
+    find_end_tool_states,
     join_states,
 )
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
 
-MAX_BRANCHES = 200
-"""Maximum number of branches; limits the time of the checker, which compares every pair of branches."""
+MAX_CHILDREN = 200
+"""Maximum number of children; limits the time of the checker, which compares every pair of children."""
 
 
 class Parallel(ControlNode):
@@ -33,9 +33,9 @@ class Parallel(ControlNode):
 
     * If enough children have succeeded, the node succeeds, even if others failed in the same tick, and halts
       the running children.
-    * If too many children have failed, the node fails with the first failure; of failures in the same tick,
-      with the failure of the child listed first. With `halt`, the node halts the running children at once;
-      without `halt`, it lets them finish, so that a motion of the arm is completed.
+    * If too many children have failed, the node fails with the first failure; the order of the children
+      decides between failures in the same tick. With `halt`, the node halts the running children at once;
+      without `halt`, the node lets the running children finish, so that a motion is completed.
 
     With `wait_for: lead`, the node ends in the tick in which its first child, the lead, ends, with the status
     of the lead, and halts the others.
@@ -52,7 +52,7 @@ class Parallel(ControlNode):
         default=False,
         doc="True to halt the others at once after a failure, instead of letting them finish.",
     )
-    do: Children = key(shorthand=True, max_count=MAX_BRANCHES, doc="Nodes to run at the same time.")
+    do: Children = key(shorthand=True, max_count=MAX_CHILDREN, doc="Nodes to run at the same time.")
 
     @property
     def _has_lead(self) -> bool:
@@ -76,58 +76,55 @@ class Parallel(ControlNode):
 
     def start(self) -> None:
         """Begin with all children."""
-        self._running = list(self.do)
+        self._running_children = list(self.do)
         self._missing_count = self._required_count
-        self._failure: Failure | None = None
-        self._tick_children = self._tick_lead if self._has_lead else self._tick_all
+        self._first_failure: Failure | None = None
 
     def step(self) -> Status:
         """Tick every running child."""
-        return self._tick_children()
+        return self._tick_lead() if self._has_lead else self._tick_all()
 
     def _tick_lead(self) -> Status:
         """Tick the lead; if the lead is still running, tick the other running children."""
-        lead, *others = self._running
+        lead, *siblings = self._running_children
         status = self.run_child(lead)
         if status is not Status.RUNNING:
-            self.halt_children(others)
+            self.halt_children(siblings)
             return status if status is Status.SUCCESS else self.fail(self.get_failure(lead))
-        for child in others:
+        for child in siblings:
             status = self.run_child(child)
             if status is not Status.RUNNING:
-                self._running.remove(child)
+                self._running_children.remove(child)
             if status is Status.FAILURE:
                 self.report_choice("go on without this branch", self.get_failure(child))
         return Status.RUNNING
 
     def _tick_all(self) -> Status:
-        has_child_ended = not self._running
-        for child in self._running:
-            if self.run_child(child) is not Status.RUNNING:
-                has_child_ended = True
-        return self._decide() if has_child_ended else Status.RUNNING
+        statuses = {self.run_child(child) for child in self._running_children}
+        return Status.RUNNING if statuses == {Status.RUNNING} else self._decide()
 
     def _decide(self) -> Status:
         """Count the children that ended in this tick, and return the resulting status of the node."""
-        ticked = self._running
-        self._running = [child for child in ticked if child.status is Status.RUNNING]
-        self._missing_count -= sum(child.status is Status.SUCCESS for child in ticked)
-        failures = [self.get_failure(child) for child in ticked if child.status is Status.FAILURE]
-        self._failure = next(iter(failures), None) if self._failure is None else self._failure
+        ended_children = [child for child in self._running_children if child.status is not Status.RUNNING]
+        running_children = [child for child in self._running_children if child.status is Status.RUNNING]
+        self._running_children = running_children
+        failures = [self.get_failure(child) for child in ended_children if child.status is Status.FAILURE]
+        self._missing_count -= len(ended_children) - len(failures)
+        self._first_failure = self._first_failure or next(iter(failures), None)
         if self._missing_count <= 0:
-            self.halt_children(self._running)
+            self.halt_children(running_children)
             self._report_choices("enough others succeeded", failures)
             return Status.SUCCESS
-        must_fail = self._missing_count > len(self._running)
-        if self._running and not (must_fail and self.halt):
-            choice = "let the others finish, then fail" if must_fail else "go on with the others"
+        has_failed = self._missing_count > len(running_children)
+        if running_children and not (has_failed and self.halt):
+            choice = "let the others finish, then fail" if has_failed else "go on with the others"
             self._report_choices(choice, failures)
             return Status.RUNNING
-        self.halt_children(self._running)
-        assert self._failure is not None
-        others = [failure for failure in failures if failure is not self._failure]
-        self._report_choices(f"fail with {self._failure}", others)
-        return self.fail(self._failure)
+        self.halt_children(running_children)
+        assert self._first_failure is not None
+        later_failures = [failure for failure in failures if failure is not self._first_failure]
+        self._report_choices(f"fail with {self._first_failure}", later_failures)
+        return self.fail(self._first_failure)
 
     def _report_choices(self, choice: str, failures: Sequence[Failure]) -> None:
         for failure in failures:
@@ -135,38 +132,36 @@ class Parallel(ControlNode):
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends: every child is entered in the same state, and the ends are combined."""
-        flows = [flow_of(branch, state) for branch in self.do]
-        after_halt = [find_tools_at_end(flow, state, may_be_halted=True) for flow in flows]
+        flows = [flow_of(child, state) for child in self.do]
+        ends_with_halt = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         halted = join_states(flow.halted for flow in flows)
-        halted = halted and halted.with_tools(combine_tools(state.tools, after_halt))
-        failures: dict[PossibleFailure, FlowState] = {}
+        halted = halted and halted.with_tool_states(combine_tool_states(state.tool_states, ends_with_halt))
         if self._has_lead:
-            others = after_halt[1:]
-            for failure, after in flows[0].failures.items():
-                failures[failure] = after.with_tools(combine_tools(state.tools, [after.tools, *others]))
-            end = flows[0].success
-            success = end and end.with_tools(combine_tools(state.tools, [end.tools, *others]))
-            return Flow(success, failures, halted)
-        required = self._required_count
-        ends = [find_tools_at_end(flow, state, self.halt or required < len(flows)) for flow in flows]
-        if sum(bool(flow.failures) for flow in flows) > len(flows) - required:
-            for index, flow in enumerate(flows):
-                others = [*ends[:index], *ends[index + 1 :]]
-                for failure, after in flow.failures.items():
-                    failures[failure] = after.with_tools(combine_tools(state.tools, [after.tools, *others]))
+            lead, siblings = flows[0], ends_with_halt[1:]
+            failures = {failure: _combine(state, end, siblings) for failure, end in lead.failures.items()}
+            return Flow(lead.success and _combine(state, lead.success, siblings), failures, halted)
+        failures, required = {}, self._required_count
+        ends = [find_end_tool_states(flow, state, self.halt or required < len(flows)) for flow in flows]
+        can_fail = sum(bool(flow.failures) for flow in flows) > len(flows) - required
+        for index, flow in enumerate(flows if can_fail else ()):
+            siblings = [*ends[:index], *ends[index + 1 :]]
+            failures |= {failure: _combine(state, end, siblings) for failure, end in flow.failures.items()}
         return Flow(self._compute_success_state(flows, state), failures, halted)
 
     def _compute_success_state(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
-        """Return the state after enough branches have succeeded; None if too few branches can succeed."""
-        succeeding = [flow.success for flow in flows if flow.success is not None]
-        success = join_states(succeeding)
-        if success is None or len(succeeding) < self._required_count:
+        """Return the state after enough children have succeeded; None if too few children can succeed."""
+        successes = [flow.success for flow in flows if flow.success is not None]
+        success = join_states(successes)
+        if success is None or len(successes) < self._required_count:
             return None
         if self._required_count < len(flows):
-            ends = [find_tools_at_end(flow, state, may_be_halted=True) for flow in flows]
-            return success.with_tools(combine_tools(state.tools, ends))
-        end = success.with_variables(name for one in succeeding for name in one.written or ())
-        return end.with_tools(combine_tools(state.tools, [one.tools for one in succeeding]))
+            ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
+        else:
+            ends = [end.tool_states for end in successes]
+            success = success.with_variables(
+                name for end in successes for name in end.written_variables or ()
+            )
+        return success.with_tool_states(combine_tool_states(state.tool_states, ends))
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of the lead, or the n-th shortest if n children must succeed [s]."""
@@ -189,8 +184,13 @@ class Parallel(ControlNode):
         if self._has_lead:
             return "ends with the status of its first child, the lead"
         count = len(self.do)
-        texts = {"all": f"all {count}", "any": f"one of its {count}"}
-        required = texts.get(str(self.wait_for), f"{self.wait_for} of its {count}")
-        # The handled failures may include the failure passed on: it was reported while other branches ran.
-        others = [reason for reason in failure.handled_counts if reason != failure.reason]
-        return f"needs {required} branches" + (f"; also failed: {', '.join(others)}" if others else "")
+        required_texts = {"all": f"all {count}", "any": f"one of its {count}"}
+        required = required_texts.get(str(self.wait_for), f"{self.wait_for} of its {count}")
+        # The handled failures may include the passed failure, which was reported while other children ran.
+        others = ", ".join(name for name in failure.handled_counts if name != failure.name)
+        return f"needs {required} branches" + (f"; also failed: {others}" if others else "")
+
+
+def _combine(entry: FlowState, end: FlowState, siblings: Iterable[ToolStates]) -> FlowState:
+    """Return the state `end` after one child, with the states of the tool after all children."""
+    return end.with_tool_states(combine_tool_states(entry.tool_states, [end.tool_states, *siblings]))

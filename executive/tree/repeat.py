@@ -13,13 +13,13 @@ from executive.tree.loop import Loop
 
 
 class Repeat(Loop):
-    """Run the body again after each success, up to a number of times or until an expected failure.
+    """Run the body repeatedly, up to a maximum number of iterations or until an expected failure.
 
     Both ends of the loop are a success. Any other failure of the body ends the loop and is passed on.
     """
 
     keyword = "repeat"
-    keyword_hints: ClassVar = {"loop": "It is called repeat here, or while with a condition."}
+    keyword_hints: ClassVar = {"loop": "Write repeat, or while for a loop with a condition."}
     any_of = ("times", "until")
 
     times: int | None = key(default=None, ge=0, doc="Maximum number of iterations.")
@@ -40,7 +40,7 @@ class Repeat(Loop):
         self._completed_count = 0
 
     def step(self) -> Status:
-        """Tick the body; begin the next iteration in the same tick if the last one took at least one tick."""
+        """Tick the body; begin the next iteration in the same tick if `begin_iteration` allows it."""
         while self._completed_count != self.times:
             status = self.run_iteration(self.do)
             if status is Status.RUNNING:
@@ -63,10 +63,11 @@ class Repeat(Loop):
         body, entry = find_fixed_point(
             flow_of, self.do, state, lambda flow: None if self.times == 1 else flow.success
         )
-        finished = [after for failure, after in body.failures.items() if failure.may_match(self.until)]
-        success = join_states((*finished, None if self.times is None else body.success))
-        others = {one: after for one, after in body.failures.items() if not one.must_match(self.until)}
-        return Flow(success, others, join_states((body.halted, entry)))
+        items = body.failures.items()
+        expected_ends = [end for failure, end in items if failure.may_match(self.until)]
+        success = join_states((*expected_ends, None if self.times is None else body.success))
+        failures = {failure: end for failure, end in items if not failure.must_match(self.until)}
+        return Flow(success, failures, join_states((body.halted, entry)))
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of all iterations [s]; 0 if a failure may end the loop with success."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from math import inf, isfinite
 
 from py_trees.common import Status
@@ -39,7 +40,7 @@ class Backoff(KeySection):
         """Return the delay [s] after a failure of the attempt with the number `attempt`, counted from 1."""
         try:
             return min(self.first * self.factor ** (attempt - 1), self.max)
-        except OverflowError:
+        except OverflowError:  # The power exceeds the range of floats.
             return self.max
 
 
@@ -75,7 +76,7 @@ class Retry(Loop):
         self._pending_failure: Failure | None = None
 
     def step(self) -> Status:
-        """Tick the current child; begin an attempt in the same tick if the last one took a tick or more."""
+        """Tick the current child; begin the next attempt in the same tick if `begin_iteration` allows it."""
         while True:
             if self._pending_failure is None:
                 status = self.run_iteration(self.do)
@@ -84,7 +85,7 @@ class Retry(Loop):
                 failure = self.get_failure(self.do)
                 if self._attempt == self.attempts or (self.on and not failure.matches(self.on)):
                     return self.fail(failure)
-                self._pending_failure, self._wait_steps = failure, self._begin_wait(failure)
+                self._pending_failure, self._delay_steps = failure, self._begin_delay(failure)
             status = self._tick_recovery(self._pending_failure)
             if status is not Status.SUCCESS:
                 return status
@@ -92,7 +93,7 @@ class Retry(Loop):
             if not self.begin_iteration():
                 return Status.RUNNING
 
-    def _begin_wait(self, failure: Failure) -> Steps:
+    def _begin_delay(self, failure: Failure) -> Steps:
         """Report the next attempt, and return the steps of the delay before the attempt."""
         delay = 0.0 if self.backoff is None else self.backoff.compute_delay(self._attempt)
         self._attempt += 1
@@ -102,8 +103,9 @@ class Retry(Loop):
 
     def _tick_recovery(self, failure: Failure) -> Status:
         """Continue the delay, then tick `recover`; return SUCCESS if the next attempt may begin."""
-        if next(self._wait_steps, self) is not self:
-            self.was_running = True
+        # `next` returns None while the delay lasts.
+        if next(self._delay_steps, "end of the delay") is None:
+            self.has_tick_passed = True
             return Status.RUNNING
         if self.recover is None:
             return Status.SUCCESS
@@ -115,31 +117,29 @@ class Retry(Loop):
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends: body and recovery are entered in turn until no new state occurs."""
-        recovery: list[Flow] = []
-        retry_state: FlowState | None = None
 
         def is_retried(failure: PossibleFailure) -> bool:
             return not self.on or failure.may_match(self.on)
 
-        def get_next_entry(body: Flow) -> FlowState | None:
-            nonlocal retry_state
-            recovery.clear()
-            retried = (after.after_handling(one) for one, after in body.failures.items() if is_retried(one))
-            retry_state = join_states(retried) if self.attempts != 1 else None
-            if retry_state is None or self.recover is None:
-                return retry_state
-            recovery.append(flow_of(self.recover, retry_state))
-            return recovery[0].success
+        def compute_retry_state(body: Flow) -> FlowState | None:
+            ends = body.failures.items() if self.attempts != 1 else ()
+            return join_states(end.with_handled_failure(cause) for cause, end in ends if is_retried(cause))
 
-        body, _ = find_fixed_point(flow_of, self.do, state, get_next_entry)
-        given_up = join_states(after for flow in recovery for after in flow.failures.values())
+        def compute_recovery_flow(body: Flow) -> Flow:
+            retry_state = compute_retry_state(body)
+            if retry_state is None or self.recover is None:
+                return Flow(retry_state, {}, None)
+            return flow_of(self.recover, retry_state)
+
+        body, _ = find_fixed_point(flow_of, self.do, state, lambda flow: compute_recovery_flow(flow).success)
+        recovery = compute_recovery_flow(body)
+        failed_recovery = join_states(recovery.failures.values())
         failures = {
-            failure: after.join(given_up or after) if is_retried(failure) else after
-            for failure, after in body.failures.items()
+            failure: end.join(failed_recovery or end) if is_retried(failure) else end
+            for failure, end in body.failures.items()
         }
-        wait_state = retry_state if self.backoff else None
-        halted = join_states((body.halted, *(flow.halted for flow in recovery), wait_state))
-        return Flow(body.success, failures, halted)
+        delay_state = compute_retry_state(body) if self.backoff else None
+        return Flow(body.success, failures, join_states((body.halted, recovery.halted, delay_state)))
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of one attempt [s]."""
@@ -148,51 +148,49 @@ class Retry(Loop):
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
         """Yield a warning if nothing changes between the attempts, and if there is only one attempt."""
         skills = facts.list_skills()
-        if not self.backoff and skills and not any(one is None or one.senses or one.moves for one in skills):
+        may_change = any(skill is None or skill.senses or skill.moves for skill in skills)
+        if not self.backoff and skills and not may_change:
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
             hint = "Put a look or a motion into do or recover, or wait with backoff."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
-        # An attempt count from a param is not reported: the param may have another value in another run.
+        # A number of attempts from a param is no mistake: the param may have another value in another run.
         if self.attempts == 1 and facts.is_literal("attempts"):
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
     def explain_unreachable(self, child: Child) -> str:
         """Return the cause for which the recovery never runs; "" for the body."""
-        if child is not self.recover:
+        if child is not self.recover or (self.on and self.attempts > 1):
             return ""
-        return (
-            "there is only one attempt" if self.attempts == 1 else "" if self.on else "the body never fails"
-        )
+        return "there is only one attempt" if self.attempts == 1 else "the body never fails"
 
     def explain(self, failure: PropagatedFailure) -> str:
         """Return a text with the failures of all attempts."""
-        counts = dict(failure.handled_counts)
+        counts = Counter(failure.handled_counts)
         if self._has_recovery_failed(failure):
-            attempt, attempts = self.count_attempts(failure)
-            last = f"{failure.last_handled}: {failure.last_messages[failure.last_handled]}"
-            return f"gave up after attempt {attempt} of {attempts}: its recovery failed with {last}"
+            attempt, _ = self.count_attempts(failure)
+            cause = f"{failure.last_handled}: {failure.last_messages[failure.last_handled]}"
+            return f"gave up after attempt {attempt} of {self.attempts}: its recovery failed with {cause}"
         if self.on and not failure.is_one_of(self.on):
-            earlier = f"; failures before: {_format_counts(counts)}" if counts else ""
-            return f"runs again only after {format_reasons(self.on)}{earlier}"
-        counts[failure.reason] = counts.get(failure.reason, 0) + 1
+            earlier_failures = f"; failures before: {_format_counts(counts)}" if counts else ""
+            return f"runs again only after {format_reasons(self.on)}{earlier_failures}"
+        counts[failure.name] += 1
         if self.attempts == 1:
             return "has no second attempt"
         return f"all {self.attempts} attempts failed: {_format_counts(counts)}"
 
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int]:
         """Return the number of the failed attempt and the number of allowed attempts."""
-        # `handled_counts` contains every failed attempt except the last, and also a failed recovery.
-        return sum(failure.handled_counts.values()) + (
-            -1 if self._has_recovery_failed(failure) else 1
-        ), self.attempts
+        handled_count = sum(failure.handled_counts.values())
+        # The handled failures are all failed attempts but the last, or all failed attempts and the recovery.
+        return handled_count + (-1 if self._has_recovery_failed(failure) else 1), self.attempts
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
         """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
-        attempts = self.attempts
+        attempt, attempts = self.count_attempts(failure)
         if self._has_recovery_failed(failure):
             yield Advice(f"handle {failure.last_handled} in the recovery", child=self.recover)
-        elif (not self.on or failure.is_one_of(self.on)) and self.count_attempts(failure)[0] == attempts:
+        elif attempt == attempts and (not self.on or failure.is_one_of(self.on)):
             yield Advice(f"allow more than {attempts} attempt{'s' * (attempts > 1)}", "attempts")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
@@ -204,5 +202,5 @@ class Retry(Loop):
         return self.recover is not None and failure.has_child_failed(self.recover)
 
 
-def _format_counts(counts: dict[str, int]) -> str:
+def _format_counts(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count} x {reason}" for reason, count in counts.items())

@@ -20,22 +20,22 @@ class Sequence(ControlNode):
 
     def start(self) -> None:
         """Begin with the first child."""
-        self._next = 0
+        self._child_index = 0
 
     def step(self) -> Status:
-        """Tick the current child; continue with the next in the same tick."""
-        while self._next < len(self.do):
-            child = self.do[self._next]
+        """Tick the current child; after a success, tick the next child in the same tick."""
+        while self._child_index < len(self.do):
+            child = self.do[self._child_index]
             status = self.run_child(child)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
                 return self.fail(self.get_failure(child))
-            self._next += 1
+            self._child_index += 1
         return Status.SUCCESS
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; each child is entered in the state after the success of the previous."""
+        """Return the possible ends; each child is entered after success of the previous child."""
         failures: dict[PossibleFailure, FlowState] = {}
         halted = None
         entry: FlowState | None = state
@@ -52,7 +52,7 @@ class Sequence(ControlNode):
         return sum(map(min_time_of, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause: an earlier child cannot succeed."""
+        """Return the cause: a child before `child` cannot succeed."""
         del child
         return "an earlier child never succeeds"
 

@@ -26,21 +26,21 @@ class SkillRun:
     def __init__(self, skill: Skill, cell: Cell) -> None:
         self.skill = skill
         self._cell = cell
-        self._steps: Iterator[object] | None = None
+        self._generator: Iterator[object] | None = None
 
     def step(self) -> bool:
-        """Advance the skill by one step; return True if the skill has succeeded. The first call starts it.
+        """Start the skill, or advance the skill by one step; return True if the skill has succeeded.
 
         Raises:
             SkillFailed: The skill failed with a declared reason.
             Fault: The skill failed with an undeclared reason, yielded a value, or left an output unset.
         """
         try:
-            if self._steps is None:
-                # A `run` without `yield` is a plain function, which is complete when it returns.
-                self._steps = iter(self.skill.run(self._cell) or ())
+            if self._generator is None:
+                # A `run` without `yield` is a plain function: the skill succeeds when the function returns.
+                self._generator = iter(self.skill.run(self._cell) or ())
             # At the end of the generator, `next` returns `self`, which a skill cannot yield.
-            yielded = next(self._steps, self)
+            yielded = next(self._generator, self)
         except SkillFailed as failed:
             if failed.reason in self.skill.reasons:
                 raise
@@ -52,12 +52,12 @@ class SkillRun:
         if yielded is not self:
             name = type(yielded).__name__
             raise Fault(f'it yielded a {name}; to run the steps of another generator, write "yield from"')
-        if unset := [name for name in self._output_names if not hasattr(self.skill, name)]:
-            raise Fault(f"it succeeded without setting its output {', '.join(unset)}")
+        if unset_outputs := [name for name in self._output_names if not hasattr(self.skill, name)]:
+            raise Fault(f"it succeeded without setting its output {', '.join(unset_outputs)}")
         return True
 
     def read_outputs(self) -> dict[str, object]:
-        """Return the values of all outputs by name; called after success, when all outputs are set."""
+        """Return the values of all outputs by name; only allowed after success."""
         return {name: getattr(self.skill, name) for name in self._output_names}
 
     def halt(self) -> None:
@@ -66,10 +66,10 @@ class SkillRun:
         Raises:
             Fault: The skill raised or yielded during its `finally`.
         """
-        if not isinstance(self._steps, Generator):
+        if not isinstance(self._generator, Generator):
             return
         try:
-            self._steps.close()
+            self._generator.close()
         except Exception as error:
             message = f"{type(error).__name__} while it was halted: {error}"
             if isinstance(error, RuntimeError) and "GeneratorExit" in str(error):

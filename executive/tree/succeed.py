@@ -10,7 +10,7 @@ from executive.tree.node import ControlNode
 
 
 class Succeed(ControlNode):
-    """Succeed however the body ends; without a body, succeed at once."""
+    """Succeed after success and failure of the body; without a body, succeed at once."""
 
     keyword = "succeed"
     symbol = "✓"
@@ -30,5 +30,5 @@ class Succeed(ControlNode):
         """Return the possible ends: success after every end of the body."""
         if self.do is None:
             return Flow(state, {}, None)
-        body = flow_of(self.do, state)
-        return Flow(join_states((body.success, *body.failures.values())), {}, body.halted)
+        flow = flow_of(self.do, state)
+        return Flow(join_states((flow.success, *flow.failures.values())), {}, flow.halted)

@@ -13,13 +13,13 @@ from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
 CLOCK_TOLERANCE = 0.005
-"""Maximum time by which a wait may end too early [s]: half a control period."""
+"""Maximum time by which `Clock.sleep` ends too early [s]: half of a control step of 10 ms."""
 
 
 class Timeout(ControlNode):
     """Fail with the reason `timeout` if the body takes longer than a limit on the clock of the run.
 
-    A body that ends in the tick in which the limit is reached does not exceed the limit.
+    A body that ends in the tick in which the clock reaches the limit does not exceed the limit.
     """
 
     keyword = "timeout"
@@ -51,11 +51,11 @@ class Timeout(ControlNode):
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends of the body, and the timeout if the body can take more than one tick."""
-        body = flow_of(self.do, state)
-        failures = dict(body.failures)
-        if body.halted is not None:
-            failures[PossibleFailure(self.keyword, "timeout", self.path)] = body.halted
-        return Flow(body.success, failures, body.halted)
+        flow = flow_of(self.do, state)
+        failures = dict(flow.failures)
+        if flow.halted is not None:
+            failures[PossibleFailure(self.keyword, "timeout", self.path)] = flow.halted
+        return Flow(flow.success, failures, flow.halted)
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
         """Return the minimum time of the body [s]."""
@@ -69,8 +69,9 @@ class Timeout(ControlNode):
         message = f"timeout.seconds is {self.seconds:g} s, but its body takes at least {body_time:.2f} s"
         skill_times = [(name, time) for name, time in facts.list_skill_times(self.do) if time > 0]
         hint = f"Minimum times: {', '.join(f'{name} {time:.2f} s' for name, time in skill_times)}."
-        is_sum = abs(sum(time for _, time in skill_times) - body_time) <= 1e-9
-        yield NodeFinding("seconds", "short-timeout", message, hint if is_sum else "")
+        # In a fallback or a parallel, the minimum times of the skills do not explain their sum.
+        has_hint = abs(sum(time for _, time in skill_times) - body_time) <= 1e-9
+        yield NodeFinding("seconds", "short-timeout", message, hint if has_hint else "")
 
     @property
     def first_child(self) -> Child | None:

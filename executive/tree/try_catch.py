@@ -25,11 +25,11 @@ class Catch(KeySection):
     """A handler of failures."""
 
     on: Reasons = key(doc="Failures after which the handler runs.")
-    do: Child = key(doc="Node to run after such a failure.")
+    do: Child = key(doc="Node to run after one of the failures in `on`.")
 
 
 class TryCatch(ControlNode):
-    """Run a body, a handler if the body fails, and the child `finally` at the end.
+    """Run a body, a handler if the body fails, and `finally` at the end.
 
     The node succeeds if the body or the handler succeeds. `finally` runs after success and failure, but not
     after a halt or a fault. A failure of `finally` is passed on unless the body or the handler failed too.
@@ -50,31 +50,30 @@ class TryCatch(ControlNode):
     )
 
     def describe_trigger(self, child: Child) -> str:
-        """Return a text with the failures after which a handler runs: `on Grasp.missed`."""
+        """Return a text with the failures after which the handler `child` runs: `on Grasp.missed`."""
         return next((f"on {format_reasons(handler.on)}" for handler in self.catch if handler.do is child), "")
 
     def start(self) -> None:
         """Begin with the body."""
-        self._current = self.do
+        self._current_child = self.do
         self._pending_failure: Failure | None = None
 
     def step(self) -> Status:
-        """Tick the current child; continue with the next in the same tick."""
+        """Tick the current child; after its end, tick the next child in the same tick."""
         while True:
-            current = self._current
-            status = self.run_child(current)
+            child = self._current_child
+            status = self.run_child(child)
             if status is Status.RUNNING:
                 return status
-            failure = self.get_failure(current) if status is Status.FAILURE else None
-            if current is self.finally_:
-                # The failure of body or handler explains more than a failure of `finally`.
+            failure = self.get_failure(child) if status is Status.FAILURE else None
+            if child is self.finally_:
                 return self._end_with(self._pending_failure or failure)
-            if failure is not None and current is self.do and (handler := self._find_handler(failure)):
+            if failure is not None and child is self.do and (handler := self._find_handler(failure)):
                 self.report_choice("catch", failure)
-                self._current = handler
+                self._current_child = handler
             elif self.finally_ is not None:
                 self._pending_failure = failure
-                self._current = self.finally_
+                self._current_child = self.finally_
             else:
                 return self._end_with(failure)
 
@@ -90,25 +89,24 @@ class TryCatch(ControlNode):
         Each handler is entered in the states after the failures that it handles, `finally` in all end states.
         """
         body = flow_of(self.do, state)
-        success, halted = body.success, body.halted
-        failures = dict(body.failures)
-        earlier: list[Reason] = []
-        for catch in self.catch:
-            caught = {
-                failure: after
-                for failure, after in body.failures.items()
-                if failure.may_match(catch.on) and not failure.must_match(earlier)
+        success, halted, failures = body.success, body.halted, dict(body.failures)
+        earlier_reasons: list[Reason] = []
+        for handler in self.catch:
+            handled = {
+                failure: end.with_handled_failure(failure)
+                for failure, end in body.failures.items()
+                if failure.may_match(handler.on) and not failure.must_match(earlier_reasons)
             }
-            earlier += catch.on
-            entry = join_states(after.after_handling(failure) for failure, after in caught.items())
+            earlier_reasons += handler.on
+            entry = join_states(handled.values())
             if entry is None:
                 continue
-            for failure in caught:
-                if failure.must_match(catch.on):
+            for failure in handled:
+                if failure.must_match(handler.on):
                     failures.pop(failure, None)
-            handler = flow_of(catch.do, entry)
-            success, halted = join_states((success, handler.success)), join_states((halted, handler.halted))
-            failures.update(handler.failures)
+            flow = flow_of(handler.do, entry)
+            success, halted = join_states((success, flow.success)), join_states((halted, flow.halted))
+            failures.update(flow.failures)
         flow = Flow(success, failures, halted)
         return flow if self.finally_ is None else _append_finally(self.finally_, flow, flow_of)
 
@@ -118,16 +116,18 @@ class TryCatch(ControlNode):
         return fastest + (min_time_of(self.finally_) if self.finally_ else 0.0)
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
-        """Yield a warning for every failure name of a handler whose failures earlier names catch already."""
+        """Yield a warning for every reason of a handler whose failures earlier reasons catch already."""
         body = facts.get_flow(self.do)
-        earlier: list[Reason] = []
-        for reason in [reason for handler in self.catch for reason in handler.on] if body else ():
-            matching = [failure for failure in body.failures if failure.may_match([reason])] if body else []
-            if matching and all(failure.must_match(earlier) for failure in matching):
-                first = next(name for name in earlier if matching[0].must_match([name]))
-                message = f"{reason} is caught already, as {first} in {facts.describe_place(first, reason)}"
+        failures = () if body is None else body.failures
+        earlier_reasons: list[Reason] = []
+        for reason in [reason for handler in self.catch for reason in handler.on]:
+            matching = [failure for failure in failures if failure.may_match([reason])]
+            if matching and all(failure.must_match(earlier_reasons) for failure in matching):
+                catching = next(earlier for earlier in earlier_reasons if matching[0].must_match([earlier]))
+                place = facts.describe_place(catching, reason)
+                message = f"{reason} is caught already, as {catching} in {place}"
                 yield NodeFinding(reason, "unreachable", message, is_warning=True)
-            earlier.append(reason)
+            earlier_reasons.append(reason)
 
     @property
     def first_child(self) -> Child | None:
@@ -139,8 +139,8 @@ class TryCatch(ControlNode):
         if failure.child is self.finally_:
             return "the child finally failed"
         if failure.child is not self.do:
-            caught = failure.last_handled
-            return f"caught {caught} ({failure.last_messages.get(caught, '')}), but the handler failed"
+            name = failure.last_handled
+            return f"caught {name} ({failure.last_messages.get(name, '')}), but the handler failed"
         reasons = [reason for handler in self.catch for reason in handler.on]
         return f"catches only {format_reasons(reasons)}" if reasons else "has no catch"
 
@@ -150,7 +150,7 @@ class TryCatch(ControlNode):
             yield Advice("catch this failure in the try")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield the handlers and `finally`, each after its name in reports."""
+        """Yield the handlers, each after a name such as `catch on Grasp.missed`, and `finally`."""
         for handler in self.catch:
             yield f"catch on {format_reasons(handler.on)}", handler.do
         if self.finally_ is not None:
@@ -162,11 +162,13 @@ def _append_finally(finally_child: Child, flow: Flow, flow_of: FlowFunction) -> 
     success, halted = None, flow.halted
     failures: dict[PossibleFailure, FlowState] = {}
     if flow.success is not None:
-        end = flow_of(finally_child, flow.success)
-        success, halted = end.success, join_states((halted, end.halted))
-        failures.update(end.failures)
-    for failure, after in flow.failures.items():
-        end = flow_of(finally_child, after)
-        halted = join_states((halted, end.halted))
-        failures[failure] = join_states((end.success, *end.failures.values())) or after
+        finally_flow = flow_of(finally_child, flow.success)
+        success, halted = finally_flow.success, join_states((halted, finally_flow.halted))
+        failures.update(finally_flow.failures)
+    for failure, entry in flow.failures.items():
+        finally_flow = flow_of(finally_child, entry)
+        halted = join_states((halted, finally_flow.halted))
+        # The node passes on `failure` after success and failure of `finally`.
+        ends = (finally_flow.success, *finally_flow.failures.values())
+        failures[failure] = join_states(ends) or entry
     return Flow(success, failures, halted)

@@ -27,43 +27,40 @@ class While(Loop):
     def start(self) -> None:
         """Begin with the condition."""
         super().start()
-        self._current = self.condition
+        self._current_child = self.condition
 
     def step(self) -> Status:
-        """Tick the current child; begin an iteration in the same tick if the last one took a tick or more."""
+        """Tick the current child; begin the next iteration in this tick if `begin_iteration` allows it."""
         while True:
-            current = self._current
-            status = self.run_iteration(current)
+            child = self._current_child
+            status = self.run_iteration(child)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
-                failure = self.get_failure(current)
-                if current is self.do:
+                failure = self.get_failure(child)
+                if child is self.do:
                     return self.fail(failure)
                 self.report_choice("done", failure)
                 return Status.SUCCESS
-            if current is self.condition:
-                self._current = self.do
+            if child is self.condition:
+                self._current_child = self.do
             else:
-                self._current = self.condition
+                self._current_child = self.condition
                 if not self.begin_iteration():
                     return Status.RUNNING
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends: condition and body are entered in turn until no new state occurs."""
-        body: list[Flow] = []
 
-        def get_next_entry(condition: Flow) -> FlowState | None:
-            body.clear()
-            if condition.success is None:
-                return None
-            body.append(flow_of(self.do, condition.success))
-            return body[0].success
+        def compute_body_flow(condition: Flow) -> Flow:
+            return flow_of(self.do, condition.success) if condition.success else Flow(None, {}, None)
 
-        condition, entry = find_fixed_point(flow_of, self.condition, state, get_next_entry)
-        failures = {failure: after for flow in body for failure, after in flow.failures.items()}
-        halted = join_states((condition.halted, entry, *(flow.halted for flow in body)))
-        return Flow(join_states(condition.failures.values()), failures, halted)
+        condition, entry = find_fixed_point(
+            flow_of, self.condition, state, lambda flow: compute_body_flow(flow).success
+        )
+        body = compute_body_flow(condition)
+        halted = join_states((condition.halted, entry, body.halted))
+        return Flow(join_states(condition.failures.values()), body.failures, halted)
 
     def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
         """Yield an error if the loop never ends because its condition cannot fail."""

@@ -47,7 +47,7 @@ class Witness:
         entry = self._flow.entry_states.get(path)
         if entry is None:
             self._broken.append(f"{path} runs, which the check says it never does")
-        elif missing := [f"${name}" for name in entry.written or () if name not in self._scope]:
+        elif missing := [f"${name}" for name in entry.written_variables or () if name not in self._scope]:
             self._broken.append(
                 f"{path} begins without {', '.join(missing)}, which the check says are written"
             )

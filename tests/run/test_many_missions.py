@@ -81,7 +81,7 @@ def loaded(name: str) -> LoadedMission:
 def variables(root: Behaviour) -> list[dict[str, Any]]:
     """Return the variables of every blackboard of a tree."""
     leaves = (node for node in root.iterate() if isinstance(node, SkillLeaf))
-    scopes = {id(leaf._blackboard): leaf._blackboard for leaf in leaves}
+    scopes = {id(leaf.blackboard): leaf.blackboard for leaf in leaves}
     return [to_json(scope) for scope in scopes.values()]
 
 

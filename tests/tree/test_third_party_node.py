@@ -24,7 +24,9 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
-from executive.tree.flow import Flow, FlowFunction, FlowState, combine_tools, find_tools_at_end, join_states
+from executive.tree.flow import (
+    Flow, FlowFunction, FlowState, combine_tool_states, find_end_tool_states, join_states
+)
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
@@ -59,12 +61,13 @@ class Race(ControlNode):
 
     def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
         flows = [flow_of(child, state) for child in self.do]
-        ends = [find_tools_at_end(flow, state, may_be_halted=True) for flow in flows]
-        tools = combine_tools(state.tools, ends)
+        ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
+        tools = combine_tool_states(state.tool_states, ends)
         success = join_states(flow.success for flow in flows)
         halted = join_states(flow.halted for flow in flows)
-        failures = {one: after.with_tools(tools) for flow in flows for one, after in flow.failures.items()}
-        return Flow(success and success.with_tools(tools), failures, halted and halted.with_tools(tools))
+        success, halted = (end and end.with_tool_states(tools) for end in (success, halted))
+        ends = [end for flow in flows for end in flow.failures.items()]
+        return Flow(success, {failure: end.with_tool_states(tools) for failure, end in ends}, halted)
 
     def min_time(self, min_time_of: MinTimeFunction) -> float:
         return min(min_time_of(child) for child in self.do)

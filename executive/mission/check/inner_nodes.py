@@ -18,7 +18,7 @@ from executive.skill import Skill
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow
 from executive.tree.inspection import NodeFinding
-from executive.tree.keys import Child, Key, Kind
+from executive.tree.keys import Child, Key, KeyKind
 
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:
@@ -35,10 +35,12 @@ def _check_keys(context: CheckContext, owner: InnerNode | SectionNode, name: str
             for item in value:
                 if isinstance(item, SectionNode):
                     yield from _check_keys(context, item, key.name)
-        elif key.kind is Kind.CONSTANT:
+        elif key.kind is KeyKind.CONSTANT:
             max_value = find_upper_bound(owner, key)
             yield from _check_constant(context, f"{name}.{key.name}", key, value, max_value)
-        elif key.kind is Kind.ELEMENTS and isinstance(value, Literal) and not isinstance(value.value, list):
+        elif (
+            key.kind is KeyKind.ELEMENTS and isinstance(value, Literal) and not isinstance(value.value, list)
+        ):
             description = f"{describe_value(value.value)}{value.origin_note}"
             message = f"{name}.{key.name} must be a list or a variable, not {description}"
             is_written_text = isinstance(value.value, str) and not value.origin

@@ -39,9 +39,9 @@ def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
             # The check of settings reports this error.
             return 0.0
     state = context.flow_analysis.entry_states.get(node.path)
-    tools = state.tools if state else None
+    tools = state.tool_states if state else None
     needs_object = skill.tool_state[0] is HOLDING
-    starts_anywhere = needs_object and (tools is None or any(tool.is_arm_moved for tool in tools))
+    starts_anywhere = needs_object and (tools is None or any(tool.has_arm_moved for tool in tools))
     # The time of a transport has a bound only if it starts where an object was grasped.
     min_times = _TimesFromAnywhere(context.min_times) if starts_anywhere else context.min_times
     return skill.min_time(min_times, values)

@@ -98,8 +98,9 @@ def _find_inputs(context: CheckContext, branch: Node) -> Iterator[tuple[Node, st
             continue
         for reference in find_control_node_inputs(node):
             yield node, get_type_name(node), reference.name, reference.mark
+        written = state.written_variables
         for wire in context.find_wires(node, Direction.IN):
-            if state.written is None or wire.variable in state.written or not wire.port.is_required:
+            if written is None or wire.variable in written or not wire.port.is_required:
                 yield node, str(wire), wire.variable, wire.mark
 
 

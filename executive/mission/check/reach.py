@@ -75,5 +75,5 @@ def _explain_tool_state(flow: FlowAnalysis, tool: PossibleToolState, mark: Mark)
     if cause is None:
         return f"No object has been grasped before{after}."
     name = cause.skill if isinstance(cause, SkillNode) else "the node"
-    state = "may hold an object" if tool.tool is HOLDING else "may be empty"
+    state = "may hold an object" if tool.state is HOLDING else "may be empty"
     return f"The tool {state} since {name} in {cause.mark.describe_place(mark.source)}{after}."

@@ -12,7 +12,7 @@ from executive.mission.model.nodes import InnerNode, Node, SectionNode, SkillNod
 from executive.mission.model.values import FailureName
 from executive.mission.source import Mark
 from executive.tree.flow import UNKNOWN_NAME, PossibleFailure
-from executive.tree.keys import Key, Kind
+from executive.tree.keys import Key, KeyKind
 
 
 def check_labels(context: CheckContext) -> Iterator[Finding]:
@@ -21,8 +21,8 @@ def check_labels(context: CheckContext) -> Iterator[Finding]:
     # Paths contain keywords and keys, so a label must differ from all of them.
     reserved_words = {grammar.USE_KEYWORD, *context.node_classes}
     for node_class in context.node_classes.values():
-        keys = node_class.keys.values()
-        reserved_words |= {key.name for key in keys if key.kind in (Kind.NODE, Kind.NODES, Kind.SECTIONS)}
+        keys, kinds = node_class.keys.values(), (KeyKind.NODE, KeyKind.NODES, KeyKind.SECTIONS)
+        reserved_words |= {key.name for key in keys if key.kind in kinds}
     for node in context.iterate_nodes():
         if not node.label:
             continue

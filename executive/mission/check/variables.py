@@ -58,7 +58,7 @@ def _find_unwritten(context: CheckContext, in_libraries: bool) -> Iterator[Input
     mission_source = context.tree.mark.source
     for node, input_name, variable, mark in _iterate_inputs(context, context.tree):
         state = context.flow_analysis.entry_states.get(node.path)
-        if state is None or state.written is None or variable in state.written:
+        if state is None or state.written_variables is None or variable in state.written_variables:
             continue
         is_in_library = node.path in context.library_uses_by_path and mark.source is not mission_source
         if is_in_library is in_libraries:
@@ -117,7 +117,7 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
             continue
         subtree = context.mission.trees[use.name]
         end_state = context.flow_analysis.body_end_states.get(use.path)
-        if end_state is None or end_state.written is None:
+        if end_state is None or end_state.written_variables is None:
             continue
         written = find_written_variables(use.body, context.skills)
         returns = (subtree.returns or {}).items()
@@ -127,7 +127,7 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
                 names = sorted(each.rpartition(".")[2] for each in written)
                 hint = list_choices(name, names, "Variables that it writes")
                 yield make_error(mark, "unwritten", f"{message} no node in it writes", hint)
-            elif variable not in end_state.written:
+            elif variable not in end_state.written_variables:
                 hint = f"It is written by {_describe_writers(context, variable, mark)}."
                 yield make_error(mark, "unwritten", f"{message} it does not write on every path", hint)
 

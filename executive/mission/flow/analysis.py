@@ -16,15 +16,13 @@ from executive.mission.model.wiring import find_wires
 from executive.skill import Direction, Skill
 from executive.tree.flow import (
     INITIAL_STATE,
-    UNKNOWN,
     UNKNOWN_NAME,
+    UNKNOWN_STATE,
     Flow,
     FlowState,
     PossibleFailure,
-    apply_precondition,
-    get_tools_after_failure,
-    get_tools_after_success,
     join_states,
+    make_unknown_flow,
 )
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
@@ -84,8 +82,8 @@ class FlowAnalysis:
                 return self._compute_use_flow(node, body, state)
         for part in node.children:
             # The states in which the mission would enter the parts of an unknown node are unknown, too.
-            self._analyse(part, UNKNOWN)
-        return Flow(UNKNOWN, {PossibleFailure(UNKNOWN_NAME, UNKNOWN_NAME, node.path): UNKNOWN}, UNKNOWN)
+            self._analyse(part, UNKNOWN_STATE)
+        return make_unknown_flow(UNKNOWN_NAME, node.path)
 
     def _analyse_child(self, child: Child, state: FlowState) -> Flow:
         return self._analyse(get_mission_node(child), state)
@@ -93,15 +91,15 @@ class FlowAnalysis:
     def _compute_skill_flow(self, node: SkillNode, state: FlowState) -> Flow:
         skill = self.find_skill(node.skill)
         if skill is None:
-            return Flow(UNKNOWN, {PossibleFailure(node.skill, UNKNOWN_NAME, node.path): UNKNOWN}, UNKNOWN)
+            return make_unknown_flow(node.skill, node.path)
         before, after = skill.tool_state
-        state = state.with_tools(apply_precondition(state.tools, before, node.path))
+        state = state.apply_precondition(before, node.path)
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
-        end = state.after_motion() if skill.moves else state
-        success = end.with_variables(outputs).with_tools(get_tools_after_success(end.tools, after, node.path))
+        end = state.with_arm_moved() if skill.moves else state
+        success = end.with_variables(outputs).apply_success(after, node.path)
 
         def compute_end_state(reason: str) -> FlowState:
-            return end.with_tools(get_tools_after_failure(end.tools, skill.tool_left.get(reason), node.path))
+            return end.apply_failure(skill.tool_left.get(reason), node.path)
 
         failures = {
             PossibleFailure(node.skill, reason, node.path): compute_end_state(reason)

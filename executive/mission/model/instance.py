@@ -15,7 +15,7 @@ from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.nodes import InnerNode, KeyValue, Node, SectionNode, list_nodes
 from executive.mission.model.values import FailureName, Literal, LocatedName
 from executive.tree.blackboard import Blackboard
-from executive.tree.keys import Child, Key, Kind, VariableName
+from executive.tree.keys import Child, Key, KeyKind, VariableName
 from executive.tree.node import ControlNode, NodeContext
 
 BuildChild = Callable[[Node], Child]
@@ -63,7 +63,7 @@ def has_valid_constants(node: InnerNode) -> bool:
     for key in node.declaring_class.keys.values():
         given = node.values.get(key.name)
         value = given.value if isinstance(given, Literal) else None
-        if key.kind is Kind.CONSTANT and (given is not None or key.is_required):
+        if key.kind is KeyKind.CONSTANT and (given is not None or key.is_required):
             try:
                 convert_constant(key, value, find_upper_bound(node, key))
             except WrongType:
@@ -98,10 +98,10 @@ def _make_attribute(
         )
     if isinstance(value, LocatedName):
         return VariableName(value.name)
-    if key.kind is Kind.ELEMENTS:
+    if key.kind is KeyKind.ELEMENTS:
         elements = value.value if isinstance(value, Literal) else None
         return tuple(elements) if isinstance(elements, list) else VariableName(getattr(value, "name", ""))
-    if key.kind is not Kind.CONSTANT:
+    if key.kind is not KeyKind.CONSTANT:
         return ()
     constant = value.value if isinstance(value, Literal) else None
     try:

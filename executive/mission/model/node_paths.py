@@ -19,7 +19,7 @@ from executive.mission.model.nodes import (
     UseNode,
     iterate_keys,
 )
-from executive.tree.keys import Kind
+from executive.tree.keys import KeyKind
 
 
 def assign_paths(root: Node) -> Node:
@@ -78,7 +78,7 @@ def _assign_value_paths(
             value = _assign_path(value, path, slot if key.is_in_path or _is_list(value) else "")
         elif isinstance(value, SectionNode):
             value = replace(value, values=_assign_value_paths(value, path, slot))
-        elif isinstance(value, tuple) and key.kind is Kind.NODES:
+        elif isinstance(value, tuple) and key.kind is KeyKind.NODES:
             value = _assign_list_paths(tuple(item for item in value if isinstance(item, Node)), path)
         elif isinstance(value, tuple):
             value = tuple(

@@ -9,7 +9,7 @@ from executive.mission.model.nodes import InnerNode, Node, SkillNode, iterate_ke
 from executive.mission.model.values import Literal, LocatedName, Reference
 from executive.mission.source import Mark
 from executive.skill import Direction, Port, Skill
-from executive.tree.keys import Key, Kind
+from executive.tree.keys import Key, KeyKind
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def find_control_node_inputs(node: Node) -> Iterator[Reference]:
     """Yield the variables that a control node reads as lists of elements."""
     if isinstance(node, InnerNode):
         for key, value in iterate_keys(node):
-            if key.kind is Kind.ELEMENTS and isinstance(value, Reference):
+            if key.kind is KeyKind.ELEMENTS and isinstance(value, Reference):
                 yield value
 
 

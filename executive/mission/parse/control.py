@@ -12,7 +12,7 @@ from executive.mission.model.values import LocatedName
 from executive.mission.parse.fields import NAME_PATTERN, Fields, read_value
 from executive.mission.source import Mark
 from executive.mission.text import yaml_text as yaml
-from executive.tree.keys import Key, Kind
+from executive.tree.keys import Key, KeyKind
 from executive.tree.keys import KeySection as DeclaredSection
 from executive.tree.node import ControlNode
 
@@ -69,9 +69,9 @@ def read_control_node(parser: NodeParser, entry: ControlEntry, node_class: type[
         listed = " or ".join(f'"{name}"' for name in any_of)
         parser.add_error(mark, "missing-key", f"{keyword} needs {listed}{level}")
     missing = [key.kind for name, key in node_class.keys.items() if key.is_required and name not in values]
-    if Kind.NODES in missing:
+    if KeyKind.NODES in missing:
         return make_unknown_node(mark)
-    if Kind.VARIABLE in missing or Kind.ELEMENTS in missing:
+    if KeyKind.VARIABLE in missing or KeyKind.ELEMENTS in missing:
         children = [node for value in values.values() for node in model.list_nodes(value)]
         return model.UnknownNode(mark, entry.label, tuple(children))
     return model.InnerNode(mark, entry.label, node_class, values)
@@ -100,7 +100,7 @@ class _KeyReader:
         """Return the values of the keys of `owner` in `value`, which is the value of the key `name`."""
         values: dict[str, KeyValue] = {}
         shorthand, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
-        is_list_expected = shorthand is not None and shorthand.kind is Kind.NODES
+        is_list_expected = shorthand is not None and shorthand.kind is KeyKind.NODES
         is_short = isinstance(value, yaml.YamlSequence) if is_list_expected else shorthand is not None
         is_mapping = isinstance(value, yaml.YamlMapping)
         if shorthand is not None and (not inner_keys or (is_short and not is_mapping)):
@@ -115,7 +115,7 @@ class _KeyReader:
             given = fields.require(key.name) if key.is_required else fields.get(key.name)
             if given is not None:
                 self.read_key(fields, key, given, fields.get_key_mark(key.name), values)
-            elif key.kind is Kind.NODE and key.is_required:
+            elif key.kind is KeyKind.NODE and key.is_required:
                 values[key.name] = make_unknown_node(mark)
         return values
 
@@ -129,19 +129,19 @@ class _KeyReader:
 
     def _read_value(self, fields: Fields, key: Key, node: yaml.YamlNode, mark: Mark) -> KeyValue | None:
         match key.kind:
-            case Kind.NODE:
+            case KeyKind.NODE:
                 is_empty = isinstance(node, yaml.YamlScalar) and node.value is None
                 is_omitted = is_empty and key.is_shorthand and not key.is_required
                 return None if is_omitted else self.parser.read_node(node, mark)
-            case Kind.NODES:
+            case KeyKind.NODES:
                 return self._read_nodes(fields, key, node)
-            case Kind.REASONS:
+            case KeyKind.REASONS:
                 return fields.read_failure_names(key.name)
-            case Kind.VARIABLE:
+            case KeyKind.VARIABLE:
                 return self._read_variable(fields, key.name)
-            case Kind.SECTION:
+            case KeyKind.SECTION:
                 return self._read_section(key, node, mark)
-            case Kind.SECTIONS:
+            case KeyKind.SECTIONS:
                 return tuple(self._read_sections(key, node))
         return read_value(node, self.parser.findings)
 
@@ -166,8 +166,9 @@ class _KeyReader:
     def _read_section(self, key: Key, value: yaml.YamlNode, mark: Mark) -> model.SectionNode | None:
         """Return the section below a key, or None if it lacks a required constant."""
         values = self.read_inner_keys(key.name, mark, value, key.section)
-        constants = [k.name for k in key.section.keys.values() if k.is_required and k.kind is Kind.CONSTANT]
-        return model.SectionNode(key.section, mark, values) if values.keys() >= set(constants) else None
+        required_keys = [inner for inner in key.section.keys.values() if inner.is_required]
+        has_constants = all(inner.name in values for inner in required_keys if inner.kind is KeyKind.CONSTANT)
+        return model.SectionNode(key.section, mark, values) if has_constants else None
 
     def _read_sections(self, key: Key, value: yaml.YamlNode) -> Iterable[model.SectionNode]:
         """Yield the sections of a list, or a single section."""

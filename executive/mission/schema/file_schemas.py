@@ -22,7 +22,7 @@ from executive.mission.schema.types import (
     make_settings_schema,
 )
 from executive.skill import Skill
-from executive.tree.keys import Key, Kind
+from executive.tree.keys import Key, KeyKind
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import ControlNodes
 
@@ -149,22 +149,22 @@ def _make_key_schema(key: Key) -> Json:
 def _make_value_schema(key: Key) -> Json:
     """Return the schema of the value of a key of a control node."""
     match key.kind:
-        case Kind.NODE:
+        case KeyKind.NODE:
             node = _make_reference("node")
             may_be_empty = key.is_shorthand and not key.is_required
             return {"allOf": [{"anyOf": [node, {"type": "null"}]}]} if may_be_empty else node
-        case Kind.NODES:
+        case KeyKind.NODES:
             return _SCHEMAS_BY_KIND["nodes"]
-        case Kind.REASONS:
+        case KeyKind.REASONS:
             return _make_reference("reasons")
-        case Kind.VARIABLE:
+        case KeyKind.VARIABLE:
             return _SCHEMAS_BY_KIND["word"]
-        case Kind.ELEMENTS:
+        case KeyKind.ELEMENTS:
             return _SCHEMAS_BY_KIND["list"]
-        case Kind.SECTIONS:
+        case KeyKind.SECTIONS:
             section = _make_section_schema(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}
-        case Kind.SECTION:
+        case KeyKind.SECTION:
             section, shorthand = _make_section_schema(key.section.keys), find_shorthand_key(key.section)
             if shorthand is None:
                 return section
