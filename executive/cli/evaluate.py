@@ -95,7 +95,7 @@ def command(
         from executive.cli.cells import find_cell, load_cells
         from executive.cli.progress import report_polygons, show_progress
         from executive.training.evaluation.worst_mistakes import WorstMistakes
-        from executive.view.figures.detector_figures import print_metrics
+        from executive.view.results.detector_results import print_metrics
 
         worst, scenes = WorstMistakes(), evaluation.SceneSettings(images, seed, varied, view, workers, scene)
         names = cells or (() if dataset else ("overhead",))

@@ -58,7 +58,7 @@ def command(
         from executive.campaign.faults.trial import record_trial
         from executive.campaign.mission_under_test import load_mission_under_test
         from executive.cli.progress import print_halt, show_progress
-        from executive.view.figures.fault_figures import (
+        from executive.view.results.fault_results import (
             format_results,
             format_trial,
             results_to_json,

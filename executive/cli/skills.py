@@ -64,7 +64,7 @@ def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool
     for name, skill in skills.items():
         with keep_stdout_clean():
             from executive.testing.conformance import list_conformance_checks
-            from executive.view.figures.conformance_figures import format_verdict_counts, format_verdicts
+            from executive.view.results.conformance_results import format_verdict_counts, format_verdicts
 
             skill_verdicts = [check.run() for check in list_conformance_checks(skill, name=name)]
         if not as_json:

@@ -60,7 +60,7 @@ def command(
         elif as_json:
             shown = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
         else:
-            shown = draw_outline(nodes, ports=ports, reasons=reasons)
+            shown = draw_outline(nodes, shows_ports=ports, shows_reasons=reasons)
     (print_json if as_json else click.echo)(shown)
 
 

@@ -1,4 +1,4 @@
-"""Text in drawings and pages: estimated length, truncation, and templates with escaping."""
+"""Functions for texts in drawings and pages: width estimate, line breaks, and templates."""
 
 from __future__ import annotations
 
@@ -9,33 +9,39 @@ import unicodedata
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 _INVALID_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-# Advance widths [fraction of the font size] of characters in DejaVu Sans, the widest common sans-serif font.
-_ADVANCES = {
+"""Pattern of the characters that XML 1.0 does not allow."""
+_CHARACTERS_BY_WIDTH = {
     0.36: "ijlIJ',./:;\\| ",
     0.42: "frt!()-[]",
     0.54: 'csz"*?_`',
     0.85: "wDGHOQ#&+<=>^~MNU",
     1.0: "mW%@",
 }
-_ADVANCE = {character: advance for advance, characters in _ADVANCES.items() for character in characters}
-_DEFAULT_ADVANCE = 0.64
+"""Characters by their width in DejaVu Sans, the widest common sans-serif font [fraction of the font size]."""
+_RELATIVE_WIDTHS = {
+    character: width for width, characters in _CHARACTERS_BY_WIDTH.items() for character in characters
+}
+_DEFAULT_WIDTH, _EAST_ASIAN_WIDTH = 0.64, 1.05
+"""Widths of other characters, and of wide East Asian characters [fraction of the font size]."""
 _BOLD_FACTOR = 1.12
+"""Ratio of the widths of a bold and a regular character."""
 
 
-def measure_text(text: str, size: float, *, bold: bool = False) -> float:
-    """Return an upper bound of the width [pixel] of a text in a sans-serif font; `size` is in pixels."""
-    advances = sum(
-        1.05 if unicodedata.east_asian_width(character) in "WF" else _ADVANCE.get(character, _DEFAULT_ADVANCE)
+def estimate_text_width(text: str, font_size: float, *, bold: bool = False) -> float:
+    """Return an upper bound of the width [pixel] of a text in a sans-serif font of `font_size` [pixel]."""
+    widths = (
+        _EAST_ASIAN_WIDTH
+        if unicodedata.east_asian_width(character) in ("W", "F")
+        else _RELATIVE_WIDTHS.get(character, _DEFAULT_WIDTH)
         for character in text
     )
-    return advances * size * (_BOLD_FACTOR if bold else 1.0)
+    return sum(widths) * font_size * (_BOLD_FACTOR if bold else 1.0)
 
 
-def fit_text(text: str, max_length: int, max_lines: int = 1) -> tuple[str, ...]:
+def wrap_and_truncate(text: str, max_length: int, max_lines: int = 1) -> tuple[str, ...]:
     """Return a text as at most `max_lines` lines of at most `max_length` characters.
 
-    Lines are broken after commas if possible; `…` replaces the rest of a longer text.
+    Lines are broken after commas if possible. An ellipsis `…` replaces the text after the last line.
     """
     lines: list[str] = []
     for clause in " ".join(text.split()).replace(", ", ",\n").splitlines():
@@ -44,21 +50,23 @@ def fit_text(text: str, max_length: int, max_lines: int = 1) -> tuple[str, ...]:
         else:
             lines += textwrap.wrap(clause, max_length, break_on_hyphens=False)
     if len(lines) > max_lines:
-        last = lines[max_lines - 1]
-        end = f"{last} …" if len(last) + 2 <= max_length else f"{last[: max_length - 1]}…"
-        lines[max_lines - 1 :] = [end]
+        line = lines[max_lines - 1]
+        last_line = f"{line} …" if len(line) + 2 <= max_length else f"{line[: max_length - 1]}…"
+        lines[max_lines - 1 :] = [last_line]
     return tuple(lines)
 
 
-def replace_invalid_characters(text: str) -> str:
+def replace_invalid_xml_characters(text: str) -> str:
     """Return a text in which `�` replaces all characters that XML does not allow."""
     return _INVALID_IN_XML.sub("�", text)
 
 
 def render_template(template: str, **values: object) -> str:
-    """Return a rendered template of this package; `template` is its path relative to the package.
+    """Return a rendered template; escape texts, and replace characters that XML does not allow.
 
-    Texts are escaped, and characters that XML does not allow are replaced.
+    Args:
+        template: Path of the template file, relative to `executive/view`.
+        values: Values of the variables in the template.
     """
     environment = Environment(
         loader=PackageLoader("executive.view", "."),
@@ -67,4 +75,4 @@ def render_template(template: str, **values: object) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return replace_invalid_characters(environment.get_template(template).render(values))
+    return replace_invalid_xml_characters(environment.get_template(template).render(values))

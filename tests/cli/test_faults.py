@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from executive.cli.main import main
-from executive.view.figures.fault_figures import Branch, FaultFigures, Trial
+from executive.view.results.fault_results import Branch, FaultCampaignResults, Trial
 
 FAKE = ("sort_overhead", "--set", "cell.kind=fake")
 TRIAL = Trial(
@@ -44,7 +44,7 @@ def campaigns(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
         def _figures(self, *, pairs):
             trial = Trial(**{**vars(TRIAL), "problems": fake.problems})
             ways = (Branch("sort.yaml:14", "recover", ("tree/retry/recover",)),)
-            return FaultFigures(self._name, "fake", 0, 11.5, 1, (trial,), ways, fake.complete, pairs)
+            return FaultCampaignResults(self._name, "fake", 0, 11.5, 1, (trial,), ways, fake.complete, pairs)
 
     monkeypatch.setattr("executive.campaign.faults.campaign.Campaign", Campaign)
     return fake

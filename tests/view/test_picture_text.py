@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.view.text import fit_text, measure_text, replace_invalid_characters
+from executive.view.text import estimate_text_width, replace_invalid_xml_characters, wrap_and_truncate
 
 
 @pytest.mark.parametrize(
@@ -19,17 +19,17 @@ from executive.view.text import fit_text, measure_text, replace_invalid_characte
     ],
 )
 def test_text_is_cut_behind_a_comma_where_it_can_be(text, rows):
-    assert fit_text(text, 11, 2) == rows
+    assert wrap_and_truncate(text, 11, 2) == rows
 
 
 def test_long_text_gets_a_longer_box():
     assert (
-        measure_text("SelectTarget", 13)
-        < measure_text("SelectTarget", 13, bold=True)
-        < measure_text("SelectTargets", 13, bold=True)
+        estimate_text_width("SelectTarget", 13)
+        < estimate_text_width("SelectTarget", 13, bold=True)
+        < estimate_text_width("SelectTargets", 13, bold=True)
     )
-    assert measure_text("日本", 10) > measure_text("ab", 10)
+    assert estimate_text_width("日本", 10) > estimate_text_width("ab", 10)
 
 
 def test_what_xml_cannot_hold_is_replaced():
-    assert replace_invalid_characters("a\x00\x1b\ud800\ufffeb\tc\n€𝄞") == "a����b\tc\n€𝄞"
+    assert replace_invalid_xml_characters("a\x00\x1b\ud800\ufffeb\tc\n€𝄞") == "a����b\tc\n€𝄞"

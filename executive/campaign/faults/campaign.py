@@ -18,7 +18,7 @@ from executive.errors import InputError
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, UseNode
 from executive.mission.source import Mark
-from executive.view.figures.fault_figures import Branch, FaultFigures, Trial
+from executive.view.results.fault_results import Branch, FaultCampaignResults, Trial
 
 MAX_FAULTS_PER_RUN = 4
 """Maximum number of faults in a run: the fault under test, and the faults that let it occur."""
@@ -73,7 +73,7 @@ class Campaign:
                 )
         return {number: self.faults[number - 1] for number in numbers}
 
-    def run_single_faults(self) -> FaultFigures:
+    def run_single_faults(self) -> FaultCampaignResults:
         """Execute a run for each single fault and return the results.
 
         If a node runs only after other faults, the smallest set of such faults is injected, too. If a fault
@@ -85,9 +85,9 @@ class Campaign:
             done, complete = self._run_trials(next_runs, len(trials))
             trials |= {trial.fault_numbers: trial for trial in done}
         ordered = sorted(trials.values(), key=lambda trial: (trial.fault_numbers[-1], trial.fault_numbers))
-        return self._make_figures(ordered, complete, pairs=False)
+        return self._make_results(ordered, complete, pairs=False)
 
-    def run_fault_pairs(self, count: int) -> FaultFigures:
+    def run_fault_pairs(self, count: int) -> FaultCampaignResults:
         """Execute a run for each of `count` random pairs of faults and return the results.
 
         The seed of the mission determines the pairs. Excluded are faults that end the run, that require
@@ -102,11 +102,11 @@ class Campaign:
         while len(pairs) < min(count, math.comb(len(numbers), 2)):
             pairs[tuple(sorted(generator.sample(numbers, 2)))] = None
         trials, complete = self._run_trials(list(pairs), 0)
-        return self._make_figures(trials, complete, pairs=True)
+        return self._make_results(trials, complete, pairs=True)
 
-    def _make_figures(self, trials: Iterable[Trial], complete: bool, *, pairs: bool) -> FaultFigures:
+    def _make_results(self, trials: Iterable[Trial], complete: bool, *, pairs: bool) -> FaultCampaignResults:
         mission, done = self.mission, tuple(trials)
-        return FaultFigures(
+        return FaultCampaignResults(
             mission.name, mission.cell_description, mission.seed, self.nominal_run.robot_time,
             len(self.faults), done, find_branches(mission.loaded.tree, done), complete, pairs,
         )  # fmt: skip

@@ -28,8 +28,8 @@ from executive.record.recorded_run import RecordedRun, make_run_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
 from executive.testing.faults import FaultyCell, with_faults
-from executive.view.figures.fault_figures import Trial
 from executive.view.report.page import try_write_report
+from executive.view.results.fault_results import Trial
 
 FaultsByNumber = Mapping[int, PlannedFault]
 """Faults of a run by number; the last fault is under test, and the faults before it let it occur."""

@@ -33,7 +33,7 @@ from executive.view.live.messages import (
     SceneChange,
     encode_poses,
 )
-from executive.view.tree.svg import NodeNote, draw_svg
+from executive.view.tree.svg import NodeResult, draw_svg
 
 LOOPBACK = "127.0.0.1"
 """Network address at which the page is served."""
@@ -111,7 +111,7 @@ class LivePage:
         with self._record_errors():
             self._visuals = run.workcell.visuals()
         # Every node gets an empty line, in which the page writes the counts of the node.
-        empty_notes = {node.path: NodeNote("", ("",)) for node in nodes}
+        empty_notes = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(SceneChange(shapes=shapes))
         self._enqueue(PageChange(tree=draw_svg(nodes, mission, empty_notes)))

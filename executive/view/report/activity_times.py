@@ -1,4 +1,4 @@
-"""Time of a run by item and activity: every instant belongs to one item or none, and to one activity."""
+"""Duration of the activities in a run, for each item."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from executive.record.timeline.timeline import Timeline
 LOOK = "look"
 """Activity: search for the next item with an empty tool."""
 RETRY = "retry"
-"""Activity: failed attempts, and the looks before the next attempt."""
+"""Activity: failed attempts to handle an item, and the looks before the next attempt."""
 WAITING = "waiting"
-"""Activity: time that belongs neither to a skill nor to another activity."""
+"""Activity: no skill works on an item, moves the arm or senses the scene."""
 
 Interval = tuple[float, float, list[Activation]]
-"""Start and end of an interval [s], and the skills that run in it, in the order of their starts."""
+"""Start and end of an interval [s], and the running skills in the order of their starts."""
 
-NO_OBJECT = ""
+NO_ITEM = ""
 """Key of the time that belongs to no item, such as the time of the last look at an empty table."""
 
 
@@ -32,7 +32,7 @@ class ActivityTimes:
 
     Attributes:
         activities: Activities that took time: look, skills in the order of their first use, retry, waiting.
-        times_by_item: Time by item, then by activity; `NO_OBJECT` is last. The sum of all times is the
+        times_by_item: Time by item and activity; `NO_ITEM` is the last key. The sum of all times is the
             duration of the run.
     """
 
@@ -43,7 +43,8 @@ class ActivityTimes:
 def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> ActivityTimes:
     """Return the time by item and activity, from the start of a run to the last event of its timeline.
 
-    If several skills run, the time belongs to the first started skill among those with an item.
+    If several skills run, the time belongs to the skill that started first and works on an item. Time without
+    such a skill belongs to the item that is selected next.
 
     Args:
         timeline: Timeline of the run, with its history.
@@ -53,51 +54,47 @@ def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> 
     activations = [activation for activation in timeline.activations if activation.node in skills]
     selections = timeline.selections
     times: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
+    # Dictionaries without values are used as ordered sets.
     skill_activities: dict[str, None] = {}
     retries = _find_retries(activations, skills, selections)
     for start, end, running in _split_time(activations, timeline.clock):
-        main = next((activation for activation in running if activation.item), None)
-        if main is not None:
-            item, activity = main.item, skills[main.node].skill.lower()
+        item_activation = next((activation for activation in running if activation.item), None)
+        if item_activation is not None:
+            item, activity = item_activation.item, skills[item_activation.node].skill.lower()
         else:
-            item, activity = _find_next_item(selections, end), _classify_pause(running, skills)
+            nodes_without_item = [skills[activation.node] for activation in running]
+            is_look = any(node.senses or "arm" in node.uses for node in nodes_without_item)
+            item, activity = _find_next_item(selections, end), LOOK if is_look else WAITING
         retry_start, retry_end = retries.get(item, (0.0, 0.0))
         if retry_start <= start and end <= retry_end:
             activity = RETRY
-        elif main is not None:
+        elif item_activation is not None:
             skill_activities[activity] = None
         times[item][activity] += end - start
-    # A skill may have the name of another activity; `dict.fromkeys` removes duplicates.
-    names = dict.fromkeys([LOOK, *skill_activities, RETRY, WAITING])
-    used_names = {activity for row in times.values() for activity in row}
-    items = sorted(times, key=lambda item: item == NO_OBJECT)
-    activities = tuple(name for name in names if name in used_names)
+    # A skill may have the name of another activity, so duplicates are removed.
+    all_activities = dict.fromkeys([LOOK, *skill_activities, RETRY, WAITING])
+    activities = tuple(name for name in all_activities if any(name in row for row in times.values()))
+    items = sorted(times, key=lambda item: item == NO_ITEM)
     return ActivityTimes(activities, {item: dict(times[item]) for item in items})
 
 
 def _split_time(activations: Sequence[Activation], end_time: float) -> Iterator[Interval]:
     """Yield the intervals between successive starts and ends of skills, from 0 to `end_time` [s]."""
-    lasting = [activation for activation in activations if activation.end > activation.start]
-    upcoming = deque(sorted(lasting, key=lambda activation: activation.start))
-    times = sorted({0.0, end_time, *(time for each in activations for time in (each.start, each.end))})
+    times = {0.0, end_time, *(activation.start for activation in activations)}
+    times |= {activation.end for activation in activations}
+    waiting = deque(sorted(activations, key=lambda activation: activation.start))
     running: list[Activation] = []
-    for start, end in pairwise(times):
+    for start, end in pairwise(sorted(times)):
+        while waiting and waiting[0].start <= start:
+            running.append(waiting.popleft())
         running = [activation for activation in running if activation.end > start]
-        while upcoming and upcoming[0].start <= start:
-            running.append(upcoming.popleft())
         yield start, end, running
 
 
-def _classify_pause(running: Sequence[Activation], skills: Mapping[str, OutlineNode]) -> str:
-    """Return the activity, LOOK or WAITING, of an interval whose running skills have no item."""
-    nodes = [skills[activation.node] for activation in running]
-    return LOOK if any(node.senses or "arm" in node.uses for node in nodes) else WAITING
-
-
 def _find_next_item(selections: Sequence[tuple[float, str]], time: float) -> str:
-    """Return the item of the first selection at or after a time [s], or `NO_OBJECT`."""
+    """Return the item of the first selection at or after a time [s], or `NO_ITEM`."""
     index = bisect_left(selections, (time, ""))
-    return selections[index][1] if index < len(selections) else NO_OBJECT
+    return selections[index][1] if index < len(selections) else NO_ITEM
 
 
 def _find_retries(
@@ -106,16 +103,15 @@ def _find_retries(
     selections: Sequence[tuple[float, str]],
 ) -> dict[str, tuple[float, float]]:
     """Return, for each item with a failed attempt, the start and the end of its failed attempts [s]."""
-    last_failures = {
-        activation.item: activation.end
-        for activation in activations
-        if activation.item and activation.status == "FAILURE"
-        if skills[activation.node].uses and not skills[activation.node].senses
-    }
     retries = {}
-    for item, last_failure in last_failures.items():
-        selection_times = [time for time, name in selections if name == item]
-        start = min(selection_times, default=min(each.start for each in activations if each.item == item))
-        # Looks before the next attempt count as part of the failed attempt.
-        retries[item] = start, next((time for time in selection_times if time > last_failure), last_failure)
+    for activation in activations:
+        skill, item = skills[activation.node], activation.item
+        # An attempt fails if a skill that acts on the item fails, not if a look fails.
+        if item and activation.status == "FAILURE" and skill.uses and not skill.senses:
+            selection_times = [time for time, selected_item in selections if selected_item == item]
+            first_start = min(other.start for other in activations if other.item == item)
+            start = min(selection_times, default=first_start)
+            # Looks before the next attempt count as part of the failed attempt.
+            end = next((time for time in selection_times if time > activation.end), activation.end)
+            retries[item] = start, end
     return retries

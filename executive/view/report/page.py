@@ -19,18 +19,18 @@ from executive.record.result import describe_disagreement
 from executive.record.run_directory import RunDirectory, convert_os_errors
 from executive.record.timeline.activation import describe_ends, find_last_failure, group_by_node
 from executive.view.report.activity_times import LOOK, RETRY, WAITING
-from executive.view.report.facts import ReportFacts
 from executive.view.report.lanes import draw_lanes
+from executive.view.report.report_data import ReportData
 from executive.view.terminal.summary import describe_place_on_table
 from executive.view.text import render_template
-from executive.view.tree.svg import NodeNote, draw_svg
+from executive.view.tree.svg import NodeResult, draw_svg
 
 ACTIVITY_COLOURS = {LOOK: "#56B4E9", RETRY: "#D55E00", WAITING: "#9aa5b4"}
-"""Colours of the activities that are not skills; skills have the other colours of the palette, in order."""
+"""Colours of the activities that are not skills; the colour of a skill is another colour of the palette."""
 
 
 def try_write_report(run: str) -> tuple[str, str]:
-    """Write the report of the run in the directory `run`; return the file and "", or "" and an error message.
+    """Write the report of the run in the directory `run`; return the file, and an error message or "".
 
     The function raises no exception, because an error of the report must not change the result of the run.
     """
@@ -46,64 +46,58 @@ def try_write_report(run: str) -> tuple[str, str]:
 
 
 def write_report(path: Path) -> Path:
-    """Write the report of the run in a directory atomically, and return the file of the report.
+    """Write the report of the run in the directory `path` atomically, and return the file of the report.
 
     Raises:
         InputError: The directory lacks the journal or the tree, or is not writable.
     """
     file = RunDirectory(path).report
-    page = render_report(ReportFacts(path))
-    remedy = "copy the run directory to a writable folder, and write the report of the copy"
-    with convert_os_errors(f'write the report "{file}"', remedy):
+    page = render_report(ReportData(path))
+    advice = "copy the run directory to a writable folder, and write the report of the copy"
+    with convert_os_errors(f'write the report "{file}"', advice):
         write_atomically(file, page)
     return file
 
 
-def render_report(facts: ReportFacts) -> str:
+def render_report(data: ReportData) -> str:
     """Return the report as HTML; texts of missions and skills are escaped."""
-    result, timeline = facts.result, facts.timeline
+    result, params = data.result, data.start.params
     diagnosis = None if result is None else result.diagnosis
-    item_names = [item.item for item in facts.objects]
-    params = facts.start.params
+    item_names = [item.item for item in data.items]
+    last_picture_file = "" if diagnosis is None else diagnosis.picture
+    # A reason that repeats the status, such as "fault", is omitted.
+    reason = "" if data.end is None or data.end.reason.upper() == data.status else data.end.reason
+    warning = "" if result is None else describe_disagreement(result)
     return render_template(
         "report/report.html",
-        facts=facts,
+        data=data,
         result=result,
-        reason=_get_reason(facts),
-        verdict=_describe_end(facts),
+        reason=reason,
+        verdict=". ".join(filter(None, (warning, _describe_end(data)))),
         counts={} if result is None else asdict(result.items),
         audit=asdict(result.audit) if result is not None and result.audit is not None else {},
-        unknown=describe_unknown_labels({} if result is None else result.unknown_labels),
+        unknown_text=describe_unknown_labels({} if result is None else result.unknown_labels),
         diagnosis=diagnosis,
-        diagnosis_facts=[] if diagnosis is None else list(diagnosis_text.list_labelled_sentences(diagnosis)),
-        last_picture=next(
-            (picture for picture in facts.pictures if diagnosis and picture.file == diagnosis.picture), None
-        ),
-        titles={node.path: node.title for node in facts.nodes},
-        describe_place=describe_place_on_table,
-        colours=_choose_colours(facts.activity_times.activities),
-        totals={item: sum(row.values()) for item, row in facts.activity_times.times_by_item.items()},
-        tree=Markup(draw_svg(facts.nodes, facts.start.mission, _make_notes(facts))),
-        lanes=Markup(draw_lanes(timeline, facts.nodes)),
+        labelled_sentences=[]
+        if diagnosis is None
+        else list(diagnosis_text.list_labelled_sentences(diagnosis)),
+        last_picture=next((picture for picture in data.pictures if picture.file == last_picture_file), None),
+        titles={node.path: node.title for node in data.nodes},
+        describe_place_on_table=describe_place_on_table,
+        colours=_choose_colours(data.activity_times.activities),
+        total_times={item: sum(row.values()) for item, row in data.activity_times.times_by_item.items()},
+        tree=Markup(draw_svg(data.nodes, data.start.mission, _make_node_results(data))),
+        lanes=Markup(draw_lanes(data.timeline, data.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
-        other_pictures=[each for each in facts.pictures if each.reason and each.item not in item_names],
+        look_pictures=[
+            picture for picture in data.pictures if picture.reason and picture.item not in item_names
+        ],
     )
 
 
-def _get_reason(facts: ReportFacts) -> str:
-    """Return the reason of the end of the run; "" if there is none or it repeats the status."""
-    reason = "" if facts.end is None else facts.end.reason
-    return "" if reason.upper() == facts.status else reason
-
-
-def _describe_end(facts: ReportFacts) -> str:
-    """Return a text about the end of the run, after a warning if ledger and audit disagree."""
-    warning = "" if facts.result is None else describe_disagreement(facts.result)
-    return ". ".join(filter(None, (warning, _describe_status(facts))))
-
-
-def _describe_status(facts: ReportFacts) -> str:
-    result, end = facts.result, facts.end
+def _describe_end(data: ReportData) -> str:
+    """Return a text about the end of the run: its verdict, its message, or the number of placed objects."""
+    result, end = data.result, data.end
     if end is None:
         return "The journal has no end: the run was killed, or is still running."
     if result is not None and result.diagnosis is not None:
@@ -115,22 +109,21 @@ def _describe_status(facts: ReportFacts) -> str:
     items = result.items
     if not items.seen:
         return "The mission succeeded; no object was seen."
-    other_counts = {"rejected": items.rejected, "skipped": items.skipped, "lost": items.lost}
-    others = "".join(f", {count} {state}" for state, count in other_counts.items() if count)
-    return f"{items.placed} of {items.seen} objects are in their bins{others}."
+    unplaced_counts = {"rejected": items.rejected, "skipped": items.skipped, "lost": items.lost}
+    unplaced_text = "".join(f", {count} {state}" for state, count in unplaced_counts.items() if count)
+    return f"{items.placed} of {items.seen} objects are in their bins{unplaced_text}."
 
 
 def _choose_colours(activities: Sequence[str]) -> dict[str, str]:
-    """Return the colour of each activity."""
+    """Return the colour of each activity as `#rrggbb`."""
     skill_colours = cycle(colour for colour in PALETTE if colour not in ACTIVITY_COLOURS.values())
     return {activity: ACTIVITY_COLOURS.get(activity) or next(skill_colours) for activity in activities}
 
 
-def _make_notes(facts: ReportFacts) -> dict[str, NodeNote]:
-    """Return the note of each node that ran, for the drawing of the tree."""
-    return {
-        path: NodeNote(
-            group[-1].status, tuple(filter(None, (describe_ends(group), find_last_failure(group))))
-        )
-        for path, group in group_by_node(facts.timeline.activations).items()
-    }
+def _make_node_results(data: ReportData) -> dict[str, NodeResult]:
+    """Return the result of each node that ran, by its path."""
+    results = {}
+    for path, activations in group_by_node(data.timeline.activations).items():
+        lines = tuple(filter(None, (describe_ends(activations), find_last_failure(activations))))
+        results[path] = NodeResult(activations[-1].status, lines)
+    return results

@@ -1,15 +1,16 @@
-"""Pictures of a run for its report, which are embedded in the page or linked."""
+"""Pictures of a run, embedded in the page of the report or linked."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from urllib.parse import quote
 
 MAX_EMBEDDED_SIZE = 3_000_000
-"""Maximum total size of the embedded pictures of a page, so that the page can be sent by e-mail [bytes]."""
+"""Maximum total size of the embedded pictures, so that the page can be sent by e-mail [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -32,34 +33,39 @@ class Picture:
 
 
 def collect_pictures(folder: Path, items: Collection[str]) -> list[Picture]:
-    """Return the pictures in the folder `frames` of a run, given the names of the items of the run.
+    """Return the pictures of a run: the last decision for each object, then all failures by time.
 
-    The pictures of the last decision for each object come first and are embedded first; the pictures of
-    failures follow in the order of time.
+    If the pictures are too large for one page, the first pictures are embedded and the others linked.
+
+    Args:
+        folder: Folder `frames` of the run.
+        items: Names of the items of the run.
     """
-    parsed = sorted(
-        (_parse_name(file, items) for file in folder.glob("*.jpg")), key=lambda entry: (entry[1], entry[0])
+    pictures = sorted(
+        (_link_picture(file, items) for file in folder.glob("*.jpg")), key=attrgetter("tick", "file")
     )
-    decisions = {item: (file, tick, item, "") for file, tick, item, reason in parsed if item and not reason}
+    decisions = {picture.item: picture for picture in pictures if picture.item and not picture.reason}
+    failures = [picture for picture in pictures if picture.reason]
     free_size = MAX_EMBEDDED_SIZE
-    pictures = []
-    for file, tick, item, reason in [*decisions.values(), *(entry for entry in parsed if entry[3])]:
-        path = f"{file.parent.name}/{file.name}"
-        source = quote(path)
-        if 4 * file.stat().st_size / 3 <= free_size:
+    shown_pictures = []
+    for picture in (*decisions.values(), *failures):
+        file = folder / Path(picture.file).name
+        # Base64 encodes 3 bytes as 4 characters.
+        if file.stat().st_size * 4 / 3 <= free_size:
             source = "data:image/jpeg;base64," + base64.b64encode(file.read_bytes()).decode()
             free_size -= len(source)
-        pictures.append(Picture(source, path, tick, item, reason))
-    return pictures
+            picture = replace(picture, source=source)
+        shown_pictures.append(picture)
+    return shown_pictures
 
 
-def _parse_name(file: Path, items: Collection[str]) -> tuple[Path, int, str, str]:
-    """Return a file, and the control step, object and reason from its name `<tick>_<item>_<reason>`."""
-    tick, _, rest = file.stem.partition("_")
-    number = int(tick) if tick.isdecimal() else 0
+def _link_picture(file: Path, items: Collection[str]) -> Picture:
+    """Return a link to a picture, with the information in its file name `<tick>_<item>_<reason>`."""
+    path = f"{file.parent.name}/{file.name}"
+    tick_text, _, subject = file.stem.partition("_")
+    tick = int(tick_text) if tick_text.isdecimal() else 0
+    # The name of an item may be the beginning of the name of another item, so long names are tried first.
     for item in sorted(items, key=len, reverse=True):
-        if rest == item:
-            return file, number, item, ""
-        if rest.startswith(f"{item}_"):
-            return file, number, item, rest.removeprefix(f"{item}_")
-    return file, number, "", rest
+        if subject == item or subject.startswith(f"{item}_"):
+            return Picture(quote(path), path, tick, item, subject.removeprefix(item).removeprefix("_"))
+    return Picture(quote(path), path, tick, "", subject)

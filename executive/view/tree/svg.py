@@ -1,8 +1,8 @@
 """Drawing of a tree as an SVG document that needs no other files.
 
-Each node is a group of the class `node`. A page shows the status of a node by adding the class `running`,
-`success` or `failure` to the group, and moves the group to the end to draw its line above others. Notes are
-texts of the class `note`. The background is transparent, and may be light or dark.
+Each node is a group of the class `node`. To show the status of a node, a page adds the class `running`,
+`success` or `failure` to its group. A page may also move the group to the end of the document, so that the
+line to the node is drawn above other lines. The background is transparent; a page may be light or dark.
 """
 
 from __future__ import annotations
@@ -13,52 +13,58 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from executive.mission.outline import OutlineNode, list_child_indices
-from executive.view.text import fit_text, measure_text, render_template
-from executive.view.tree.card import MAX_LINE_LENGTH, Card, make_card
+from executive.view.text import estimate_text_width, render_template, wrap_and_truncate
+from executive.view.tree.node_texts import MAX_LINE_LENGTH, NodeTexts, make_node_texts
 from executive.view.tree.tree_layout import FRAME_PADDING, Layout, NodeSize, compute_layout
 
 TITLE_SIZE, LINE_SIZE, EDGE_LABEL_SIZE, SUBTREE_NAME_SIZE = 13.0, 11.0, 11.0, 12.0
-"""Font sizes of titles, lines, labels of edges and names of subtrees, as in `tree.svg` [pixel]."""
+"""Font sizes of titles, lines, labels of edges and names of subtrees; `tree.svg` repeats them [pixel]."""
 
 _INVALID_IN_ID = re.compile(r"[^A-Za-z0-9_/]")
-_PADDING, _BADGE_SIZE, _EDGE_LABEL_GAP, _CORNER_RADIUS = 11.0, 20.0, 4.0, 6.0
+"""Pattern of the characters of a path that are escaped in the id of an SVG element."""
+_BOX_PADDING, _SYMBOL_WIDTH, _EDGE_LABEL_GAP = 11.0, 32.0, 4.0
+"""Padding of a box, width of a symbol with margins, and gap after the label of an edge [pixel]."""
 _TITLE_HEIGHT, _LINE_HEIGHT = 28.0, 14.0
+"""Heights of the title and of another line in the box of a node [pixel]."""
+_MAX_CORNER_RADIUS = 6.0
+"""Maximum radius of the rounded corners of an edge [pixel]."""
 
 
 @dataclass(frozen=True)
-class NodeNote:
+class NodeResult:
     """Result of a node in a run, for the drawing of the node.
 
     Attributes:
-        status: Status of the node as in events, such as `SUCCESS`; "" for a node that never ran.
-        lines: Lines of text below the lines from the mission; a long line is truncated.
+        status: `RUNNING`, `SUCCESS`, `FAILURE` or `INVALID`; "" for a node that never ran.
+        lines: Lines of text below the settings of the node; the drawing truncates long lines.
     """
 
     status: str = ""
     lines: tuple[str, ...] = ()
 
 
-NO_NODE_NOTES: Mapping[str, NodeNote] = MappingProxyType({})
+NO_RESULTS: Mapping[str, NodeResult] = MappingProxyType({})
+"""Results of the nodes of a mission that did not run."""
 
 
-def draw_svg(nodes: Sequence[OutlineNode], name: str, notes: Mapping[str, NodeNote] = NO_NODE_NOTES) -> str:
+def draw_svg(nodes: Sequence[OutlineNode], name: str, results: Mapping[str, NodeResult] = NO_RESULTS) -> str:
     """Return the drawing of a tree as an SVG document.
 
     Args:
         nodes: Nodes of the tree.
         name: Name of the mission, for the title.
-        notes: Results of nodes, by path of the node.
+        results: Results of nodes, by path of the node.
     """
-    child_lists = list_child_indices(nodes)
-    parents = {child: parent for parent, child_list in enumerate(child_lists) for child in child_list}
-    cards = [make_card(node) for node in nodes]
-    node_notes = [notes.get(node.path, NodeNote()) for node in nodes]
-    lines = [_list_lines(*parts) for parts in zip(cards, node_notes, strict=True)]
-    sizes = [_compute_size(*parts) for parts in zip(nodes, cards, lines, strict=True)]
-    layout = compute_layout([node.depth for node in nodes], child_lists, sizes)
+    child_indices = list_child_indices(nodes)
+    parents = {child: parent for parent, children in enumerate(child_indices) for child in children}
+    texts = [make_node_texts(node) for node in nodes]
+    node_results = [results.get(node.path, NodeResult()) for node in nodes]
+    lines = list(map(_list_lines, texts, node_results))
+    sizes = list(map(_compute_size, nodes, texts, lines))
+    layout = compute_layout([node.depth for node in nodes], child_indices, sizes)
     edges = [_draw_edge(layout, parents.get(index), index, node.depth) for index, node in enumerate(nodes)]
-    ids, indents = map(make_group_id, (node.path for node in nodes)), map(_compute_indent, cards)
-    drawings = list(zip(nodes, cards, node_notes, lines, layout.boxes, edges, ids, indents, strict=True))
+    ids, indents = [make_group_id(node.path) for node in nodes], map(_compute_text_indent, texts)
+    drawings = list(zip(nodes, texts, node_results, lines, layout.boxes, edges, ids, indents, strict=True))
     return render_template("tree/tree.svg", name=name, layout=layout, nodes=nodes, drawings=drawings)
 
 
@@ -67,38 +73,40 @@ def make_group_id(path: str) -> str:
     return "node-" + _INVALID_IN_ID.sub(lambda match: f"--{ord(match[0]):x}-", path).replace("/", "-")
 
 
-def _list_lines(card: Card, note: NodeNote) -> list[tuple[str, str]]:
-    """Return the CSS class and the text of each line of a node; the lines of the note are truncated."""
-    notes = ("".join(fit_text(line, MAX_LINE_LENGTH)) for line in note.lines)
-    return [*(("line", line) for line in card.lines), *(("note", line) for line in notes)]
+def _list_lines(texts: NodeTexts, result: NodeResult) -> list[tuple[str, str]]:
+    """Return the CSS class and the text of each line of a node below its title."""
+    notes = ("".join(wrap_and_truncate(line, MAX_LINE_LENGTH)) for line in result.lines)
+    return [*(("line", line) for line in texts.lines), *(("note", note) for note in notes)]
 
 
-def _compute_size(node: OutlineNode, card: Card, lines: Sequence[tuple[str, str]]) -> NodeSize:
-    lengths = [measure_text(card.title, TITLE_SIZE, bold=True)]
-    lengths += [measure_text(line, LINE_SIZE) for _, line in lines]
-    width, height = (
-        _compute_indent(card) + max(lengths) + _PADDING,
-        _TITLE_HEIGHT + _LINE_HEIGHT * len(lines),
-    )
-    label_width = measure_text(node.slot, EDGE_LABEL_SIZE) + _EDGE_LABEL_GAP if node.slot else 0.0
-    subtree_name_width = measure_text(node.subtree, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING
+def _compute_size(node: OutlineNode, texts: NodeTexts, lines: Sequence[tuple[str, str]]) -> NodeSize:
+    """Return the sizes of the box of a node, of the label of its edge, and of the name of its subtree."""
+    widths = [estimate_text_width(line, LINE_SIZE) for _, line in lines]
+    text_width = max([estimate_text_width(texts.title, TITLE_SIZE, bold=True), *widths])
+    width = _compute_text_indent(texts) + text_width + _BOX_PADDING
+    height = _TITLE_HEIGHT + _LINE_HEIGHT * len(lines)
+    label_width = estimate_text_width(node.slot, EDGE_LABEL_SIZE) + _EDGE_LABEL_GAP if node.slot else 0.0
+    subtree_name_width = estimate_text_width(node.subtree, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING
     return NodeSize(width, height, label_width, subtree_name_width if node.subtrees else 0.0)
 
 
-def _compute_indent(card: Card) -> float:
+def _compute_text_indent(texts: NodeTexts) -> float:
     """Return the distance between the text of a node and the left side of its box [pixel]."""
-    return _BADGE_SIZE + 12 if card.symbol else _PADDING
+    return _SYMBOL_WIDTH if texts.symbol else _BOX_PADDING
 
 
 def _draw_edge(layout: Layout, parent: int | None, child: int, depth: int) -> str:
-    """Return the SVG path of the line between the nodes `parent` and `child`; "" for no parent."""
+    """Return the SVG path of the line between the nodes `parent` and `child`; "" for no parent.
+
+    The line runs to the right (command H), around a corner (q) down (V), and around a corner to the right.
+    """
     if parent is None:
         return ""
-    source, target, edge_x = layout.boxes[parent], layout.boxes[child], layout.edge_xs[depth]
-    path = f"M{source.right:.0f} {source.middle:.0f}"
-    height = target.middle - source.middle
+    start, end, edge_x = layout.boxes[parent], layout.boxes[child], layout.edge_xs[depth]
+    path = f"M{start.right_x:.0f} {start.middle_y:.0f}"
+    height = end.middle_y - start.middle_y
     if height >= 1:
-        radius = min(_CORNER_RADIUS, height / 2)
+        radius = min(_MAX_CORNER_RADIUS, height / 2)
         path += f"H{edge_x - radius:.0f}q{radius:.0f} 0 {radius:.0f} {radius:.0f}"
-        path += f"V{target.middle - radius:.0f}q0 {radius:.0f} {radius:.0f} {radius:.0f}"
-    return f"{path}H{target.x:.0f}"
+        path += f"V{end.middle_y - radius:.0f}q0 {radius:.0f} {radius:.0f} {radius:.0f}"
+    return f"{path}H{end.x:.0f}"

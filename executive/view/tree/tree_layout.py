@@ -1,8 +1,8 @@
 """Layout of a picture of a tree that grows from left to right.
 
-The nodes of one depth form a column, which is as wide as its widest node. Each node has a horizontal band for
-its box and the bands of its children, so that boxes cannot overlap. A frame encloses each subtree; the band
-of its first node includes the frame. The middle of a node has the same y as the middle of its first child.
+The nodes of one depth form a column. Each node has a horizontal band that contains its box and the bands of
+its children, so that boxes cannot overlap. A frame encloses each subtree, within the band of the first node
+of the subtree. A node and its first child are at the same height.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ NODE_GAP = 10.0
 EDGE_SEGMENT_LENGTH = 16.0
 """Length of each horizontal part of the line between a node and its child [pixel]."""
 FRAME_PADDING = 9.0
-"""Distance between a frame and the boxes in it [pixel]."""
+"""Distance between a frame and the boxes in the frame [pixel]."""
 FRAME_HEADER = 20.0
 """Height of the part of a frame that contains the name of the subtree [pixel]."""
 
-ChildLists = Sequence[Sequence[int]]
+ChildIndices = Sequence[Sequence[int]]
 """Indices of the children of each node, by the index of the node."""
 
 
@@ -32,7 +32,7 @@ class NodeSize:
     Attributes:
         width, height: Size of the box.
         label_width: Width of the label of the line to the node; 0 for no label.
-        subtree_name_width: Width of the name of the subtree whose first node this is; 0 for other nodes.
+        subtree_name_width: Width of the name of the subtree that starts at the node; 0 if none starts there.
     """
 
     width: float
@@ -43,7 +43,12 @@ class NodeSize:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A rectangle in the picture: its left top corner and its size [pixel]; y points down."""
+    """Rectangle in the picture [pixel].
+
+    Attributes:
+        x, y: Left top corner; y points down.
+        width, height: Size.
+    """
 
     x: float
     y: float
@@ -51,12 +56,12 @@ class Rectangle:
     height: float
 
     @property
-    def right(self) -> float:
+    def right_x(self) -> float:
         """The x of the right side [pixel]."""
         return self.x + self.width
 
     @property
-    def middle(self) -> float:
+    def middle_y(self) -> float:
         """The y of the middle [pixel]."""
         return self.y + self.height / 2
 
@@ -79,7 +84,7 @@ class Layout:
     height: float
 
 
-def compute_layout(depths: Sequence[int], children: ChildLists, sizes: Sequence[NodeSize]) -> Layout:
+def compute_layout(depths: Sequence[int], children: ChildIndices, sizes: Sequence[NodeSize]) -> Layout:
     """Return the layout of a tree; its nodes are listed with parents before their children.
 
     Args:
@@ -87,71 +92,78 @@ def compute_layout(depths: Sequence[int], children: ChildLists, sizes: Sequence[
         children: Indices of the children of each node.
         sizes: Sizes of the parts of each node.
     """
-    columns, edge_xs = _place_columns(depths, sizes)
-    bands, middles = _compute_bands(children, sizes)
-    tops = _place_bands(children, bands, middles)
+    column_xs, edge_xs = _place_columns(depths, sizes)
+    band_heights, node_offsets = _compute_bands(children, sizes)
+    band_tops = _place_bands(children, band_heights, node_offsets)
     boxes = tuple(
-        Rectangle(columns[depth], top + middle - size.height / 2, size.width, size.height)
-        for depth, top, middle, size in zip(depths, tops, middles, sizes, strict=True)
+        Rectangle(column_xs[depth], top + offset - size.height / 2, size.width, size.height)
+        for depth, top, offset, size in zip(depths, band_tops, node_offsets, sizes, strict=True)
     )
-    right_ends = _find_right_ends(children, sizes, boxes)
+    right_xs = _find_branch_ends(children, sizes, boxes)
     frames = {}
     for index, box in enumerate(boxes):
         if sizes[index].subtree_name_width:
-            x, y = box.x - FRAME_PADDING, tops[index] + NODE_GAP / 2
-            width = right_ends[index] - box.x + FRAME_PADDING
-            frames[index] = Rectangle(x, y, width, bands[index] - NODE_GAP)
-    height = tops[0] + bands[0] + MARGIN - NODE_GAP / 2
-    return Layout(boxes, edge_xs, frames, max(right_ends) + MARGIN, height)
+            x, y = box.x - FRAME_PADDING, band_tops[index] + NODE_GAP / 2
+            width = right_xs[index] - box.x + FRAME_PADDING
+            frames[index] = Rectangle(x, y, width, band_heights[index] - NODE_GAP)
+    height = band_tops[0] + band_heights[0] + MARGIN - NODE_GAP / 2
+    return Layout(boxes, edge_xs, frames, max(right_xs) + MARGIN, height)
 
 
 def _place_columns(depths: Sequence[int], sizes: Sequence[NodeSize]) -> tuple[list[float], tuple[float, ...]]:
-    """Return the x of the boxes of each depth, and the x of the vertical parts of the lines to them."""
-    columns: list[float] = []
+    """Return the x of each column, and the x of the vertical parts of the lines before each column."""
+    column_xs: list[float] = []
     edge_xs: list[float] = []
-    right = 0.0
+    right_x = 0.0
     for depth in range(max(depths) + 1):
         column = [size for size, node_depth in zip(sizes, depths, strict=True) if node_depth == depth]
-        frame = FRAME_PADDING if any(size.subtree_name_width for size in column) else 0.0
-        edge_xs.append(right + EDGE_SEGMENT_LENGTH if depth else MARGIN)
+        padding = FRAME_PADDING if any(size.subtree_name_width for size in column) else 0.0
+        edge_xs.append(right_x + EDGE_SEGMENT_LENGTH if depth else MARGIN)
         edge_length = EDGE_SEGMENT_LENGTH + max(size.label_width for size in column) if depth else 0.0
-        columns.append(edge_xs[-1] + edge_length + frame)
-        right = columns[-1] + max(size.width for size in column)
-    return columns, tuple(edge_xs)
+        column_xs.append(edge_xs[-1] + edge_length + padding)
+        right_x = column_xs[-1] + max(size.width for size in column)
+    return column_xs, tuple(edge_xs)
 
 
-def _compute_bands(children: ChildLists, sizes: Sequence[NodeSize]) -> tuple[list[float], list[float]]:
-    """Return the height of the band of each node, and the y of the middle of the node in the band."""
-    bands, middles = [0.0] * len(sizes), [0.0] * len(sizes)
+def _compute_bands(children: ChildIndices, sizes: Sequence[NodeSize]) -> tuple[list[float], list[float]]:
+    """Return for each node the height of its band, and the distance from the top of the band to its middle.
+
+    Children follow their parents in the lists, so the bands are computed from the last node to the first.
+    """
+    band_heights, node_offsets = [0.0] * len(sizes), [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
         size, node_children = sizes[index], children[index]
-        header, footer = (FRAME_HEADER, FRAME_PADDING) if size.subtree_name_width else (0.0, 0.0)
+        top_padding, bottom_padding = (FRAME_HEADER, FRAME_PADDING) if size.subtree_name_width else (0.0, 0.0)
         half_height = (size.height + NODE_GAP) / 2
-        first_middle = middles[node_children[0]] if node_children else 0.0
-        middles[index] = header + max(half_height, first_middle)
-        end = middles[index] - first_middle + sum(bands[child] for child in node_children)
-        bands[index] = max(middles[index] + half_height, end) + footer
-    return bands, middles
+        first_child_offset = node_offsets[node_children[0]] if node_children else 0.0
+        node_offsets[index] = top_padding + max(half_height, first_child_offset)
+        children_top = node_offsets[index] - first_child_offset
+        children_bottom = children_top + sum(band_heights[child] for child in node_children)
+        band_heights[index] = max(node_offsets[index] + half_height, children_bottom) + bottom_padding
+    return band_heights, node_offsets
 
 
-def _place_bands(children: ChildLists, bands: Sequence[float], middles: Sequence[float]) -> list[float]:
-    """Return the y of the top of each band, given the heights of the bands and the middles in them."""
-    tops = [MARGIN - NODE_GAP / 2] * len(bands)
-    for index, node_children in enumerate(children):
-        top = tops[index] + middles[index] - (middles[node_children[0]] if node_children else 0.0)
-        for child in node_children:
-            tops[child] = top
-            top += bands[child]
-    return tops
-
-
-def _find_right_ends(
-    children: ChildLists, sizes: Sequence[NodeSize], boxes: Sequence[Rectangle]
+def _place_bands(
+    children: ChildIndices, band_heights: Sequence[float], node_offsets: Sequence[float]
 ) -> list[float]:
-    """Return the x of the right end of each node including its descendants and their frames."""
-    right_ends = [0.0] * len(sizes)
+    """Return the y of the top of each band, given the results of `_compute_bands`."""
+    band_tops = [MARGIN - NODE_GAP / 2] * len(band_heights)
+    for index, node_children in enumerate(children):
+        first_child_offset = node_offsets[node_children[0]] if node_children else 0.0
+        top = band_tops[index] + node_offsets[index] - first_child_offset
+        for child in node_children:
+            band_tops[child] = top
+            top += band_heights[child]
+    return band_tops
+
+
+def _find_branch_ends(
+    children: ChildIndices, sizes: Sequence[NodeSize], boxes: Sequence[Rectangle]
+) -> list[float]:
+    """Return the x of the right end of each node with its descendants and their frames."""
+    right_xs = [0.0] * len(sizes)
     for index in reversed(range(len(sizes))):
         box, name_width = boxes[index], sizes[index].subtree_name_width
-        right = max([box.right, *(right_ends[child] for child in children[index])])
-        right_ends[index] = max(right + FRAME_PADDING, box.x + name_width) if name_width else right
-    return right_ends
+        right_x = max([box.right_x, *(right_xs[child] for child in children[index])])
+        right_xs[index] = max(right_x + FRAME_PADDING, box.x + name_width) if name_width else right_x
+    return right_xs

@@ -18,7 +18,7 @@ from executive.cells.fake.cell import FakeCell
 from executive.errors import InputError
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
-from executive.view.figures.fault_figures import FaultFigures, Trial
+from executive.view.results.fault_results import FaultCampaignResults, Trial
 
 MISSION = """\
 mission: small
@@ -54,7 +54,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> MissionUnderTest:
 
 
 @pytest.fixture(scope="module")
-def figures(small: MissionUnderTest) -> FaultFigures:
+def figures(small: MissionUnderTest) -> FaultCampaignResults:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("executive.campaign.faults.campaign.run_jobs", one_after_the_other)
         return Campaign(small).run_single_faults()
@@ -68,7 +68,7 @@ def one_after_the_other(
 
 
 def test_every_fault_is_tried_once_in_the_order_of_the_list(
-    figures: FaultFigures, small: MissionUnderTest
+    figures: FaultCampaignResults, small: MissionUnderTest
 ) -> None:
     last = [trial.fault_numbers[-1] for trial in figures.trials]
     assert last == sorted(set(last))
@@ -81,7 +81,7 @@ def test_every_fault_is_tried_once_in_the_order_of_the_list(
     assert (figures.complete, figures.listed) == (True, len(faults))
 
 
-def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: FaultFigures) -> None:
+def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: FaultCampaignResults) -> None:
     ways = [(branch.what, branch.place.rpartition(":")[2]) for branch in figures.branches]
     assert ways == [
         ("finally", "18"), ("choice 2", "10"), ("catch on Grasp.missed", "15"),
@@ -95,7 +95,7 @@ def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: F
 
 
 def test_a_recovery_without_a_run_is_listed_with_its_position(
-    figures: FaultFigures, small: MissionUnderTest
+    figures: FaultCampaignResults, small: MissionUnderTest
 ) -> None:
     without = [trial for trial in figures.trials if "Grasp missed" not in " ".join(trial.descriptions)]
     without = [trial for trial in without if not trial.what.startswith("no seal")]
@@ -112,7 +112,7 @@ def test_pairs_are_drawn_by_the_seed_and_come_in_the_same_order_from_any_number_
     monkeypatch.setattr("executive.campaign.faults.campaign.run_jobs", one_after_the_other)
     one, other = Campaign(small).run_fault_pairs(3), Campaign(replace(small, seed=3)).run_fault_pairs(3)
     assert (one, [len(trial.fault_numbers) for trial in one.trials]) == (two, [2] * 3)
-    assert [trial.label for trial in one.trials] != [trial.label for trial in other.trials]
+    assert [trial.fault_option for trial in one.trials] != [trial.fault_option for trial in other.trials]
 
 
 @pytest.fixture

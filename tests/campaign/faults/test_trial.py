@@ -15,7 +15,7 @@ from executive.events import FaultInjected, ItemChanged, NodeEnded, RunEnded
 from executive.plugins import load_skills
 from executive.record.journal import read_journal
 from executive.testing.run_mission import run_mission
-from executive.view.figures.fault_figures import Trial
+from executive.view.results.fault_results import Trial
 
 
 def number_of(campaign: Campaign, name: str, what: str, when: str = "first", *, behind: bool = False) -> int:
@@ -83,7 +83,7 @@ def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campai
     both = tried(campaign, number_of(campaign, "Transit", "unreachable"), behind)
     assert (both.verdict, both.raised, both.problems) == ("ok", True, ())
     assert campaign.faults[behind - 1].location in both.entered_paths
-    assert both.label.endswith(f"+{behind}")
+    assert both.fault_option.endswith(f"+{behind}")
 
 
 def test_no_skill_says_that_it_dropped_what_sticks(campaign: Campaign) -> None:

@@ -14,7 +14,7 @@ from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 from executive.view.report.activity_times import (
     LOOK,
-    NO_OBJECT,
+    NO_ITEM,
     RETRY,
     WAITING,
     ActivityTimes,
@@ -47,14 +47,14 @@ def test_a_failed_attempt_a_look_ahead_and_a_wait_are_distinguished():
         ran("Wait", 7.1, 8.1), ran("Detect", 8.1, 8.2),
     ]  # fmt: skip
     times = times_of(course, TREE, [(1.1, "cube-1"), (2.3, "cube-1"), (4.1, "duck-1")], 8.5)
-    assert list(times.times_by_item) == ["cube-1", "duck-1", NO_OBJECT]
+    assert list(times.times_by_item) == ["cube-1", "duck-1", NO_ITEM]
     assert times.times_by_item["cube-1"] == near(
         {LOOK: 1.1, RETRY: 1.2, "approach": 0.7, "grasp": 0.1, "transit": 1.9, "release": 0.1}
     )
     assert times.times_by_item["duck-1"] == near(
         {"approach": 0.9, "grasp": 0.1, "transit": 0.9, "release": 0.1}
     )
-    assert times.times_by_item[NO_OBJECT] == near({WAITING: 1.3, LOOK: 0.1})
+    assert times.times_by_item[NO_ITEM] == near({WAITING: 1.3, LOOK: 0.1})
     assert times.activities == (LOOK, "approach", "grasp", "transit", "release", RETRY, WAITING)
 
 
@@ -73,14 +73,14 @@ def test_an_attempt_that_was_the_last_was_in_vain_up_to_its_end():
         ran("Detect", 1.2, 1.3),
     ]  # fmt: skip
     times = times_of(course, TREE, [(0.5, "cube-1")], 1.3)
-    assert times.times_by_item == {"cube-1": near({WAITING: 0.5, RETRY: 0.7}), NO_OBJECT: near({LOOK: 0.1})}
+    assert times.times_by_item == {"cube-1": near({WAITING: 0.5, RETRY: 0.7}), NO_ITEM: near({LOOK: 0.1})}
 
 
 def test_the_time_before_the_first_skill_and_after_the_last_belongs_to_the_run():
     times = times_of([ran("Transit", 1.0, 2.0, "cube-1", "INVALID")], TREE, [(1.0, "cube-1")], 2.4)
     assert times.times_by_item == {
         "cube-1": near({WAITING: 1.0, "transit": 1.0}),
-        NO_OBJECT: near({WAITING: 0.4}),
+        NO_ITEM: near({WAITING: 0.4}),
     }
 
 
@@ -88,7 +88,7 @@ def test_a_skill_that_is_called_like_another_activity_has_no_column_of_its_own()
     tree = [*TREE, skill("Look", "arm")]
     times = times_of([ran("Look", 0.0, 1.0, "cube-1"), ran("Detect", 1.0, 2.0)], tree, [], 2.0)
     assert times.activities == (LOOK,)
-    assert times.times_by_item == {"cube-1": near({LOOK: 1.0}), NO_OBJECT: near({LOOK: 1.0})}
+    assert times.times_by_item == {"cube-1": near({LOOK: 1.0}), NO_ITEM: near({LOOK: 1.0})}
 
 
 TIMES = st.integers(0, 240).map(lambda ticks: ticks / 24)
@@ -116,8 +116,8 @@ def test_every_instant_belongs_to_one_object_and_one_activity(course, decisions,
     assert all(seconds > 0 for seconds in spent)
     assert list(times.activities) == list(dict.fromkeys(times.activities))
     assert {activity for row in times.times_by_item.values() for activity in row} == set(times.activities)
-    assert NO_OBJECT not in list(times.times_by_item)[:-1]
+    assert NO_ITEM not in list(times.times_by_item)[:-1]
     for item, row in times.times_by_item.items():
         # Nobody's time is spent on an object that was never decided for nor handled.
-        assert item == NO_OBJECT or item in {span.item for span in course} | {name for _, name in decisions}
+        assert item == NO_ITEM or item in {span.item for span in course} | {name for _, name in decisions}
         assert RETRY not in row or any(span.item == item and span.status == "FAILURE" for span in course)

@@ -15,7 +15,7 @@ from made_up_runs import TREE, activation, picks, ran
 from executive.mission.outline import OutlineNode
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
-from executive.view.report.lanes import MAX_BARS, MAX_LENGTH, MIN_LENGTH, draw_lanes
+from executive.view.report.lanes import MAX_AXIS_LENGTH, MAX_BAR_COUNT, MIN_AXIS_LENGTH, draw_lanes
 
 THINNEST = 1.5
 SVG = "{http://www.w3.org/2000/svg}"
@@ -77,12 +77,13 @@ def test_distinguishable_bars_stay_separate_and_short_activations_are_visible():
 
 def test_however_long_the_run_its_timeline_has_a_bound():
     text = drawn(picks(3_000), 15_000.0)
-    assert MAX_BARS / 3 < text.count("<rect") <= MAX_BARS + len(TREE)
-    assert len(text) < 300 * MAX_BARS
+    assert MAX_BAR_COUNT / 3 < text.count("<rect") <= MAX_BAR_COUNT + len(TREE)
+    assert len(text) < 300 * MAX_BAR_COUNT
 
 
 @pytest.mark.parametrize(
-    ("end", "length"), [(0.0, MIN_LENGTH), (1.0, MIN_LENGTH), (100.0, 4500.0), (4e6, MAX_LENGTH)]
+    ("end", "length"),
+    [(0.0, MIN_AXIS_LENGTH), (1.0, MIN_AXIS_LENGTH), (100.0, 4500.0), (4e6, MAX_AXIS_LENGTH)],
 )
 def test_the_time_axis_is_neither_too_short_nor_too_long_and_its_times_stand_clear(end, length):
     picture = ElementTree.fromstring(drawn([ran("Wait", 0.0, end)], end))

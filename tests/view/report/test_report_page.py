@@ -12,8 +12,8 @@ import pytest
 from page_reader import SECTIONS, Page
 
 from executive.record.journal import find_run_start, read_journal
-from executive.view.report.facts import ReportFacts
 from executive.view.report.page import render_report, write_report
+from executive.view.report.report_data import ReportData
 
 NASTY = """</style></title><script>alert("x")</script><img src=x onerror='y'> & {{ 7 * 7 }} {% raw %} \x00"""
 WORDS = {"kind", "status", "state", "file", "node", "path", "item", "origin", "picture"}
@@ -21,7 +21,7 @@ WORDS = {"kind", "status", "state", "file", "node", "path", "item", "origin", "p
 
 
 def page(run: Path) -> Page:
-    return Page(render_report(ReportFacts(run)))
+    return Page(render_report(ReportData(run)))
 
 
 def change(file: Path, change: Any) -> None:
@@ -71,10 +71,10 @@ def test_a_success_has_no_story_and_says_what_is_in_the_bins(done):
 
 
 def test_every_object_has_its_outcome_time_picture_and_problems(failed):
-    found, facts = page(failed), ReportFacts(failed)
+    found, facts = page(failed), ReportData(failed)
     text = found.texts["objects"]
-    assert all(f"{row.item} rejected" in text for row in facts.objects)
-    assert [row.item for row in facts.objects] == ["sphere-1", "sphere-2"]
+    assert all(f"{row.item} rejected" in text for row in facts.items)
+    assert [row.item for row in facts.items] == ["sphere-1", "sphere-2"]
     assert "2 seen, 0 placed, 2 rejected" in text
     assert "0.81 s Grasp.missed no seal on sphere-1" in text
     alts = [attributes["alt"] for tag, attributes in found.elements if tag == "img"]
@@ -90,7 +90,7 @@ def test_the_rows_of_time_sum_up_to_the_time_of_the_run(failed, done, killed, co
     )
     assert "no object" in page(braked).texts["objects"]
     for run in (failed, done, killed, braked):
-        facts = ReportFacts(run)
+        facts = ReportData(run)
         rows = re.findall(r"</td><td>([0-9.]+)</td>\s*<td class=\"bar\">", render_report(facts))
         assert len(rows) == len(facts.activity_times.times_by_item)
         assert sum(map(float, rows)) == pytest.approx(facts.timeline.clock, abs=0.01 * len(rows))
@@ -156,7 +156,7 @@ def test_whatever_a_mission_says_is_text(failed, copy):
     odd.rename(run / "frames" / "000001_<script>'{{ 7 * 7 }}\".jpg")
     for name in ("journal.jsonl", "tree.json", "result.json"):
         change(run / name, nasty)
-    text = render_report(ReportFacts(run))
+    text = render_report(ReportData(run))
     found = Page(text)
     assert found.shape == plain.shape
     assert found.raw == plain.raw
@@ -169,7 +169,7 @@ def test_whatever_a_mission_says_is_text(failed, copy):
 
 @pytest.mark.parametrize("name", ["done", "failed", "killed"])
 def test_the_page_needs_nothing_from_outside(name, request):
-    text = render_report(ReportFacts(request.getfixturevalue(name)))
+    text = render_report(ReportData(request.getfixturevalue(name)))
     found = Page(text)
     tags = {tag for tag, _ in found.elements}
     assert not tags & {"script", "iframe", "object", "embed", "base", "form", "image", "use", "foreignobject"}

@@ -45,12 +45,12 @@ def inside(index: int, depths: list[int]) -> set[int]:
 
 
 def overlap(one: Rectangle, other: Rectangle) -> bool:
-    across = one.x < other.right and other.x < one.right
+    across = one.x < other.right_x and other.x < one.right_x
     return across and one.y < other.y + other.height and other.y < one.y + one.height
 
 
 def contains(outer: Rectangle, inner: Rectangle) -> bool:
-    right, bottom = outer.right - inner.right, outer.y + outer.height - inner.y - inner.height
+    right, bottom = outer.right_x - inner.right_x, outer.y + outer.height - inner.y - inner.height
     return min(inner.x - outer.x, inner.y - outer.y, right, bottom) >= -1e-6
 
 
@@ -59,13 +59,13 @@ def test_nodes_stand_clear_of_each_other_in_their_order_and_level_with_their_fir
     plan = compute_layout(depths, below(depths), nodes)
     assert not any(overlap(one, other) for one, other in itertools.combinations(plan.boxes, 2))
     for parent, among in enumerate(below(depths)):
-        middles = [plan.boxes[child].middle for child in among]
+        middles = [plan.boxes[child].middle_y for child in among]
         assert middles == sorted(middles)
         for child in among:
             trunk = plan.edge_xs[depths[child]]
-            assert plan.boxes[parent].right < trunk < plan.boxes[child].x - nodes[child].label_width
+            assert plan.boxes[parent].right_x < trunk < plan.boxes[child].x - nodes[child].label_width
         if among and not nodes[parent].subtree_name_width:
-            assert abs(plan.boxes[parent].middle - middles[0]) < 1e-6
+            assert abs(plan.boxes[parent].middle_y - middles[0]) < 1e-6
     whole = Rectangle(0, 0, plan.width, plan.height)
     assert all(contains(whole, part) for part in (*plan.boxes, *plan.frames.values()))
 

@@ -10,10 +10,10 @@ from xml.etree.ElementTree import Element
 from executive.mission.outline import Connection, OutlineNode
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import load_control_nodes
-from executive.view.text import replace_invalid_characters
-from executive.view.tree.card import make_card
+from executive.view.text import replace_invalid_xml_characters
 from executive.view.tree.dot import format_dot
-from executive.view.tree.svg import NodeNote, draw_svg, make_group_id
+from executive.view.tree.node_texts import make_node_texts
+from executive.view.tree.svg import NodeResult, draw_svg, make_group_id
 
 NASTY = """<b onload="x">&amp; 'quoted' "twice" \\ ]]> --> größer ≥ 日本 \x00\x1b \ud800"""
 RETRY = "up to 3 attempts, on Grasp.missed, Grasp.blocked"
@@ -46,9 +46,9 @@ NODES = [
 ]  # fmt: skip
 
 
-def parsed(nodes: list[OutlineNode], name: str = "sort", **notes: NodeNote) -> Element:
+def parsed(nodes: list[OutlineNode], name: str = "sort", **notes: NodeResult) -> Element:
     return ElementTree.fromstring(
-        draw_svg(nodes, name, {node.path: notes.get(node.title, NodeNote()) for node in nodes})
+        draw_svg(nodes, name, {node.path: notes.get(node.title, NodeResult()) for node in nodes})
     )
 
 
@@ -131,9 +131,9 @@ def test_the_picture_needs_nothing_else_and_its_colours_come_from_the_style_shee
 def test_text_from_a_mission_cannot_leave_its_place_in_the_svg():
     node = skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, slot=NASTY, subtrees=(NASTY,))
     picture = parsed([control("tree", 0, "sequence"), replace(node, depth=1)], NASTY)
-    group = groups(picture)[f"tree/{replace_invalid_characters(NASTY)}"]
-    assert picture.findtext(f"{SVG}title") == replace_invalid_characters(NASTY)
-    assert texts(group, "slot") == [replace_invalid_characters(NASTY)]
+    group = groups(picture)[f"tree/{replace_invalid_xml_characters(NASTY)}"]
+    assert picture.findtext(f"{SVG}title") == replace_invalid_xml_characters(NASTY)
+    assert texts(group, "slot") == [replace_invalid_xml_characters(NASTY)]
     assert NASTY[:24] in tooltip(group)
     draw_svg([node], NASTY).encode()
 
@@ -177,15 +177,15 @@ def test_the_dot_has_every_node_and_every_line():
 def test_a_skill_has_two_lines_of_params_at_most():
     detail = ", ".join(f"param_{number}: {number}" for number in range(9))
     lines = ("param_0: 0, param_1: 1,", "param_2: 2, param_3: 3, …")
-    assert make_card(skill("tree/A", 0, "A", detail=detail)).lines == lines
-    assert make_card(skill("tree/A", 0, "A", detail="x" * 100)).lines == ("x" * 28, "x" * 27 + "…")
+    assert make_node_texts(skill("tree/A", 0, "A", detail=detail)).lines == lines
+    assert make_node_texts(skill("tree/A", 0, "A", detail="x" * 100)).lines == ("x" * 28, "x" * 27 + "…")
 
 
 def test_a_note_stands_below_what_the_mission_says_in_a_box_with_room_for_it():
     message = "missed: no seal on big_yellow_duck-12 within 0.10 s after contact"
     plain = groups(parsed(NODES))
     noted = groups(
-        parsed(NODES, Grasp=NodeNote("FAILURE", ("1 done, 2 failed", message)), retry=NodeNote("RUNNING"))
+        parsed(NODES, Grasp=NodeResult("FAILURE", ("1 done, 2 failed", message)), retry=NodeResult("RUNNING"))
     )
     grasp = "tree/try/retry/do/Grasp"
     texts = sorted(noted[grasp].iter(f"{SVG}text"), key=lambda text: float(text.attrib["y"]))

@@ -1,4 +1,4 @@
-"""Facts about a run for its report, read from its run directory."""
+"""Data for the report of a run, read from the run directory."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ INTERRUPTED = "INTERRUPTED"
 """Status of a run whose journal has no end: the run was killed, or is still running."""
 
 
-class ReportFacts:
-    """Facts about a run for its report.
+class ReportData:
+    """Data for the report of a run.
 
     Args:
         path: The run directory.
@@ -30,11 +30,11 @@ class ReportFacts:
         path: The run directory.
         start: Event of the start of the run.
         result: Content of `result.json`; None if the file is missing or belongs to another run.
-        end: The result; without it, the event of the end of the run; None if neither exists.
+        end: The result, or else the event of the end of the run; None for an interrupted run.
         status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `INTERRUPTED`.
         nodes: Nodes of the tree.
         timeline: Timeline of the run.
-        objects: Last change of each item that is not a phantom.
+        items: Last change of each item that is not a phantom.
         activity_times: Time of the run by item and activity.
         pictures: Pictures of decisions and failures.
         requests: Requests of the operator, in order.
@@ -56,14 +56,15 @@ class ReportFacts:
         self.status = INTERRUPTED if self.end is None else self.end.status
         self.nodes = read_tree(directory.tree)
         self.timeline = Timeline.from_events(events)
-        items = self.timeline.items.list_items()
-        self.objects = [item for item in items if item.state != "phantom"]
+        all_items = self.timeline.items.list_items()
+        self.items = [item for item in all_items if item.state != "phantom"]
         self.activity_times = compute_activity_times(self.timeline, self.nodes)
-        self.pictures = collect_pictures(directory.pictures, [item.item for item in items])
+        self.pictures = collect_pictures(directory.pictures, [item.item for item in all_items])
         self.requests = list_requests(self.timeline)
         file = Path(self.start.file)
         mission = file.stem if file.parent == get_shipped_folder() else str(file)
-        options = mission, self.start.seed, self.start.overrides
-        self.repeat_command = format_repeat_command(*options, self.requests, directory.scene)
+        self.repeat_command = format_repeat_command(
+            mission, self.start.seed, self.start.overrides, self.requests, directory.scene
+        )
         self.resume_command = "" if self.status in FINAL_STATUSES else make_resume_command(str(path))
         self.replay_command = shlex.join(["executive", "replay", str(path)])

@@ -9,10 +9,9 @@ from executive.testing.conformance.conformance_check import Verdict
 
 
 def format_verdicts(verdicts: Sequence[Verdict]) -> Iterator[str]:
-    """Yield a line per check: its status, the skill, the name of the check, and the first problem."""
+    """Yield a line per check: status, skill, name of the check, and the first problem of a failed check."""
     for verdict in verdicts:
         line = f"{verdict.status:7}  {verdict.skill}.{verdict.check}"
-        # The cause for which a check was not run is not repeated on its line.
         if verdict.status == "failed":
             other_count = len(verdict.problems) - 1
             line += f": {verdict.problems[0]}" + (f" (and {other_count} more)" if other_count else "")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from itertools import pairwise
+from operator import itemgetter
 
-COLUMNS = ("first", "middle", "late", "lasting")
-"""Occasions at which a fault is injected: columns of the table of verdicts."""
+OCCASIONS = ("first", "middle", "late", "lasting")
+"""Values of `Trial.when`; each has a column in the table of verdicts."""
 
 
 @dataclass(frozen=True)
@@ -16,13 +16,13 @@ class Trial:
     """One run with injected faults.
 
     Attributes:
-        fault_numbers: Numbers of the injected faults; the last fault is under test, and occurs only if the
-            others occurred before.
+        fault_numbers: Numbers of the injected faults. The last fault is under test; it occurs only after all
+            other faults.
         descriptions: Description of each fault.
-        name: Name of the skill that the last fault affects, or of another affected part of the cell.
+        name: Name of the skill, or of the part of the cell, that the last fault affects.
         place: File and line of the affected node in the mission, or "".
         what: Failure reason that the last fault should cause, or kind of the fault.
-        when: Occasion of the last fault, one of `COLUMNS`.
+        when: Occasion of the last fault, one of `OCCASIONS`.
         happened: True if all faults occurred.
         raised: True if the affected node failed with the expected reason, or if no reason is expected.
         is_halted_by_user: True if the user halted the run.
@@ -61,13 +61,13 @@ class Trial:
     remark: str = ""
 
     @property
-    def label(self) -> str:
+    def fault_option(self) -> str:
         """Value of the option `--fault` that repeats the trial: `12`, or `3+12`."""
         return "+".join(map(str, self.fault_numbers))
 
     @property
     def verdict(self) -> str:
-        """Short verdict: `!!` for a problem, `-` if a fault did not occur, `ok`, or status and reason."""
+        """Verdict: `!!` (problem), `-` (fault did not occur), `ok`, `ok -N` (N objects fewer), or status."""
         if self.problems:
             return "!!"
         if not self.happened:
@@ -86,7 +86,7 @@ class Branch:
     Attributes:
         place: File and line of the branch in the mission.
         what: Kind of the branch: `catch on Grasp.missed`, `recover`, `choice 2`, `finally`.
-        paths: Paths of the root of the branch in the tree; a branch in a subtree that is used twice has two.
+        paths: Path of the root of the branch, for each use of the subtree that contains the branch.
         entered: Number of trials that entered the branch.
     """
 
@@ -97,12 +97,12 @@ class Branch:
 
 
 @dataclass(frozen=True)
-class FaultFigures:
+class FaultCampaignResults:
     """Results of a fault campaign on one mission.
 
     Attributes:
         mission: Name of the mission.
-        cell: Kind of the cell, and source of the detections.
+        cell: Kind of the cell, and source of the detections, as text.
         seed: Seed of the random numbers.
         robot_time: Duration of a run without faults on its clock [s].
         listed: Number of single faults that can be injected in the mission.
@@ -133,19 +133,19 @@ class FaultFigures:
         return tuple(branch for branch in self.branches if not branch.entered)
 
 
-def results_to_json(figures: FaultFigures) -> dict[str, object]:
+def results_to_json(results: FaultCampaignResults) -> dict[str, object]:
     """Return the results as JSON values; times in s."""
     names = ("mission", "cell", "seed", "listed", "pairs", "complete")
     return {
-        **{name: getattr(figures, name) for name in names},
-        "robot_time_s": figures.robot_time,
-        "runs": len(figures.trials),
-        "failed": len(figures.failed_trials),
+        **{name: getattr(results, name) for name in names},
+        "robot_time_s": results.robot_time,
+        "runs": len(results.trials),
+        "failed": len(results.failed_trials),
         "branches": [
             {"place": branch.place, "what": branch.what, "entered": branch.entered}
-            for branch in figures.branches
+            for branch in results.branches
         ],
-        "trials": [trial_to_json(trial) for trial in figures.trials],
+        "trials": [trial_to_json(trial) for trial in results.trials],
     }
 
 
@@ -154,110 +154,115 @@ def trial_to_json(trial: Trial) -> dict[str, object]:
     values = asdict(trial)
     for name in ("fault_numbers", "descriptions", "name", "is_halted_by_user", "entered_paths", "robot_time"):
         del values[name]
-    values |= {"fault": trial.label, "verdict": trial.verdict, "robot_time_s": trial.robot_time}
+    values |= {"fault": trial.fault_option, "verdict": trial.verdict, "robot_time_s": trial.robot_time}
     return {**values, "descriptions": list(trial.descriptions), "problems": list(trial.problems)}
 
 
-def format_results(figures: FaultFigures) -> str:
+def format_results(results: FaultCampaignResults) -> str:
     """Return the results of a campaign as a text."""
-    return "\n".join(_describe(figures))
+    return "\n".join(_list_result_lines(results))
 
 
 def format_trial(trial: Trial) -> str:
     """Return the faults, the end and the problems of one trial as a text."""
-    return "\n".join(_describe_trial(trial))
+    return "\n".join(_list_trial_lines(trial))
 
 
-def _describe(figures: FaultFigures) -> Iterator[str]:
-    trials = figures.trials
-    faults = "pairs of faults" if figures.pairs else "faults"
+def _list_result_lines(results: FaultCampaignResults) -> Iterator[str]:
+    """Yield the lines of the text about a campaign."""
+    trials = results.trials
+    faults_text = "pairs of faults" if results.pairs else "faults"
     yield (
-        f"{figures.mission} ({figures.cell}), seed {figures.seed}: {len(trials)} runs with {faults}; "
-        f"a run without faults takes {figures.robot_time:.1f} s"
+        f"{results.mission} ({results.cell}), seed {results.seed}: {len(trials)} runs with {faults_text}; "
+        f"a run without faults takes {results.robot_time:.1f} s"
     )
-    if not figures.complete:
+    if not results.complete:
         yield "  ended by the user before the last run"
-    if not figures.pairs:
+    if not results.pairs:
         yield ""
-        yield from _tabulate(trials)
+        yield from _list_table_lines(trials)
         yield ""
-    yield from _count_verdicts(trials)
-    yield f"  runs with a problem: {len(figures.failed_trials) or 'none'}"
-    for trial in figures.failed_trials:
-        yield from (f"    {line}" for line in _describe_trial(trial))
-    yield from _list_remarks(trials)
-    branches, unentered_branches = figures.branches, figures.unentered_branches
+    yield from _list_count_lines(trials)
+    yield f"  runs with a problem: {len(results.failed_trials) or 'none'}"
+    for trial in results.failed_trials:
+        yield from (f"    {line}" for line in _list_trial_lines(trial))
+    yield from _list_remark_lines(trials)
+    branches, unentered_branches = results.branches, results.unentered_branches
     yield f"  branches after a failure: {len(branches) - len(unentered_branches)} of {len(branches)} entered"
     for branch in unentered_branches:
         yield f"    never entered: {branch.place}: {branch.what}"
 
 
-def _tabulate(trials: Sequence[Trial]) -> Iterator[str]:
+def _list_table_lines(trials: Sequence[Trial]) -> Iterator[str]:
     """Yield the lines of a table of verdicts: a row per node and kind of fault, a column per occasion."""
     trials_by_row: dict[tuple[str, str, str], dict[str, list[Trial]]] = defaultdict(lambda: defaultdict(list))
     for trial in trials:
         trials_by_row[(trial.name, trial.place, trial.what)][trial.when].append(trial)
-    rows: list[tuple[str, ...]] = [("node", "place", "fault", *COLUMNS)]
-    for heading, columns in sorted(trials_by_row.items(), key=lambda entry: entry[0][:2]):
-        rows.append((*heading, *(_summarize(columns.get(column, ())) for column in COLUMNS)))
+    rows: list[tuple[str, ...]] = [("node", "place", "fault", *OCCASIONS)]
+    # The order of the faults of one node is kept.
+    for name, place, what in sorted(trials_by_row, key=itemgetter(0, 1)):
+        trials_by_occasion = trials_by_row[name, place, what]
+        verdicts = (_summarize_verdicts(trials_by_occasion[occasion]) for occasion in OCCASIONS)
+        rows.append((name, place, what, *verdicts))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    all_rows: list[tuple[str, ...]] = [("", "", ""), *rows]
-    for previous, row in pairwise(all_rows):
-        # Node and place are not repeated.
-        texts = row if row[:2] != previous[:2] else ("", "", *row[2:])
-        cells = (text.ljust(width) for text, width in zip(texts, widths, strict=True))
-        yield f"  {'  '.join(cells).rstrip()}"
+    previous_node = ("", "")
+    for name, place, *texts in rows:
+        # Name and place of a node are only in the first row of the node.
+        node = (name, place) if (name, place) != previous_node else ("", "")
+        previous_node = name, place
+        padded = (text.ljust(width) for text, width in zip((*node, *texts), widths, strict=True))
+        yield f"  {'  '.join(padded).rstrip()}"
 
 
-def _summarize(trials: Sequence[Trial]) -> str:
-    """Return a text with the common verdict, or with the number of `ok` and the most important other one."""
+def _summarize_verdicts(trials: Sequence[Trial]) -> str:
+    """Return the common verdict of trials, or the number of `ok` and the most important other verdict."""
     if not trials:
         return ""
-    # Trials without an occurrence of the fault are ignored if the fault occurred in another trial.
+    # A trial whose fault did not occur counts only if the fault occurred in no trial.
     trials = [trial for trial in trials if trial.verdict != "-"] or trials
     verdicts = Counter(trial.verdict for trial in trials)
     if len(verdicts) == 1:
         (verdict,) = verdicts
         return verdict if len(trials) == 1 or verdict == "-" else f"{verdict} {len(trials)}/{len(trials)}"
-    ok = verdicts.pop("ok", 0)
-    worst = "!!" if "!!" in verdicts else verdicts.most_common(1)[0][0]
-    return f"ok {ok}/{len(trials)}, {worst}"
+    ok_count = verdicts.pop("ok", 0)
+    worst_verdict = "!!" if "!!" in verdicts else verdicts.most_common(1)[0][0]
+    return f"ok {ok_count}/{len(trials)}, {worst_verdict}"
 
 
-def _count_verdicts(trials: Sequence[Trial]) -> Iterator[str]:
-    def count(verdict: str) -> int:
-        return sum(trial.verdict == verdict for trial in trials)
-
-    fewer = sum(trial.verdict.startswith("ok -") for trial in trials)
-    failed = sum(trial.verdict.startswith("FAILURE") for trial in trials)
-    yield (
-        f"  as without faults: {count('ok')}; fewer objects sorted: {fewer}; failed: {failed}; "
-        f"ended as FAULT: {count('FAULT')}; fault did not occur: {count('-')}; wrong: {count('!!')}"
-    )
+def _list_count_lines(trials: Sequence[Trial]) -> Iterator[str]:
+    """Yield the number of trials by verdict, and the number of failed trials by reason."""
+    counts = Counter(trial.verdict for trial in trials)
+    reduced_count = sum(trial.verdict.startswith("ok -") for trial in trials)
     reasons = Counter(trial.reason for trial in trials if trial.verdict.startswith("FAILURE"))
+    yield (
+        f"  as without faults: {counts['ok']}; fewer objects sorted: {reduced_count}; "
+        f"failed: {reasons.total()}; ended as FAULT: {counts['FAULT']}; "
+        f"fault did not occur: {counts['-']}; wrong: {counts['!!']}"
+    )
     if reasons:
-        yield f"  failures: {', '.join(f'{reason} {number}' for reason, number in reasons.most_common())}"
+        yield f"  failures: {', '.join(f'{reason} {count}' for reason, count in reasons.most_common())}"
 
 
-def _list_remarks(trials: Sequence[Trial]) -> Iterator[str]:
-    """Yield a line per remark, with the labels of the trials that have it."""
-    labels_by_remark: dict[str, list[str]] = defaultdict(list)
+def _list_remark_lines(trials: Sequence[Trial]) -> Iterator[str]:
+    """Yield a line per remark, with the faults of the first three trials that have the remark."""
+    faults_by_remark: dict[str, list[str]] = defaultdict(list)
     for trial in trials:
         if trial.remark:
-            labels_by_remark[trial.remark].append(trial.label)
-    if labels_by_remark:
+            faults_by_remark[trial.remark].append(trial.fault_option)
+    if faults_by_remark:
         yield "  failed with another reason than the injected fault should cause:"
-    for remark, labels in labels_by_remark.items():
-        others = f" and {len(labels) - 3} more" if len(labels) > 3 else ""
-        yield f"    {remark}: fault {', '.join(labels[:3])}{others}"
+    for remark, faults in faults_by_remark.items():
+        more_text = f" and {len(faults) - 3} more" if len(faults) > 3 else ""
+        yield f"    {remark}: fault {', '.join(faults[:3])}{more_text}"
 
 
-def _describe_trial(trial: Trial) -> Iterator[str]:
-    yield f"fault {trial.label}: {'; and '.join(trial.descriptions)}"
+def _list_trial_lines(trial: Trial) -> Iterator[str]:
+    """Yield the lines of the text about a trial."""
+    yield f"fault {trial.fault_option}: {'; and '.join(trial.descriptions)}"
     if not trial.happened:
         subject = "one of the faults" if len(trial.descriptions) > 1 else "the fault"
         yield f"  {subject} did not occur"
-    end = " ".join(filter(None, (trial.status, trial.reason)))
-    node = f" at {trial.node}" if trial.node else ""
-    yield f"  {end}{node}{f': {trial.message}' if trial.message else ''}"
+    status_text = " ".join(filter(None, (trial.status, trial.reason)))
+    node_text = f" at {trial.node}" if trial.node else ""
+    yield f"  {status_text}{node_text}{f': {trial.message}' if trial.message else ''}"
     yield from (f"  wrong: {problem}" for problem in trial.problems)

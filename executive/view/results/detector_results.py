@@ -1,4 +1,4 @@
-"""Text and tables with the measured accuracy of a detector."""
+"""Results of the evaluation of a detector, as text and tables."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ def print_metrics(source: str, detector: str, evaluation: Evaluation) -> None:
     """Print the accuracy of the detector with the name `detector`, measured on `source`, to stderr."""
     console = Console(stderr=True, highlight=False, markup=False, force_terminal=False)
     console.print(f"{source}, detector {detector}")
-    for part in _list_parts(detector, evaluation):
-        console.print(part, soft_wrap=isinstance(part, str))
+    for line_or_table in _list_lines_and_tables(detector, evaluation):
+        console.print(line_or_table, soft_wrap=isinstance(line_or_table, str))
 
 
-def _list_parts(detector: str, evaluation: Evaluation) -> Iterator[RenderableType]:
+def _list_lines_and_tables(detector: str, evaluation: Evaluation) -> Iterator[RenderableType]:
+    """Yield the lines of text and the tables with the metrics of a detector."""
     yield f"  {evaluation.objects} objects on {evaluation.images} images, threshold {evaluation.threshold:g}"
     if evaluation.unavailable:
         fraction = evaluation.unavailable / evaluation.images
-        count = f"{evaluation.unavailable} of {evaluation.images} images ({fraction:.1%})"
-        yield f"  unavailable for {count}, last reason: {evaluation.why}"
+        images_text = f"{evaluation.unavailable} of {evaluation.images} images ({fraction:.1%})"
+        yield f"  unavailable for {images_text}, last reason: {evaluation.why}"
     if not evaluation.answered_by:
         return
     if set(evaluation.answered_by) != {detector}:
-        yield "  answered by " + ", ".join(
-            f"{name} ({count})" for name, count in evaluation.answered_by.items()
-        )
+        counts = (f"{name} ({count})" for name, count in evaluation.answered_by.items())
+        yield f"  answered by {', '.join(counts)}"
     yield (
         f"  precision {evaluation.precision:.2%}, recall {evaluation.recall:.2%}, "
         f"mAP50 {evaluation.map50:.4f}, mAP50-95 {evaluation.map50_95:.4f}"
@@ -56,8 +56,13 @@ def _make_class_table(evaluation: Evaluation) -> Table:
 def _make_confusion_table(evaluation: Evaluation) -> Table:
     """Return a table with the number of objects by true class (rows) and detected class (columns)."""
     table = _make_table("true \\ detected", *next(iter(evaluation.confusion.values())))
-    for label, row in evaluation.confusion.items():
-        table.add_row(label, *("" if label == other == NO_OBJECT else f"{row[other]}" for other in row))
+    for true_class, counts in evaluation.confusion.items():
+        # An object that is neither present nor detected is not counted.
+        cells = (
+            "" if true_class == detected_class == NO_OBJECT else str(count)
+            for detected_class, count in counts.items()
+        )
+        table.add_row(true_class, *cells)
     return table
 
 
@@ -76,10 +81,10 @@ def _make_error_table(evaluation: Evaluation) -> Table:
     return table
 
 
-def _make_table(first: str, *headings: str) -> Table:
-    """Return an empty table whose first column is aligned left, and the others right."""
+def _make_table(row_heading: str, *headings: str) -> Table:
+    """Return an empty table with a left-aligned column for the names of rows, and right-aligned columns."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 1))
-    table.add_column(first)
+    table.add_column(row_heading)
     for heading in headings:
         table.add_column(heading, justify="right")
     return table

@@ -19,7 +19,7 @@ from executive.record.journal_format import encode_event
 from executive.record.recorded_run import RecordOptions
 from executive.record.resumed_run import resume_run
 from executive.run.assembly import RunOptions
-from executive.view.report.facts import INTERRUPTED, ReportFacts
+from executive.view.report.report_data import INTERRUPTED, ReportData
 
 
 def append(run: Path, tick: int, event: Event) -> None:
@@ -33,7 +33,7 @@ def without_end(run: Path) -> None:
 
 
 def test_a_run_that_ended_is_described_by_its_result(failed):
-    facts = ReportFacts(failed)
+    facts = ReportData(failed)
     assert to_json(facts.result) == json.loads((failed / "result.json").read_text())
     assert (facts.status, facts.timeline.clock) == ("FAILURE", facts.result.robot_time_s)
     assert facts.resume_command == ""
@@ -44,9 +44,9 @@ def test_a_run_that_ended_is_described_by_its_result(failed):
 @pytest.mark.slow
 def test_an_interrupted_and_resumed_run_is_described_as_one(killed, copy):
     run = copy(killed)
-    assert ReportFacts(run).status == INTERRUPTED
+    assert ReportData(run).status == INTERRUPTED
     resume_run(run, load_skills(), RunOptions(3, kind=FakeCell), RecordOptions(saves_pictures=False))
-    facts = ReportFacts(run)
+    facts = ReportData(run)
     assert (facts.status, facts.resume_command) == ("SUCCESS", "")
     transits = [one for one in facts.timeline.activations if one.node.endswith("/Transit")]
     assert [one.status for one in transits] == ["INVALID", "SUCCESS"]
@@ -59,10 +59,10 @@ def test_an_interrupted_and_resumed_run_is_described_as_one(killed, copy):
 def test_a_result_from_before_the_run_was_taken_up_again_is_not_its_end(failed, copy):
     run = copy(failed)
     append(run, 312, RunResumed(310, "", {}))
-    facts = ReportFacts(run)
+    facts = ReportData(run)
     assert (facts.status, facts.end, facts.timeline.clock) == (INTERRUPTED, None, 1.3)
     append(run, 400, run_ended("HALTED", reason="halted", message="halted by the user", ticks=400))
-    facts = ReportFacts(run)
+    facts = ReportData(run)
     assert (facts.status, facts.end.message) == ("HALTED", "halted by the user")
     assert facts.resume_command == shlex.join(["executive", "run", "--resume", str(run)])
 
@@ -72,7 +72,7 @@ def test_a_run_whose_end_was_not_written_is_described_by_its_result(failed, copy
     without_end(run)
     result = json.loads((run / "result.json").read_text()) | {"status": "FAULT"}
     (run / "result.json").write_text(json.dumps(result))
-    facts = ReportFacts(run)
+    facts = ReportData(run)
     assert (facts.status, to_json(facts.result)) == ("FAULT", result)
 
 
@@ -80,10 +80,10 @@ def test_a_run_whose_end_was_not_written_is_described_by_its_result(failed, copy
 def test_a_result_that_is_none_tells_nothing(failed, copy, content):
     run = copy(failed)
     (run / "result.json").write_bytes(content.encode(errors="surrogatepass"))
-    facts = ReportFacts(run)
+    facts = ReportData(run)
     assert (facts.status, facts.end) == ("FAILURE", facts.timeline.ended)
     without_end(run)
-    assert (ReportFacts(run).status, ReportFacts(run).end) == (INTERRUPTED, None)
+    assert (ReportData(run).status, ReportData(run).end) == (INTERRUPTED, None)
 
 
 def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(done, copy):
@@ -93,7 +93,7 @@ def test_a_shipped_mission_is_repeated_by_its_name_and_with_what_was_asked_for(d
     (run / "journal.jsonl").write_text("\n".join([json.dumps(shipped), *others]) + "\n")
     append(run, 420, RequestGiven("apple"))
     append(run, 432, FaultInjected("object removed", "", "", "", []))
-    facts = ReportFacts(run)
+    facts = ReportData(run)
     assert facts.repeat_command == "executive run sort_fruit --seed 3 --request apple"
     assert facts.replay_command == shlex.join(["executive", "replay", str(run)])
     assert (facts.requests, facts.timeline.faults) == (["apple"], [(1.8, "object removed")])
@@ -103,7 +103,7 @@ def test_a_run_that_had_not_begun_has_nothing_to_report(done, copy):
     run = copy(done)
     (run / "journal.jsonl").write_text("")
     with pytest.raises(InputError) as caught:
-        ReportFacts(run)
+        ReportData(run)
     assert str(caught.value) == (
         f'the run in "{run}" was interrupted before its start; there is nothing to report'
     )

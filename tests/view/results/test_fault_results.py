@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from executive.view.figures.fault_figures import (
+from executive.view.results.fault_results import (
     Branch,
-    FaultFigures,
+    FaultCampaignResults,
     Trial,
     format_results,
     format_trial,
@@ -35,7 +35,7 @@ BRANCHES = (
     Branch("sort.yaml:14", "recover", ("tree/retry/recover",)),
 )
 TRIALS = (MISSED, LASTING, AGAIN, STUCK, NOWHERE, WRONG)
-FIGURES = FaultFigures("sort", "fake", 3, 11.5, 6, TRIALS, BRANCHES, True)
+FIGURES = FaultCampaignResults("sort", "fake", 3, 11.5, 6, TRIALS, BRANCHES, True)
 
 
 def test_the_matrix_has_a_row_per_node_and_fault_and_a_column_per_occasion() -> None:

@@ -1,1 +1,0 @@
-"""Results of measurements, as text and as JSON values."""
