@@ -16,7 +16,7 @@ from executive.motion.limits import JointLimits, compute_min_time
 from executive.motion.state import JointState
 
 MIN_JOINT_DIFFERENCE = 0.2
-"""Two candidates differ by more than this in at least one joint [rad]."""
+"""Difference that two candidates exceed in at least one joint [rad]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,8 @@
 """Straight motion of the tool, up or down, in one branch of the inverse kinematics.
 
 The joint path `q(s)` is a spline through inverse-kinematics solutions; its parameter `s` is the distance that
-the tool has moved. With speed `v`, acceleration `a` and jerk `j` of the tool, the chain rule gives
+the tool has moved. `q_s`, `q_ss` and `q_sss` are the derivatives of `q` by `s`. With speed `v`, acceleration
+`a` and jerk `j` of the tool, the chain rule gives
 
     q' = q_s v,  q'' = q_s a + q_ss v²,  q''' = q_s j + 3 q_ss v a + q_sss v³.
 

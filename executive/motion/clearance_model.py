@@ -4,7 +4,7 @@ The model gives the distances between all states of a motion and all obstacles i
 planner can check the found motion in a more exact model.
 
 The workspace counts as an obstacle, because undetected objects may lie in it. Near the two ends of a motion,
-where looks (images with detections) have found all objects, only known obstacles count.
+where detectors have found all objects, only known obstacles count.
 """
 
 from __future__ import annotations

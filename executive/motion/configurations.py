@@ -12,7 +12,7 @@ from executive.errors import Unreachable
 from executive.geometry import Array, Pose, make_tool_down_pose
 from executive.motion.arm_model import BranchKey, Kinematics, Solutions, wrap_angles
 
-LIMIT_MARGIN = math.radians(1.0)
+PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""
 COARSE_SPACING = math.radians(5.0)
 """Distance between the redundancy angles in the first search for configurations [rad]."""
@@ -52,7 +52,7 @@ def find_configuration_pairs(
     """
     x, y, z = goal.position
     poses = [make_tool_down_pose((x, y, z + length)), make_tool_down_pose((x, y, z))]
-    for spacing, margin in ((COARSE_SPACING, LIMIT_MARGIN), (FINE_SPACING, 0.0)):
+    for spacing, margin in ((COARSE_SPACING, PREFERRED_LIMIT_DISTANCE), (FINE_SPACING, 0.0)):
         upper, lower = (kinematics.solve_all(pose, q_start, spacing) for pose in poses)
         high, low = upper.qs, lower.qs
         allowed = kinematics.joint_range.shrink(margin)

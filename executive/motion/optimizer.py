@@ -17,7 +17,7 @@ from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import ClearanceModel, Discs
 from executive.motion.limits import JointLimits
 from executive.motion.payload import PayloadLimit
-from executive.motion.point_to_point import Connector, NoProfile, PointToPoint
+from executive.motion.point_to_point import Connector, JointLimitError, PointToPoint
 from executive.motion.state import JointState
 from executive.motion.transcription import (
     SAMPLES_PER_STEP,
@@ -46,8 +46,8 @@ class OptimizationProblem:
     """The optimization problem between two states.
 
     Attributes:
-        start, end: The states.
-        connector: Connects states within the joint limits.
+        start, end: States at the start and at the end of the motion.
+        connector: Planner of motions between two states within the joint limits.
         kinematics: Kinematics of the arm.
         clearance: Distances from the obstacles.
         discs: Discs that enclose the tool and the load.
@@ -101,13 +101,13 @@ class Optimizer:
     Args:
         problem: The optimization problem.
         initial_qs: Samples `(M, n)` [rad] of a motion between the states, at `SAMPLE_FRACTIONS`.
-        duration: Duration of this motion [s].
+        duration: Duration of the sampled motion [s].
 
     Attributes:
         cost: Duration of the best motion, plus the cost of its violated constraints [s].
 
     Raises:
-        NoProfile: The initial motion cannot be approximated within the joint limits.
+        JointLimitError: The initial motion cannot be approximated within the joint limits.
     """
 
     def __init__(self, problem: OptimizationProblem, initial_qs: Array, duration: float) -> None:
@@ -115,8 +115,8 @@ class Optimizer:
         self._transcription = Transcription(problem.start, problem.end, problem.connector.limits)
         motion = self._transcription.fit(INITIAL_DURATION_FRACTION * duration / STEP_COUNT, initial_qs)
         if motion is None:
-            raise NoProfile("no motion inside the joint limits approximates the motion that stops at corners")
-        self._best, self.cost, self._trust_radius = motion, np.inf, INITIAL_TRUST_RADIUS
+            raise JointLimitError("no motion inside the limits approximates the motion that stops at corners")
+        self._best_motion, self.cost, self._trust_radius = motion, np.inf, INITIAL_TRUST_RADIUS
         self._payload_constraints: list[LinearizedConstraints] = []
         self._set_last_motion(motion)
 
@@ -125,10 +125,10 @@ class Optimizer:
         for _ in range(max_step_count):
             rows = np.nonzero(self._slack < MAX_SLACK)[0]
             slack = self._slack[rows]
-            gradients = self._problem.compute_gradients(self._last.qs[rows], slack)
+            gradients = self._problem.compute_gradients(self._last_motion.qs[rows], slack)
             distances = LinearizedConstraints(slack, rows[:, None], gradients[:, None], np.zeros(len(rows)))
             constraints = [distances, *self._payload_constraints]
-            motion = self._transcription.shorten(self._last, constraints, self._trust_radius)
+            motion = self._transcription.shorten(self._last_motion, constraints, self._trust_radius)
             if motion is None:
                 return
             self._trust_radius *= TRUST_RADIUS_FACTOR
@@ -136,7 +136,7 @@ class Optimizer:
 
     def _set_last_motion(self, motion: DiscreteMotion) -> None:
         """Make `motion` the last motion, and also the best motion if its cost is the lowest."""
-        self._last, self._slack = motion, self._problem.compute_slack(motion.qs)
+        self._last_motion, self._slack = motion, self._problem.compute_slack(motion.qs)
         violations = [-float(self._slack.min())]
         if self._problem.payload is not None:
             sample_time = motion.step / SAMPLES_PER_STEP
@@ -145,7 +145,7 @@ class Optimizer:
             self._payload_constraints = [constraints]
         cost = motion.duration + VIOLATION_COST * max(0.0, *violations)
         if cost < self.cost:
-            self._best, self.cost = motion, cost
+            self._best_motion, self.cost = motion, cost
 
     def connect_states(self, *, is_exact: bool) -> tuple[PointToPoint, ...]:
         """Return the best motion as point-to-point motions between its states.
@@ -155,12 +155,12 @@ class Optimizer:
                 connect the states at all steps in minimum time; the path differs slightly.
 
         Raises:
-            NoProfile: No motion connects two of the states.
+            JointLimitError: No motion connects two of the states.
         """
-        min_duration = self._best.step / 2 if is_exact else None
+        min_duration = self._best_motion.step / 2 if is_exact else None
         states = [
             _limit_velocity(state, self._problem.connector.limits)
-            for state in self._transcription.compute_states(self._best)[:: 1 if is_exact else 2]
+            for state in self._transcription.compute_states(self._best_motion)[:: 1 if is_exact else 2]
         ]
         return tuple(self._problem.connector.connect(a, b, min_duration) for a, b in pairwise(states))
 

@@ -39,14 +39,16 @@ class PayloadLimit:
     """
 
     def __init__(self, load: Load, kinematics: Kinematics) -> None:
-        self._max_pull = load.holding_force / SAFETY_FACTOR / load.kind.mass  # maximum of |a + g| [m/s²]
+        self._max_specific_force = (
+            load.holding_force / SAFETY_FACTOR / load.kind.mass
+        )  # maximum of |a + g| [m/s²]
         self._centre_offset = load.kind.height / 2
         self._kinematics = kinematics
 
     @property
     def max_lift_acceleration(self) -> float:
         """Maximum upward acceleration [m/s²]."""
-        return max(self._max_pull - GRAVITY, MIN_LIFT_ACCELERATION)
+        return max(self._max_specific_force - GRAVITY, MIN_LIFT_ACCELERATION)
 
     def find_acceleration_fraction(self, trajectory: Trajectory) -> float:
         """Return the largest factor on the accelerations of a motion, 0 to 1, with the safety factor kept."""
@@ -55,7 +57,7 @@ class PayloadLimit:
             return 1.0
         # The interval before the last sample is shorter than a control step.
         acceleration = np.diff(centres[:-1], n=2, axis=0) / STEP**2
-        return float(np.min(_find_acceleration_fractions(acceleration, self._max_pull)))
+        return float(np.min(_find_acceleration_fractions(acceleration, self._max_specific_force)))
 
     def slow_down(self, trajectory: Trajectory) -> Trajectory:
         """Return the motion, slowed down so that it keeps the safety factor if possible."""
@@ -76,11 +78,11 @@ class PayloadLimit:
         rows = np.arange(SAMPLE_STRIDE - 1, len(qs) - 1, SAMPLE_STRIDE)[:, None] + np.array([-1, 0, 1])
         centres = self._locate_load(qs)
         acceleration = _SECOND_DIFFERENCE @ centres[rows] / sample_time**2
-        pull = acceleration + np.array([0.0, 0.0, GRAVITY])
-        magnitude = np.linalg.norm(pull, axis=1)
-        slack = DISTANCE_PER_ACCELERATION * (self._max_pull - magnitude)
+        specific_force = acceleration + np.array([0.0, 0.0, GRAVITY])
+        magnitude = np.linalg.norm(specific_force, axis=1)
+        slack = DISTANCE_PER_ACCELERATION * (self._max_specific_force - magnitude)
         chosen = np.nonzero(slack < max_slack)[0]
-        rows, direction = rows[chosen], pull[chosen] / magnitude[chosen, None]
+        rows, direction = rows[chosen], specific_force[chosen] / magnitude[chosen, None]
         displaced_qs = qs[rows][:, :, None] + _FINITE_DIFFERENCE_STEP * np.eye(qs.shape[1])
         displaced_centres = self._locate_load(displaced_qs.reshape(-1, qs.shape[1]))
         displaced_centres = displaced_centres.reshape(*displaced_qs.shape[:3], 3)
@@ -98,10 +100,10 @@ class PayloadLimit:
         return np.asarray(tips + self._centre_offset * axes)
 
 
-def _find_acceleration_fractions(accelerations: Array, max_pull: float) -> Array:
-    """Return the largest `k`, 0 to 1, with `|k a + g| <= max_pull` for accelerations `a` `(N, 3)` [m/s²]."""
+def _find_acceleration_fractions(accelerations: Array, max_specific_force: float) -> Array:
+    """Return the largest `k`, 0 to 1, at which `|k a + g|` keeps its maximum; `a` is `(N, 3)` [m/s²]."""
     square = np.sum(accelerations**2, axis=1) + 1e-12
     product = GRAVITY * accelerations[:, 2]
-    discriminant = product**2 - square * (GRAVITY**2 - max_pull**2)
+    discriminant = product**2 - square * (GRAVITY**2 - max_specific_force**2)
     fractions = (np.sqrt(np.maximum(discriminant, 0.0)) - product) / square
     return np.clip(np.where(discriminant < 0, 0.0, fractions), 0.0, 1.0)

@@ -25,7 +25,7 @@ from executive.motion.arm_model import Kinematics
 from executive.motion.configurations import find_configuration_pairs
 from executive.motion.limits import JointLimits
 from executive.motion.payload import PayloadLimit
-from executive.motion.point_to_point import NoProfile
+from executive.motion.point_to_point import JointLimitError
 from executive.motion.search import MotionSearch
 from executive.motion.trajectory import Trajectory, thin_out_path
 
@@ -73,7 +73,7 @@ class Planner:
         """Check that the arm reaches both a goal and the travel height above the goal in the same branch.
 
         Raises:
-            Unreachable: The arm does not; the message states the joint limit or the distance.
+            Unreachable: The arm cannot reach both; the message states the joint limit or the distance.
         """
         length = max(0.0, compute_travel_height(self._config) - goal.position[2])
         find_configuration_pairs(self.kinematics, goal, length, np.zeros(self.limits.joint_count))
@@ -86,7 +86,7 @@ class Planner:
         for motion in search.list_motions():
             try:
                 self._check_motion(motion, search, task)
-            except (Blocked, Unreachable, NoProfile) as error:
+            except (Blocked, Unreachable, JointLimitError) as error:
                 errors.append(str(error))
             else:
                 return motion
@@ -100,7 +100,7 @@ class Planner:
 
         Raises:
             Blocked: The motion comes too near to an obstacle.
-            Unreachable, NoProfile: The motion exceeds the range or another limit of a joint.
+            Unreachable, JointLimitError: The motion exceeds the range or another limit of a joint.
         """
         qs = motion.check_limits(self.limits).q
         is_guarded = motion.guarded_start_time < math.inf

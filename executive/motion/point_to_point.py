@@ -18,8 +18,8 @@ from executive.motion.state import JointState
 _ROUNDING_ERROR = 1e-9  # fraction of a limit
 
 
-class NoProfile(ValueError):
-    """No velocity profile inside the joint limits connects the given states."""
+class JointLimitError(ValueError):
+    """No motion within the joint limits exists, or a motion exceeds a limit."""
 
 
 class PointToPoint:
@@ -55,7 +55,7 @@ class Connector:
         The joint positions between the states are not limited.
 
         Raises:
-            NoProfile: No motion exists, for example because the velocity of a state exceeds its limit.
+            JointLimitError: No motion exists, for example because the velocity of a state exceeds its limit.
             Fault: A state lacks a finite number for a joint; ruckig would read out of bounds or crash.
         """
         count = self.limits.joint_count
@@ -82,7 +82,7 @@ class Connector:
                 problem = "its profile exceeds a velocity limit"
         if problem is not None:
             states = f"from {start.q.round(4)} to {end.q.round(4)} rad"
-            raise NoProfile(f"ruckig finds no profile {states}: {problem}")
+            raise JointLimitError(f"ruckig finds no profile {states}: {problem}")
         return PointToPoint(profile)
 
 

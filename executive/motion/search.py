@@ -22,7 +22,7 @@ from executive.motion.configurations import find_vertical_waypoints, solve_verti
 from executive.motion.limits import JointLimits
 from executive.motion.optimizer import OptimizationProblem, Optimizer
 from executive.motion.payload import PayloadLimit
-from executive.motion.point_to_point import Connector, NoProfile
+from executive.motion.point_to_point import Connector, JointLimitError
 from executive.motion.state import JointState, MotionPiece
 from executive.motion.trajectory import Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS
@@ -90,7 +90,7 @@ class MotionSearch:
         yield from self._list_direct_and_optimized(candidates)
         for extra_height in EXTRA_HEIGHTS:
             for candidate in candidates:
-                with contextlib.suppress(Unreachable, NoProfile):
+                with contextlib.suppress(Unreachable, JointLimitError):
                     corners = self._connect_with_corners(candidate, extra_height, is_straight=True)
                     yield self._build_motion(candidate, *corners)
 
@@ -135,7 +135,7 @@ class MotionSearch:
 
     def _list_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterator[Trajectory]:
         for is_exact in (False, True):
-            with contextlib.suppress(NoProfile):
+            with contextlib.suppress(JointLimitError):
                 yield self._build_motion(candidate, *optimizer.connect_states(is_exact=is_exact))
 
     def _evaluate_candidates(
@@ -155,7 +155,7 @@ class MotionSearch:
                 self._start, candidate.entry, self._connector, self._kinematics, self._clearance,
                 self._discs, self._payload,
             )  # fmt: skip
-            with contextlib.suppress(NoProfile, Unreachable):
+            with contextlib.suppress(JointLimitError, Unreachable):
                 free_part = self._connector.connect(self._start, candidate.entry)
                 qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
                 if problem.compute_slack(qs).min() >= 0:
@@ -192,7 +192,7 @@ class MotionSearch:
 
         Raises:
             Unreachable: A corner is out of reach in the branch of the candidate.
-            NoProfile: No motion connects two of the states.
+            JointLimitError: No motion connects two of the states.
         """
         connect, height = self._connector.connect, self._travel_height + extra_height
         if (height, is_straight) not in self._rises:

@@ -15,7 +15,7 @@ from executive.cell.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
 from executive.motion.limits import JointLimits
-from executive.motion.point_to_point import NoProfile
+from executive.motion.point_to_point import JointLimitError
 from executive.motion.state import JointState, MotionPiece
 
 _ROUNDING_ERROR = 1e-6
@@ -78,7 +78,7 @@ class Trajectory:
 
         Raises:
             Unreachable: A joint would leave its range; the message names the joint.
-            NoProfile: A velocity, acceleration or jerk would exceed its limit.
+            JointLimitError: A velocity, acceleration or jerk would exceed its limit.
         """
         states = self.samples
         # The samples are checked, because ruckig's `position_extrema` are too small if a joint turns back
@@ -88,7 +88,7 @@ class Trajectory:
         for name, peaks in zip(("velocity", "acceleration", "jerk"), peak_fractions, strict=True):
             joint = int(np.argmax(peaks))
             if peaks[joint] > 1 + _ROUNDING_ERROR:
-                raise NoProfile(
+                raise JointLimitError(
                     f"the {name} of joint {joint + 1} would be {peaks[joint]:.3f} times its limit"
                 )
         return states

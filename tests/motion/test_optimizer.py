@@ -13,7 +13,7 @@ from executive.geometry import Array, make_tool_down_pose
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.optimizer import OptimizationProblem, Optimizer
 from executive.motion.payload import PayloadLimit
-from executive.motion.point_to_point import NoProfile
+from executive.motion.point_to_point import JointLimitError
 from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS
@@ -81,7 +81,8 @@ def test_no_detour_follows_a_way_in_no_time(over_the_post) -> None:
     problem, corners = over_the_post()
     first = sample_pieces(corners, SAMPLE_FRACTIONS * sum(piece.duration for piece in corners)).q
     with pytest.raises(
-        NoProfile, match="no motion inside the joint limits approximates the motion that stops at corners"
+        JointLimitError,
+        match="no motion inside the limits approximates the motion that stops at corners",
     ):
         Optimizer(problem, first, 0.1)
 

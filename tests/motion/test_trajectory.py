@@ -13,7 +13,7 @@ from joint_states import LIMITS, positions, states
 from executive.cell.clock import STEP
 from executive.cells.sim.rebuild import to_trajectory
 from executive.errors import Fault, Unreachable
-from executive.motion.point_to_point import Connector, NoProfile
+from executive.motion.point_to_point import Connector, JointLimitError
 from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory, compute_peak_fractions, thin_out_path
 
@@ -109,7 +109,7 @@ def test_a_motion_outside_a_limit_cannot_be_flown_and_the_text_names_the_joint(l
     ]
     less = getattr(LIMITS, limit).copy()
     less[4] *= most / 1.01
-    with pytest.raises(NoProfile, match=rf"the {limit} of joint 5 would be 1\.010 times its limit"):
+    with pytest.raises(JointLimitError, match=rf"the {limit} of joint 5 would be 1\.010 times its limit"):
         motion.check_limits(replace(LIMITS, **{limit: less}))
 
 
