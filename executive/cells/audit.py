@@ -1,4 +1,4 @@
-"""Counts of the objects by their true final positions in a simulated or fake cell, made only after a run."""
+"""Counts of the objects of a simulated or fake cell by their true positions at the end of a run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from executive.cell.workcell import AUDIT_KEYS
 from executive.geometry import Array
 from executive.ledger.item import Record, State
 
-UNKNOWN = "unknown"
+UNKNOWN_LABEL = "unknown"
 """Label of an object without a class."""
 
 
@@ -21,8 +21,8 @@ class FinalObject:
     """An object at the end of a run.
 
     Attributes:
-        label: Class of the object, or `UNKNOWN`.
-        bin: Name of the bin that contains the object; "" outside of all bins, None off the table.
+        label: Class of the object, or `UNKNOWN_LABEL`.
+        bin: Name of the bin that contains the object; "" outside of all bins, None below the table.
         rest_positions: Positions of the object `(3,)` [m] at the start, and after each move and each fall.
         is_dropped: True if the object fell from the tool and has not been picked up since.
         is_held: True if the tool holds the object.
@@ -40,13 +40,13 @@ class FinalObject:
 def audit_objects(
     objects: Iterable[FinalObject], records: Sequence[Record], routes: Routes, max_distance: float
 ) -> dict[str, int]:
-    """Return the number of objects that ended `right`, `wrong_bin`, `left` on the table, or `elsewhere`.
+    """Return the number of objects by outcome.
 
-    A held object counts as `left`, even above a bin. An object that was dropped into a wrong bin counts as
-    `elsewhere` and as `fell_in_wrong_bin`. An object is unseen if no item of the ledger was first seen near
-    it. A removed object counts only if it was seen: as `right` or `wrong_bin` if it was placed in a bin,
-    otherwise as `elsewhere`. An unseen object of unknown class is counted only if it is in a wrong bin, and
-    never as `unseen`.
+    `right` and `wrong_bin` count objects in permitted and in other bins. `left` counts objects on the table
+    and the held object. `elsewhere` counts objects below the table, and objects that fell into a wrong bin,
+    which `fell_in_wrong_bin` counts too. `unseen` counts objects without a ledger item first seen near them.
+    A removed object counts only if it was seen: as `elsewhere`, unless the tool placed the object in a bin.
+    An unseen object without a class counts only if it is in a wrong bin, and never as `unseen`.
 
     Args:
         objects: The objects of the world, including removed objects.
@@ -58,8 +58,8 @@ def audit_objects(
     first_positions = [record.first_position for record in records if record.state is not State.PHANTOM]
     for final_object in objects:
         is_seen = any(
-            float(np.linalg.norm((first - position)[:2])) <= max_distance
-            for first in first_positions
+            float(np.linalg.norm((first_position - position)[:2])) <= max_distance
+            for first_position in first_positions
             for position in final_object.rest_positions
         )
         outcome = _find_outcome(final_object, routes)
@@ -68,7 +68,7 @@ def audit_objects(
             counts[outcome if was_placed else "elsewhere"] += is_seen
             continue
         fell_in_wrong_bin = outcome == "wrong_bin" and final_object.is_dropped
-        is_ignored = final_object.label == UNKNOWN and not is_seen
+        is_ignored = final_object.label == UNKNOWN_LABEL and not is_seen
         if not is_ignored or outcome == "wrong_bin":
             counts["elsewhere" if fell_in_wrong_bin else outcome] += 1
         counts["fell_in_wrong_bin"] += fell_in_wrong_bin
@@ -77,7 +77,7 @@ def audit_objects(
 
 
 def _find_outcome(final_object: FinalObject, routes: Routes) -> str:
-    """Return `right`, `wrong_bin`, `left` or `elsewhere`, regardless of drops and removals."""
+    """Return `right`, `wrong_bin`, `left` or `elsewhere` for the final position, without regard to drops."""
     if final_object.is_held:
         return "left"
     if not final_object.bin:

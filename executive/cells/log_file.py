@@ -9,7 +9,7 @@ from executive.errors import Fault, InputError, describe_os_error, explain_os_er
 
 
 class LogFile:
-    """A file that is written without a buffer: a killed process loses no written data.
+    """A file without a write buffer, so that a killed process loses no written data.
 
     Args:
         path: Path of the file.
@@ -27,22 +27,17 @@ class LogFile:
             if length is not None:
                 os.ftruncate(self._file, length)
 
-    @property
-    def is_open(self) -> bool:
-        """True until the file is closed, or until a write fails."""
-        return self._file is not None
-
     def write(self, data: bytes, offset: int) -> None:
         """Write all data at an offset in the file [byte]; do nothing if the file is closed.
 
         Raises:
-            Fault: The disk does not accept the data. Later writes do nothing and raise no fault, so
-                that the run can still bring the arm to rest.
+            Fault: The disk does not accept the data. Later calls do nothing, so that the run can still
+                bring the arm to rest.
         """
         try:
             while data and self._file is not None:
-                written_count = os.pwrite(self._file, data, offset)
-                data, offset = data[written_count:], offset + written_count
+                byte_count = os.pwrite(self._file, data, offset)
+                data, offset = data[byte_count:], offset + byte_count
         except OSError as error:
             self.close()
             raise Fault(

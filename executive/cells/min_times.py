@@ -16,16 +16,16 @@ class CellMinTimes:
 
     def __init__(self, config: CellConfig, touch_distance: float, max_excess_height: float = 0.0) -> None:
         self._config = config
-        self._max_saved_distance = touch_distance + max_excess_height
+        self._max_shortening = touch_distance + max_excess_height
 
     @property
     def descent_time(self) -> float:
-        """Minimum time of a guarded descent [s]; it ends early at an object above its expected height."""
+        """Minimum time of a guarded descent [s], which an object above its expected height shortens."""
         motion = self._config.motion
-        return max(0.0, motion.descent - self._max_saved_distance) / motion.descent_speed
+        return max(0.0, motion.descent - self._max_shortening) / motion.descent_speed
 
     def get_transport_time(self, bin: str | None) -> float:
-        """Return the minimum time of the transport of an object to a bin [s]; None: to the nearest bin.
+        """Return the minimum time to transport an object to a bin, or for None to the nearest bin [s].
 
         The time is 0 for a bin that the cell lacks or that the arm does not reach.
         """
@@ -33,11 +33,11 @@ class CellMinTimes:
         return min(map(self._compute_min_transport_time, names), default=0.0)
 
     def get_answer_time(self, detector: str) -> float:
-        """Return the latency of a detector [s]; "": of the first one; 0 if the cell lacks the detector."""
+        """Return the latency of a detector, or for "" of the first detector [s]; 0 without the detector."""
         detectors = self._config.detectors
         config = detectors.get(detector or next(iter(detectors)))
         return config.latency if config else 0.0
 
     def _compute_min_transport_time(self, bin: str) -> float:
-        """Return the minimum time of the transport of an object to a bin of the cell [s]."""
+        """Return the minimum time to transport an object to a bin of the cell [s]."""
         raise NotImplementedError

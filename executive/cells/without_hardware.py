@@ -1,4 +1,4 @@
-"""Cell without arm, tool and camera: base class of the simulated and the fake cell, and cell of a replay."""
+"""Cell without arm, tool and camera, which is the base class of the simulated and the fake cell."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from executive.perception.evidence import find_classes_distinct_by_touch
 
 
 class CellWithoutHardware:
-    """Clock, bins, classes and ledger of a cell file; implements `executive.cell.workcell.Workcell`.
+    """Clock, bins, classes and ledger of a cell; implements `executive.cell.workcell.Workcell`.
 
-    Arm, tool, camera, detectors and localizer of `cell` are None until a subclass adds them.
+    Arm, tool, camera, detectors and localizer of `cell` are None until a subclass adds them. A replay uses
+    the class without a subclass.
 
     Args:
         config: The cell file.
@@ -37,7 +38,7 @@ class CellWithoutHardware:
         routes: Names of the permitted bins of each class.
         accounts: The ledger of the run.
         cell: The cell as skills use it.
-        steps: Number of control steps since the run began.
+        steps: Number of control steps since the start of the run.
         last_command: Control step of the last logged command to arm or tool; 0 if there is none.
     """
 
@@ -47,29 +48,29 @@ class CellWithoutHardware:
         del seed
         self.config, self.routes = config, dict(routes)
         self.steps = self.last_command = 0
-        bins, distinct = build_bins(config), find_classes_distinct_by_touch(config)
-        self.accounts = Tracker(config.ledger, config.table, bins, self.routes, emit, distinct)
-        missing: Any = None
+        bins, distinct_classes = build_bins(config), find_classes_distinct_by_touch(config)
+        self.accounts = Tracker(config.ledger, config.table, bins, self.routes, emit, distinct_classes)
+        no_device: Any = None
 
-        def emit_decision(target: Target, bin: str) -> None:
+        def emit_selection(target: Target, bin: str) -> None:
             emit(TargetSelected(target.item, target.label, target.frame, bin))
 
         self.cell = Cell(
             clock=StepClock(lambda: self.steps * STEP),
-            arm=missing,
-            tool=missing,
-            camera=missing,
-            detectors=dict.fromkeys(config.detectors, missing),
+            arm=no_device,
+            tool=no_device,
+            camera=no_device,
+            detectors=dict.fromkeys(config.detectors, no_device),
             ledger=self.accounts,
             operator=options.operator,
             bins=bins,
             classes=build_object_classes(config),
             routes=self.routes,
-            localizer=missing,
+            localizer=no_device,
             safe_place=np.array(config.safe_place),
             descent=config.motion.descent,
             descent_speed=config.motion.descent_speed,
-            report_selection=emit_decision,
+            report_selection=emit_selection,
         )
 
     def log_to(self, path: Path) -> None:

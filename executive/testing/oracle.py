@@ -20,7 +20,7 @@ from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
 from executive.cell.detection import Detection
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
-from executive.cells.audit import UNKNOWN
+from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim.camera import Image, SimCamera
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
@@ -101,7 +101,7 @@ class TruthCamera(SimCamera):
         return tuple(
             Detection(outline.label, ORACLE_CONFIDENCE, compute_bounding_box(outline.pixels))
             for outline in outlines
-            if outline.label != UNKNOWN and not any(other.is_occluding(outline) for other in outlines)
+            if outline.label != UNKNOWN_LABEL and not any(other.is_occluding(outline) for other in outlines)
         )
 
 

@@ -13,7 +13,7 @@ from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
-from executive.cells.audit import UNKNOWN
+from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim.audit import audit_bodies
 from executive.cells.sim.cell import SimCell
 from executive.events import Emit, ItemChanged
@@ -81,7 +81,7 @@ class FoundObject:
     @property
     def is_known(self) -> bool:
         """True if it is of a class of the cell."""
-        return self.label != UNKNOWN
+        return self.label != UNKNOWN_LABEL
 
     @property
     def is_in_wrong_bin(self) -> bool:

@@ -240,7 +240,7 @@ class TestSoak:
         class Blind(FakeCell):
             def __init__(self, *given: Any, **options: Any) -> None:
                 super().__init__(*given, **options)
-                self.detector.answers = lambda look, true: "the server does not answer"
+                self.detector.make_answer = lambda look, true: "the server does not answer"
 
         (problem,) = soak.measure(load(kind=Blind), runs=1)["problems"]
         assert problem.startswith("seed 7 ended with FAILURE Detect.unavailable")

@@ -30,11 +30,11 @@ class UnkindCell(FakeCell):
         self.camera.is_table_visible = lambda: not self._happens(0.1) and self._sees_all()
         self.arm.plan, self.tool.open = self._plan_or_not, self._open_or_not  # type: ignore[method-assign]
         for detector in self.detectors.values():
-            detector.answers = self._answer
+            detector.make_answer = self._answer
 
     def advance(self) -> None:
         super().advance()
-        if self.world.held is not None and not self.arm.at_rest and self._happens(0.0005):
+        if self.world.held_object is not None and not self.arm.at_rest and self._happens(0.0005):
             self.has_dropped = True
             self._open()
         if self.steps == self._longest:

@@ -60,14 +60,14 @@ class Dropping(Spoilt):
     def advance(self) -> None:
         """Let one control step pass; 0.3 s after every second grasp the object is gone."""
         super().advance()
-        held, now = self.world.held, self.cell.clock.now
+        held, now = self.world.held_object, self.cell.clock.now
         if held is None:
             self._since = None
         elif self._since is None:
             self._since = now
             self._carries += 1
         elif self._carries % 2 == 0 and now > self._since + 0.3:
-            self.world.held = None
+            self.world.held_object = None
             held.position[:2] = self._random.uniform((0.42, -0.22), (0.64, 0.22))
             held.position[2] = self.cell.classes[held.label].height / 2
 

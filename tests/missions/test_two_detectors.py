@@ -21,7 +21,7 @@ def sort(**answers: Answers) -> MissionResult:
 
     def arrange(cell: FakeCell) -> None:
         for name, given in answers.items():
-            cell.detectors[name].answers = given
+            cell.detectors[name].make_answer = given
 
     return run_mission("two_detectors", seed=1, arrange=arrange)
 

@@ -25,7 +25,7 @@ def sorted_with(mission: str, labels: dict[str, str]) -> MissionResult:
         fake.world.objects.clear()
         for thing in OBJECTS:
             fake.world.put(*thing)
-        fake.detector.answers = relabel
+        fake.detector.make_answer = relabel
 
     return run_mission(mission, FakeCell, arrange=arrange)
 

@@ -95,7 +95,7 @@ class FailedRun:
         slips = iter(range(times))
 
         def watch() -> None:
-            held = self.fake.world.held
+            held = self.fake.world.held_object
             if held is not None and self.height > 0.12 and next(slips, None) is not None:
                 self.fake.tool.open()
                 if vanish:

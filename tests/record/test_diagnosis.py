@@ -84,7 +84,7 @@ def test_a_recovery_that_failed_in_an_earlier_round_explains_nothing() -> None:
         "      catch: [{on: [IsHolding.empty], do: succeed}]\n",
         objects=CUBE,
     )
-    run.fake.detector.answers = lambda look, true: "gone" if look == 2 else true
+    run.fake.detector.make_answer = lambda look, true: "gone" if look == 2 else true
     story = run.tell()
     assert story.passed_nodes[2].explanation == "runs again only after IsHolding.empty"
 
@@ -129,7 +129,7 @@ def test_what_was_let_go_as_the_run_ended_is_to_be_looked_for() -> None:
     run = FailedRun("sort_overhead", objects=CUBE)
 
     def let_go_and_stop() -> None:
-        if run.fake.world.held and run.height > 0.1:
+        if run.fake.world.held_object and run.height > 0.1:
             run.fake.tool.break_seal()
             run.run.control.stop()
 
@@ -159,7 +159,7 @@ def test_a_halt_at_a_question_says_so() -> None:
 def test_every_failure_has_a_diagnosis(breaks, slips, misses, gone, stop) -> None:
     run = FailedRun("sort_overhead", overrides={"attempts": "2"})
     run.fake.tool.can_seal = lambda: breaks.random() >= misses
-    run.fake.detector.answers = lambda look, true: "gone" if breaks.random() < gone else true
+    run.fake.detector.make_answer = lambda look, true: "gone" if breaks.random() < gone else true
     run.slip(slips, vanish=breaks.random() < 0.5)
     if stop is not None:
         run.at_every_step(lambda: run.run.control.stop() if run.fake.steps == stop else None)

@@ -54,7 +54,7 @@ def test_an_object_that_cannot_be_had_is_rejected_and_the_others_go_on(missions:
 
 def test_a_reason_nobody_catches_ends_the_mission(missions: Path) -> None:
     run, _ = make(missions)
-    fake_of(run).detector.answers = lambda look, true: "the server is gone"
+    fake_of(run).detector.make_answer = lambda look, true: "the server is gone"
     outcome = run.execute()
     assert (outcome.status, outcome.reason) == ("FAILURE", "Detect.unavailable")
     assert (outcome.message, outcome.node.rpartition("/")[2]) == (
@@ -120,7 +120,7 @@ def test_an_unknown_kind_of_cell_names_the_installed_ones(missions: Path) -> Non
 def test_a_box_that_stays_in_doubt_ends_in_an_empty_table_and_not_in_a_failure(missions: Path) -> None:
     run, events = make(missions)
     ghost = Detection("duck", 0.4, (300, 200, 320, 220))
-    fake_of(run).detector.answers = lambda look, true: [*true, ghost]
+    fake_of(run).detector.make_answer = lambda look, true: [*true, ghost]
     fake_of(run).world.objects.clear()
     outcome = run.execute()
     assert (outcome.status, outcome.message) == (
@@ -138,7 +138,7 @@ def test_an_object_that_slips_out_of_the_cup_every_time_is_given_up_in_the_end(m
 
     def slipping() -> None:
         advance()
-        if fake.world.held is slippery and fake.arm.tool_pose.position[2] > 0.12:
+        if fake.world.held_object is slippery and fake.arm.tool_pose.position[2] > 0.12:
             fake.tool.open()
         assert fake.steps < 60_000, "the mission tries for ever"
 

@@ -36,7 +36,7 @@ def test_an_answer_becomes_visible_after_the_detectors_latency(fake: FakeCell) -
 def test_only_what_is_sure_is_found(
     fake: FakeCell, answer: list[Detection], params: dict[str, str], found: int, doubtful: int
 ) -> None:
-    fake.detector.answers = lambda look, true: answer
+    fake.detector.make_answer = lambda look, true: answer
     result = run_skill(Detect(**params), fake)
     detections = result.outputs["detections"]
     assert (result.status, len(detections.confident), len(detections.doubtful)) == (
@@ -67,7 +67,7 @@ def test_only_what_is_sure_is_found(
 def test_an_answer_that_is_of_no_use_is_a_failure(
     fake: FakeCell, answer: Any, reason: str, message: str
 ) -> None:
-    fake.detector.answers = lambda look, true: answer
+    fake.detector.make_answer = lambda look, true: answer
     result = run_skill(Detect(), fake)
     assert (result.reason, result.message[: len(message)]) == (reason, message)
 
@@ -77,7 +77,7 @@ def test_an_uncertain_detection_in_a_bin_is_no_failure(
     fake: FakeCell, x: float, y: float, status: str
 ) -> None:
     fake.world.put("cube", x, y)
-    fake.detector.answers = lambda look, true: [replace(one, confidence=0.4) for one in true]
+    fake.detector.make_answer = lambda look, true: [replace(one, confidence=0.4) for one in true]
     result = run_skill(Detect(view="full"), fake)
     assert (result.status, result.reason) == (status, "unsure" if status == "FAILURE" else "")
 
@@ -95,7 +95,7 @@ def test_an_arm_in_the_way_may_be_looked_past(fake: FakeCell) -> None:
 
 def test_what_is_seen_of_things_behind_the_arm_is_not_believed(fake: FakeCell) -> None:
     behind, beside = (Detection("cube", 0.9, (x, 200, x + 20, 220)) for x in (300, 400))
-    fake.detector.answers = lambda look, true: [behind, beside]
+    fake.detector.make_answer = lambda look, true: [behind, beside]
     fake.camera.occluded_regions.append((290, 190, 310, 230))
     assert run_skill(Detect(hidden="pass"), fake).outputs["detections"].confident == (beside,)
 

@@ -89,7 +89,7 @@ def test_an_object_in_a_bin_may_lie_at_any_height(fake: FakeCell, monkeypatch: p
 def unsure(fake: FakeCell):
     """A look whose detector is unsure of a cube on the table."""
     fake.world.put("cube", 0.5, 0.0)
-    fake.detector.answers = lambda look, true: [replace(one, confidence=0.4) for one in true]
+    fake.detector.make_answer = lambda look, true: [replace(one, confidence=0.4) for one in true]
     return run_skill(Detect(doubtful="pass"), fake).outputs["detections"]
 
 

@@ -95,7 +95,7 @@ def test_a_target_out_of_reach_is_unreachable_and_nothing_moves(fake: FakeCell, 
     fake.world.put("cube", 0.80, 0.30)
     result = run_skill(Approach(target=look("full")[0]), fake)
     assert (result.reason, fake.arm.commands) == ("unreachable", [])
-    assert "more than the arm's 0.85 m" in result.message
+    assert "the arm reaches 0.85 m" in result.message
 
 
 def test_what_the_tool_still_touches_from_before_is_no_contact_with_the_target(

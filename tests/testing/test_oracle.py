@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import ROUTES, SilentOperator
+from executive.cells.fake.cell import SHIPPED_ROUTES, SilentOperator
 from executive.events import discard_event
 from executive.geometry import Pose
 from executive.mission.parse.cell_file import load_cell
@@ -21,7 +21,7 @@ def build(missions, request):
         path = missions / "cells" / "overhead.yaml"
         options = CellOptions(SilentOperator(), base=path.parent)
         made = make_oracle_kind(**oracle)(
-            load_cell(path), seed=3, routes=ROUTES, emit=discard_event, options=options
+            load_cell(path), seed=3, routes=SHIPPED_ROUTES, emit=discard_event, options=options
         )
         request.addfinalizer(made.close)
         return made

@@ -1,4 +1,4 @@
-"""Ideal arm and tool of the fake cell; tests can make them fail."""
+"""Ideal arm and tool of the fake cell, with attributes by which tests provoke failures."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MAX_REACH = 0.85
 """Maximum distance of the tool of the fake arm from the base [m]."""
 
 MAX_TOOL_SPEED = 1.0
-"""Maximum tool speed of the fake arm, and its speed outside of guarded motions [m/s]."""
+"""Speed of the fake tool outside of guarded motions, and maximum speed of guarded motions [m/s]."""
 
 DEFAULT_BREAKAWAY_FORCE = 7.9
 """Breakaway force of the seals of the fake tool, unless a test changes it [N]."""
@@ -70,24 +70,24 @@ class FakeArm:
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
-        self._height = compute_travel_height(config)
+        self._travel_height = compute_travel_height(config)
         self._joint_count = config.arm.joint_count
         self._obstacles = FakeObstacles(config)
         self._plans = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
-        self._tool = self.poses["home"]
+        self._tool_pose = self.poses["home"]
         self._path: list[Pose] = []
-        self._half_length = 0
-        self._met_obstacle: str | None = None
+        self._half_pose_count = 0
+        self._collision_message: str | None = None
 
     @property
     def q(self) -> Array:
         """Tool position [m], padded with zeros to the number of joints `(n,)`."""
-        return np.concatenate([self._tool.position, np.zeros(self._joint_count - 3)])
+        return np.concatenate([self._tool_pose.position, np.zeros(self._joint_count - 3)])
 
     @property
     def tool_pose(self) -> Pose:
         """Pose of the tool centre point."""
-        return self._tool
+        return self._tool_pose
 
     @property
     def tool_velocity(self) -> Array:
@@ -96,8 +96,8 @@ class FakeArm:
 
     @property
     def destination(self) -> Array:
-        """Position of the tool at the end of the running motion, or now if it is at rest `(3,)` [m]."""
-        return (self._path[-1] if self._path else self._tool).position
+        """Position of the tool `(3,)` [m] at the end of the running motion, or now if the arm is at rest."""
+        return (self._path[-1] if self._path else self._tool_pose).position
 
     @property
     def at_rest(self) -> bool:
@@ -107,13 +107,13 @@ class FakeArm:
     @property
     def collision(self) -> str | None:
         """Description of the obstacle that stopped the last motion, or None."""
-        return self._met_obstacle
+        return self._collision_message
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
         """Begin to plan a motion to a goal or a named pose; a plan from `plan_ahead` is complete at once.
 
         The result raises Unreachable for a goal beyond `MAX_REACH` from the base, and Blocked if the tool tip
-        or the load would enter the table or a bin; as for the simulated arm, also on the guarded part.
+        or the load would enter the table or a bin, even on the guarded part of the motion.
         """
         return self._plans.plan(self.destination, goal, task)
 
@@ -135,12 +135,12 @@ class FakeArm:
         self.commands.append("start")
         self._world.is_commanded = True
         self._path = list(motion.path)
-        self._half_length = len(self._path) // 2
-        self._met_obstacle = None
+        self._half_pose_count = len(self._path) // 2
+        self._collision_message = None
 
     def set_tool_pose(self, pose: Pose) -> None:
         """Move the tool to a pose at once; the arm is then at rest."""
-        self._tool, self._path = pose, []
+        self._tool_pose, self._path = pose, []
 
     def stop(self) -> None:
         """End the running motion without braking."""
@@ -151,46 +151,48 @@ class FakeArm:
     def run_into(self, obstacle: str) -> None:
         """Stop the running motion and set `collision` to an obstacle; do nothing if the arm is at rest."""
         if self._path:
-            self._met_obstacle = obstacle
+            self._collision_message = obstacle
             self.stop()
 
     def advance(self) -> None:
-        """Move tool and held object one step along the path; stop before the object enters table or bins."""
+        """Move tool and held object to the next pose; stop before the object enters the table or a bin."""
         if self._path and (collision := self._find_load_collision(self._path[0])):
-            self.run_into(f"{collision.part} ran into {collision.obstacle}, {collision.tool_position_text}")
+            self.run_into(f"{collision.part} ran into {collision.obstacle}, {collision.position_text}")
         elif self._path:
-            self._tool = self._path.pop(0)
-            if self.next_obstacle is not None and len(self._path) <= self._half_length:
-                self._met_obstacle, self.next_obstacle = self.next_obstacle, None
+            self._tool_pose = self._path.pop(0)
+            if self.next_obstacle is not None and len(self._path) <= self._half_pose_count:
+                self._collision_message, self.next_obstacle = self.next_obstacle, None
                 self.stop()
-        if self._world.held is not None:
-            held = self._world.held
+        if (held := self._world.held_object) is not None:
             height = self._world.classes[held.label].height
-            held.position = self._tool.position - np.array([0.0, 0.0, height / 2])
+            held.position = self._tool_pose.position - np.array([0.0, 0.0, height / 2])
 
     def _find_load_collision(self, pose: Pose) -> Collision | None:
-        """Return the collision of the held object in a motion to `pose`, or None; plans may lack it."""
-        held = self._world.held
+        """Return the collision of the held object on the way to `pose`, or None.
+
+        A plan without `task.load` did not check the held object.
+        """
+        held = self._world.held_object
         if held is None:
             return None
-        tips = np.array([self._tool.position, pose.position])
-        return self._obstacles.find_collision(tips, self._world.classes[held.label])
+        tip_positions = np.array([self._tool_pose.position, pose.position])
+        return self._obstacles.find_collision(tip_positions, self._world.classes[held.label])
 
     def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> FakeMotion:
         load = task.load.kind if task.load else None
-        collisions = []
+        message = ""
         for path in self._generate_paths(start, goal):
-            tips = np.array([start, *(pose.position for pose in path)])
-            collision = self._obstacles.find_collision(tips, load)
+            tip_positions = np.array([start, *(pose.position for pose in path)])
+            collision = self._obstacles.find_collision(tip_positions, load)
             if collision is None:
                 return FakeMotion(path)
-            collisions.append(collision)
-        part, obstacle, depth, tool_position_text = collisions[-1]
-        raise Blocked(f"the motion would bring {part} {depth:.3f} m into {obstacle}, {tool_position_text}")
+            part, obstacle, depth, position_text = collision
+            message = f"the motion would bring {part} {depth:.3f} m into {obstacle}, {position_text}"
+        raise Blocked(message)
 
     def _generate_paths(self, start: Array, goal: Goal | str) -> Iterator[list[Pose]]:
-        """Yield candidate paths, best first: straight if the goal is a named pose, then at travel height."""
-        raised_position = np.array([*start[:2], max(start[2], self._height)])
+        """Yield candidate paths: for a named pose first a straight path, then a path at travel height."""
+        raised_position = np.array([*start[:2], max(start[2], self._travel_height)])
         if isinstance(goal, str):
             end = self.poses[goal]
             end_position = guarded_start = end.position
@@ -202,38 +204,43 @@ class FakeArm:
             guarded_start = np.array([*end_position[:2], end_position[2] + goal.guarded_length])
             rotation = make_tool_down_pose(end_position, goal.yaw or 0.0).rotation
             speed = min(goal.guarded_speed, MAX_TOOL_SPEED)
-        position_over_goal = np.array([*end_position[:2], max(guarded_start[2], self._height)])
+        position_over_goal = np.array([*end_position[:2], max(guarded_start[2], self._travel_height)])
         fast_part = [
             pose
-            for a, b in pairwise([start, raised_position, position_over_goal, guarded_start])
-            for pose in _make_straight_path(a, b, rotation, MAX_TOOL_SPEED)
+            for line_start, line_end in pairwise([start, raised_position, position_over_goal, guarded_start])
+            for pose in _make_straight_path(line_start, line_end, rotation, MAX_TOOL_SPEED)
         ]
         yield [*fast_part, *_make_straight_path(guarded_start, end_position, rotation, speed)]
 
 
 class FakeTool:
-    """A suction cup that seals on every object that it touches, unless `can_seal` returns False.
+    """A suction cup that seals on every touched object, unless `can_seal` returns False.
+
+    Args:
+        world: The world with the objects.
+        get_tip_position: Returns the position of the tool tip `(3,)` [m].
 
     Attributes:
         can_seal: Function that returns True if the cup can seal on the touched object; set by tests.
         breakaway_force: Force that every seal withstands [N].
     """
 
-    def __init__(self, world: FakeWorld, tip: Callable[[], Array]) -> None:
+    def __init__(self, world: FakeWorld, get_tip_position: Callable[[], Array]) -> None:
         self._world = world
-        self._tip = tip
+        self._get_tip_position = get_tip_position
         self.can_seal: Callable[[], bool] = lambda: True
         self.breakaway_force = DEFAULT_BREAKAWAY_FORCE
 
     @property
     def touching(self) -> bool:
         """True while the cup touches an object or the table."""
-        return self._world.find_touched_object(self._tip()) is not None or float(self._tip()[2]) <= 0.0
+        tip_position = self._get_tip_position()
+        return self._world.find_touched_object(tip_position) is not None or float(tip_position[2]) <= 0.0
 
     @property
     def holding(self) -> bool:
         """True while the tool holds an object."""
-        return self._world.held is not None
+        return self._world.held_object is not None
 
     @property
     def holding_force(self) -> float:
@@ -243,9 +250,9 @@ class FakeTool:
     def close(self) -> None:
         """Seal the cup on the touched object."""
         self._world.is_commanded = True
-        touched = self._world.find_touched_object(self._tip())
-        if touched is not None and self.can_seal():
-            self._world.held, touched.is_dropped = touched, False
+        fake_object = self._world.find_touched_object(self._get_tip_position())
+        if fake_object is not None and self.can_seal():
+            self._world.held_object, fake_object.is_dropped = fake_object, False
 
     def open(self) -> None:
         """Release the held object; it falls straight down."""
@@ -254,18 +261,18 @@ class FakeTool:
 
     def break_seal(self) -> None:
         """Break the seal: the held object falls straight down, and rolls off other objects and bin walls."""
-        dropped = self._world.held
+        fake_object = self._world.held_object
         self._release()
-        if dropped is not None:
-            dropped.is_dropped = True
-            self._world.roll_to_free_position(dropped)
-            dropped.rest_positions[-1] = dropped.position.copy()
+        if fake_object is not None:
+            fake_object.is_dropped = True
+            self._world.roll_to_free_position(fake_object)
+            fake_object.rest_positions[-1] = fake_object.position.copy()
 
     def _release(self) -> None:
-        released, self._world.held = self._world.held, None
-        if released is not None:
-            released.position[2] = self._world.classes[released.label].height / 2
-            released.rest_positions.append(released.position.copy())
+        fake_object, self._world.held_object = self._world.held_object, None
+        if fake_object is not None:
+            fake_object.position[2] = self._world.classes[fake_object.label].height / 2
+            fake_object.rest_positions.append(fake_object.position.copy())
 
 
 def compute_named_poses(config: CellConfig) -> dict[str, Pose]:
@@ -282,16 +289,16 @@ def check_reachable(position: Array) -> None:
     """
     distance = float(np.linalg.norm(position))
     if distance > MAX_REACH:
-        raise Unreachable(f"{distance:.2f} m from the base is more than the arm's {MAX_REACH:.2f} m")
+        raise Unreachable(f"the goal is {distance:.2f} m from the base, the arm reaches {MAX_REACH:.2f} m")
 
 
 def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield a key of the cell file and a message for each bin and safe place beyond `MAX_REACH`."""
+    """Yield key and message for each bin and safe place of the cell file beyond `MAX_REACH`."""
     height = compute_travel_height(config)
     return find_unreachable_places(config, lambda place, _: check_reachable(np.array([*place, height])))
 
 
 def _make_straight_path(start: Array, end: Array, rotation: Array, speed: float) -> list[Pose]:
-    """Return the tool poses of a straight path from the position `start`, excluded, to `end`, `(3,)` [m]."""
+    """Return the tool poses on the line from `start` (without its pose) to `end` `(3,)` [m]."""
     count = math.ceil(float(np.linalg.norm(end - start)) / speed / STEP)
     return [Pose(rotation, start + (end - start) * (i + 1) / count) for i in range(count)]

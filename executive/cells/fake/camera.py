@@ -1,9 +1,9 @@
-"""Camera and detectors of the fake cell: blank images, and detections from the true objects."""
+"""Camera and detectors of the fake cell: blank images, and detections of the true objects."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +18,16 @@ from executive.errors import Unavailable
 from executive.geometry import Pose
 from executive.perception.mounted_camera import MountedCamera
 
-MIN_CONFIDENCE = 0.9
-"""Confidence of the detections of a fake detector, unless the threshold of its cell file is higher."""
+DEFAULT_CONFIDENCE = 0.9
+"""Confidence of the detections of a fake detector, unless the threshold in the cell file is higher."""
 
 
 class FakeCamera(MountedCamera):
     """A camera at the pose of the cell file, with blank images.
 
     Attributes:
-        is_table_visible: Function that returns True if the whole workspace is in the image; set by tests. By
-            default it ignores occlusion.
+        is_table_visible: Function that returns True if the whole workspace is in the image, by default
+            without regard to occlusion; set by tests.
         occluded_regions: Regions of the image that frames mark as occluded [pixel]; set by tests.
         displacement_message: Message about a displacement of the camera, "" for none; set by tests.
     """
@@ -61,21 +61,29 @@ class FakeCamera(MountedCamera):
 
     def _compute_visibility_mask(self, X_WC: Pose) -> NDArray[np.bool_]:
         del X_WC
-        visible = np.ones((self.config.height, self.config.width), dtype=bool)
+        mask = np.ones((self.config.height, self.config.width), dtype=bool)
         for left, top, right, bottom in self.occluded_regions:
-            visible[int(top) : int(bottom), int(left) : int(right)] = False
-        return visible
+            mask[int(top) : int(bottom), int(left) : int(right)] = False
+        return mask
 
     def _is_table_in_image(self) -> bool:
         corners = self._compute_pose().inverse().apply(self._corners) @ self.matrix.T
         pixels = corners[:, :2] / corners[:, 2:]
-        inside = (pixels >= 0) & (pixels < (self.config.width, self.config.height))
-        return bool(np.all(corners[:, 2] > 0) and np.all(inside))
+        is_inside = (pixels >= 0) & (pixels < (self.config.width, self.config.height))
+        return bool(np.all(corners[:, 2] > 0) and np.all(is_inside))
 
 
 @dataclass(frozen=True)
 class FakeRequest:
-    """A request whose answer, the detections or a message, is available from the time `due_time` [s]."""
+    """A request with an answer that becomes available later.
+
+    Attributes:
+        due_time: Time from which the answer is available [s].
+        clock: Clock of the run.
+        answer: Detections, or the message of an unavailable detector.
+        detector: Name of the detector.
+        error_rates: Error rates of the detector.
+    """
 
     due_time: float
     clock: Clock
@@ -95,14 +103,9 @@ class FakeRequest:
         return Answer(self.detector, tuple(self.answer), self.error_rates)
 
 
-def _return_true_detections(request_number: int, true_detections: Sequence[Detection]) -> Sequence[Detection]:
-    del request_number
-    return true_detections
-
-
 @dataclass(eq=False)
 class FakeDetector:
-    """A detector that finds every object in a view, unless `answers` changes the detections.
+    """A detector that finds every object in a view, unless a test replaces `make_answer`.
 
     Attributes:
         name: Name of the detector in the cell file.
@@ -110,8 +113,8 @@ class FakeDetector:
         world: The world with the true objects.
         clock: Clock of the run.
         get_view_region: Returns the region of the image of a view, which is `table` or `full` [pixel].
-        answers: Returns the detections, or a message if the detector is unavailable; its arguments are the
-            number of the request (from 1) and the true detections.
+        make_answer: Returns the detections, or a message if the detector is unavailable. Its arguments are
+            the number of the request (from 1) and the true detections.
         request_count: Number of requests so far.
     """
 
@@ -120,35 +123,33 @@ class FakeDetector:
     world: FakeWorld
     clock: Clock
     get_view_region: Callable[[str], Box]
-    answers: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = _return_true_detections
+    make_answer: Callable[[int, Sequence[Detection]], Sequence[Detection] | str] = field(
+        default=lambda _request_number, true_detections: true_detections
+    )
     request_count: int = 0
 
     def request(self, frame: Frame, view: str) -> Request:
-        """Return a request for the objects in a view of a frame; the cell file sets its latency."""
+        """Return a request for the objects in a view of a frame, with the latency of the cell file."""
         self.request_count += 1
         left, top, right, bottom = self.get_view_region(view)
         true_detections = []
         for fake_object in self.world.objects:
             x, y, depth = frame.matrix @ frame.X_WC.inverse().apply(fake_object.position)
-            if depth <= 0 or fake_object is self.world.held:
+            if depth <= 0 or fake_object is self.world.held_object:
                 continue
             column, row = x / depth, y / depth
             if left <= column < right and top <= row < bottom:
                 scale = frame.matrix[0, 0] / depth
                 true_detections.append(self._make_detection(fake_object.label, column, row, scale))
-        return FakeRequest(
-            self.clock.now + self.config.latency,
-            self.clock,
-            self.answers(self.request_count, true_detections),
-            self.name,
-            self.config.error_rates,
-        )
+        answer = self.make_answer(self.request_count, true_detections)
+        due_time = self.clock.now + self.config.latency
+        return FakeRequest(due_time, self.clock, answer, self.name, self.config.error_rates)
 
     def close(self) -> None:
         """Do nothing: the detector holds no resources."""
 
     def _make_detection(self, label: str, column: float, row: float, scale: float) -> Detection:
-        """Return the detection of an object with its centre at a pixel, at a scale [pixel/m]."""
+        """Return the detection of an object around the pixel of its centre, for a scale [pixel/m]."""
         half_side = scale * self.world.classes[label].radius
         box = (column - half_side, row - half_side, column + half_side, row + half_side)
-        return Detection(label, max(MIN_CONFIDENCE, self.config.threshold), box)
+        return Detection(label, max(DEFAULT_CONFIDENCE, self.config.threshold), box)

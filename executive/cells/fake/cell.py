@@ -1,4 +1,4 @@
-"""Work cell without physics: fake arm, tool, camera and detectors, with the real ledger and localizer."""
+"""Work cell without physics: a fake arm, tool, camera and detectors, with the real ledger and localizer."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from executive.cell.workcell import CellOptions, KeyPath
 from executive.cells.audit import FinalObject, audit_objects
 from executive.cells.fake.arm import FakeArm, FakeTool, find_places_out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
-from executive.cells.fake.command_log import FakeLog, restore_world
 from executive.cells.fake.min_times import FakeMinTimes
+from executive.cells.fake.state_log import FakeStateLog, restore_world
 from executive.cells.fake.visuals import FakeVisuals
 from executive.cells.fake.world import FakeObject, FakeWorld
 from executive.cells.without_hardware import CellWithoutHardware
@@ -30,18 +30,18 @@ from executive.motion.arms import find_arm_errors
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.localization import build_localizer
 
-ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
+SHIPPED_ROUTES = {"cube": ("red_bin",), "sphere": ("blue_bin",), "duck": ("yellow_bin",)}
 """Permitted bins of each class of the shipped cells."""
 
 
 class SilentOperator:
-    """Operator without a terminal, who requests the classes of a list in order, and then quits."""
+    """Operator without a terminal, who requests the classes of a list in order."""
 
     def __init__(self, requests: Sequence[str] = ()) -> None:
         self._requests = list(requests)
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the next request of the list, or None at its end."""
+        """Return the next class of the list, or None at the end of the list."""
         del choices
         return self._requests.pop(0) if self._requests else None
 
@@ -54,10 +54,10 @@ class FakeCell(CellWithoutHardware):
 
     Args:
         config: The cell file; by default `load_empty_cell`.
-        seed: Random seed of the classes and positions of the objects.
+        seed: Random seed for the classes and positions of the objects.
         routes: Names of the permitted bins of each class.
         emit: Receives the events of the cell.
-        options: Options of the run; by default with an operator who requests nothing.
+        options: Options of the run; by default with an operator without requests.
 
     Attributes:
         world: Objects and bins.
@@ -66,7 +66,7 @@ class FakeCell(CellWithoutHardware):
         camera: The fake camera.
         detectors: The fake detectors by name.
         detector: The first detector.
-        ledger: The ledger, as in every cell.
+        ledger: The ledger of the run.
 
     Raises:
         InputError: The workspace has no room for the objects, or `options` request a window.
@@ -77,7 +77,7 @@ class FakeCell(CellWithoutHardware):
         config: CellConfig | None = None,
         *,
         seed: int = 0,
-        routes: Routes = ROUTES,
+        routes: Routes = SHIPPED_ROUTES,
         emit: Emit = discard_event,
         options: CellOptions | None = None,
     ) -> None:
@@ -93,7 +93,7 @@ class FakeCell(CellWithoutHardware):
         self.arm = FakeArm(self.world, config, clock, emit)
         self.tool = FakeTool(self.world, lambda: self.arm.tool_pose.position)
         name, camera = next(iter(config.cameras.items()))
-        X_TF = Pose.of((0.0, 0.0, -config.tool.length))
+        X_TF = Pose.of((0.0, 0.0, -config.tool.length))  # pose of the flange F in the frame T of the tool
         self.camera = FakeCamera(
             name,
             camera,
@@ -107,7 +107,7 @@ class FakeCell(CellWithoutHardware):
             for name, detector in config.detectors.items()
         }
         self.detector = next(iter(self.detectors.values()))
-        self._log: FakeLog | None = None
+        self._log: FakeStateLog | None = None
         if options.resume is not None:
             self.steps, self.last_command = restore_world(options.resume.log_path, self.world, self.arm)
             self.camera.set_counts(options.resume.frame_count, options.resume.pose_count)
@@ -123,12 +123,13 @@ class FakeCell(CellWithoutHardware):
 
     @staticmethod
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return a finding for an unsupported arm, each place out of reach, and more objects than fit."""
+        """Return key and message for an unsupported arm, each place out of reach, and a lack of room."""
         del base
-        if unsupported := tuple(find_arm_errors(config)):
-            return unsupported
-        problem = _describe_lack_of_room(config, config.table.objects[1])
-        return (*find_places_out_of_reach(config), *([(("table", "objects"), problem)] if problem else []))
+        if arm_errors := tuple(find_arm_errors(config)):
+            return arm_errors
+        room_error = _describe_lack_of_room(config, config.table.objects[1])
+        room_errors = [(("table", "objects"), room_error)] if room_error else []
+        return (*find_places_out_of_reach(config), *room_errors)
 
     @staticmethod
     def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
@@ -138,12 +139,12 @@ class FakeCell(CellWithoutHardware):
 
     @staticmethod
     def min_times(config: CellConfig) -> MinTimes:
-        """Return the minimum times of the stages of a task in a cell of this configuration."""
+        """Return the minimum times of descent, transport and detection in the cell of a cell file."""
         return FakeMinTimes(config)
 
     def log_to(self, path: Path) -> None:
         """Write the state of the world to a log file, now and after every control step."""
-        self._log = FakeLog(path)
+        self._log = FakeStateLog(path)
         try:
             self.log_state()
         except Fault as fault:
@@ -155,7 +156,7 @@ class FakeCell(CellWithoutHardware):
             self._log.write_state(self.steps, self.last_command, self.world, self.arm)
 
     def advance(self) -> None:
-        """Advance arm and log by one control step."""
+        """Advance arm and ledger by one control step, and log the state."""
         if self.world.is_commanded:
             self.last_command, self.world.is_commanded = self.steps, False
         self.arm.advance()
@@ -168,22 +169,23 @@ class FakeCell(CellWithoutHardware):
 
     def audit(self) -> dict[str, int]:
         """Return the counts of `executive.cells.audit.audit_objects` for the objects of the cell."""
-        world = self.world
-        objects = []
-        for is_removed, group in ((False, world.objects), (True, world.removed_objects)):
-            for obj in group:
-                bin = self._find_bin(obj)
-                # If a resumed run first detects an item in a bin, its first position is the bin's centre.
-                centres = [self.cell.bins[bin].position] if bin else []
-                positions, is_held = [*obj.rest_positions, *centres], obj is world.held
-                objects.append(FinalObject(obj.label, bin, positions, obj.is_dropped, is_held, is_removed))
-        return audit_objects(objects, self.ledger.records, self.routes, self.config.ledger.gate)
+        world, final_objects = self.world, []
+        for fake_object in (*world.objects, *world.removed_objects):
+            bin = self._find_bin(fake_object)
+            # The ledger of a resumed run first sees an object in a bin at the centre of the bin.
+            positions = fake_object.rest_positions + ([self.cell.bins[bin].position] if bin else [])
+            is_held, is_removed = fake_object is world.held_object, fake_object in world.removed_objects
+            state = FinalObject(
+                fake_object.label, bin, positions, fake_object.is_dropped, is_held, is_removed
+            )
+            final_objects.append(state)
+        return audit_objects(final_objects, self.ledger.records, self.routes, self.config.ledger.gate)
 
     def _find_bin(self, fake_object: FakeObject) -> str:
-        """Return the name of the bin in which an object lies, or ""."""
-        # An object on the wall of a bin counts as being in the bin, unless it is inside another bin.
-        wall = BIN_THICKNESS + self.cell.classes[fake_object.label].radius / 2
-        for margin in (0.0, wall):
+        """Return the name of the bin that contains an object, or ""."""
+        # A bin contains an object on its wall, unless the object is inside another bin.
+        wall_margin = BIN_THICKNESS + self.cell.classes[fake_object.label].radius / 2
+        for margin in (0.0, wall_margin):
             for name, bin in self.cell.bins.items():
                 if bin.contains(fake_object.position, margin):
                     return name
@@ -193,7 +195,6 @@ class FakeCell(CellWithoutHardware):
         """Close the log."""
         if self._log is not None:
             self._log.close()
-            self._log = None
 
 
 @functools.cache
@@ -204,33 +205,34 @@ def load_empty_cell() -> CellConfig:
 
 
 def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
-    """Put objects of random classes on random points of a grid; their number is in the cell file's range.
+    """Put objects of random classes on random points of a grid; the key `table.objects` limits their number.
 
     Raises:
-        InputError: The workspace has no room for this number of objects.
+        InputError: The workspace has no room for the objects.
     """
-    random = np.random.default_rng(seed)
-    count = int(random.integers(*config.table.objects, endpoint=True))
-    if problem := _describe_lack_of_room(config, count):
-        raise InputError(problem)
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(*config.table.objects, endpoint=True))
+    if room_error := _describe_lack_of_room(config, count):
+        raise InputError(room_error)
     points, _ = _compute_grid_points(config)
-    for index in random.permutation(len(points))[:count]:
-        world.put(str(random.choice(list(config.objects))), *points[index])
+    for index in rng.permutation(len(points))[:count]:
+        world.put(str(rng.choice(list(config.objects))), *points[index])
 
 
 def _compute_grid_points(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
-    """Return the grid points for objects on the table [m], and the distance between them [m]."""
-    pitch = 2 * max(kind.radius for kind in config.objects.values()) + config.table.gap
-    sides = config.table.x, config.table.y
-    xs, ys = (np.linspace(low, high, 1 + int((high - low) / pitch)) for low, high in sides)
-    return [(float(x), float(y)) for x in xs for y in ys], pitch
+    """Return the grid points for objects on the table, and the minimum distance between two points [m]."""
+    distance = 2 * max(object_class.radius for object_class in config.objects.values()) + config.table.gap
+    ranges = config.table.x, config.table.y
+    xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in ranges)
+    return [(float(x), float(y)) for x in xs for y in ys], distance
 
 
 def _describe_lack_of_room(config: CellConfig, count: int) -> str:
     """Return a message if the workspace lacks room for `count` objects, else ""."""
-    points, pitch = _compute_grid_points(config)
-    message = (
+    points, distance = _compute_grid_points(config)
+    if count <= len(points):
+        return ""
+    return (
         f"{count} objects find no room on the workspace of cell {config.cell}, which has {len(points)} "
-        f"places {pitch:.3f} m apart; ask for fewer or widen table.x and table.y"
+        f"places {distance:.3f} m apart; ask for fewer or widen table.x and table.y"
     )
-    return message if count > len(points) else ""

@@ -1,4 +1,4 @@
-"""Minimum times of descent, transport and detection in a fake cell."""
+"""Minimum times of descent, transport and detection in a fake cell, from the speed of the fake arm."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from executive.cells.min_times import CellMinTimes
 
 
 class FakeMinTimes(CellMinTimes):
-    """Times of straight paths at the maximum speed of the fake arm; implements `MinTimes`."""
+    """Durations of straight paths at the maximum speed of the fake arm; implements `MinTimes`."""
 
     def __init__(self, config: CellConfig) -> None:
         super().__init__(config, TOUCH_DISTANCE)
 
     def _compute_min_transport_time(self, bin: str) -> float:
-        """Return the time [s] from the top of the tallest object to travel height and to the nearest slot."""
-        max_height = max(kind.height for kind in self._config.objects.values())
+        """Return the time [s] to lift the tallest object to travel height and to move to the nearest slot."""
+        max_height = max(object_class.height for object_class in self._config.objects.values())
         slots = build_bin(bin, self._config.bins[bin]).slots
         low, high = np.array([self._config.table.x, self._config.table.y]).T
         distance = float(np.linalg.norm(slots - np.clip(slots, low, high), axis=1).min())

@@ -1,4 +1,4 @@
-"""Detector that adds errors to the answers of another detector, to test missions against errors."""
+"""Detector that adds random errors to the answers of another detector."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class NoisyOptions(Section):
     """Options of a noisy detector in the cell file, in addition to its error rates."""
 
     of: str
-    """Name of the detector of the cell to whose answers errors are added."""
+    """Name of the base detector, to whose answers errors are added."""
     classes: tuple[str, ...]
-    """Possible classes of detections with a wrong class and of false detections."""
+    """Classes that wrong and false detections can have."""
 
 
 class NoisyDetector:
@@ -41,7 +41,7 @@ class NoisyDetector:
     The errors in each frame are random and depend on the seed. The detector omits the fraction `miss_rate`
     of the detections, gives the fraction `confusion_rate` a wrong class with low confidence, shifts each box
     along each axis by a normal deviate with standard deviation `jitter`, and adds `false_detections` boxes
-    on average. The ledger assumes the same rates, because they come from the same section of the cell file.
+    on average. The ledger computes with these error rates, which are exact.
 
     Attributes:
         is_fake: True: the error rates in the cell file are exact and need not be measured.
@@ -53,7 +53,7 @@ class NoisyDetector:
         self._config = config
         self._options = options
         self._setting = setting
-        self._other: Detector = setting.get_detector(options.of)
+        self._base_detector: Detector = setting.get_detector(options.of)
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> NoisyDetector:
@@ -74,8 +74,8 @@ class NoisyDetector:
             yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(others)}'
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Return the request to the other detector, with errors added to its answer."""
-        request = self._other.request(frame, view)
+        """Return the request to the base detector, with errors added to the answer."""
+        request = self._base_detector.request(frame, view)
         return ChangedRequest(request, lambda answer: self._add_errors(answer, frame, view))
 
     def close(self) -> None:
@@ -83,38 +83,39 @@ class NoisyDetector:
 
     def _add_errors(self, answer: Answer, frame: Frame, view: str) -> Answer:
         """Return the answer with random errors, which depend on the seed, the frame and the view."""
-        random = np.random.default_rng([self._setting.seed, frame.id, len(view)])
-        kept = [detection for detection in answer.confident if random.random() >= self._config.miss_rate]
-        found = [self._shift_box(self._replace_class(detection, random), random) for detection in kept]
-        false_count = random.poisson(self._config.false_detections)
-        found += [self._make_false_detection(frame, view, random) for _ in range(false_count)]
-        found.sort(key=lambda detection: -detection.confidence)
-        return Answer(self._setting.name, tuple(found), self._config.error_rates)
+        # The names of the views differ in length.
+        rng = np.random.default_rng([self._setting.seed, frame.id, len(view)])
+        detections = [detection for detection in answer.confident if rng.random() >= self._config.miss_rate]
+        detections = [self._shift_box(self._replace_class(detection, rng), rng) for detection in detections]
+        false_count = rng.poisson(self._config.false_detections)
+        detections += [self._make_false_detection(frame, view, rng) for _ in range(false_count)]
+        detections.sort(key=lambda detection: -detection.confidence)
+        return Answer(self._setting.name, tuple(detections), self._config.error_rates)
 
-    def _replace_class(self, detection: Detection, random: np.random.Generator) -> Detection:
-        if random.random() >= self._config.confusion_rate:
+    def _replace_class(self, detection: Detection, rng: np.random.Generator) -> Detection:
+        """Return the detection with a wrong class at the confusion rate, else unchanged."""
+        if rng.random() >= self._config.confusion_rate:
             return detection
         wrong_labels = [label for label in self._options.classes if label != detection.label]
-        return replace(
-            detection,
-            label=str(random.choice(wrong_labels)),
-            confidence=self._draw_confidence(MAX_CONFUSED_CONFIDENCE, random),
-        )
+        label, confidence = str(rng.choice(wrong_labels)), self._draw_confidence(MAX_CONFUSED_CONFIDENCE, rng)
+        return replace(detection, label=label, confidence=confidence)
 
-    def _shift_box(self, detection: Detection, random: np.random.Generator) -> Detection:
-        right, down = random.normal(0.0, self._config.jitter, 2)
-        x0, y0, x1, y1 = detection.box
-        return replace(detection, box=(x0 + right, y0 + down, x1 + right, y1 + down))
+    def _shift_box(self, detection: Detection, rng: np.random.Generator) -> Detection:
+        """Return the detection with a randomly shifted box."""
+        shift_x, shift_y = rng.normal(0.0, self._config.jitter, 2)
+        left, top, right, bottom = detection.box
+        box = (left + shift_x, top + shift_y, right + shift_x, bottom + shift_y)
+        return replace(detection, box=box)
 
-    def _make_false_detection(self, frame: Frame, view: str, random: np.random.Generator) -> Detection:
+    def _make_false_detection(self, frame: Frame, view: str, rng: np.random.Generator) -> Detection:
+        """Return a detection with random class, confidence and box in the region of a view."""
         height, width = frame.image.shape[:2]
-        left, top, right, bottom = (
-            self._setting.camera.table_view if view == "table" else (0, 0, width, height)
-        )
-        x, y = random.uniform((left, top), (right, bottom))
-        half_width, half_height = random.uniform(*FALSE_BOX_SIDE_RANGE, 2) / 2
+        region = self._setting.camera.table_view if view == "table" else (0, 0, width, height)
+        x, y = rng.uniform(region[:2], region[2:])
+        half_width, half_height = rng.uniform(*FALSE_BOX_SIDE_RANGE, 2) / 2
         box = (x - half_width, y - half_height, x + half_width, y + half_height)
-        return Detection(str(random.choice(self._options.classes)), self._draw_confidence(1.0, random), box)
+        return Detection(str(rng.choice(self._options.classes)), self._draw_confidence(1.0, rng), box)
 
-    def _draw_confidence(self, max_confidence: float, random: np.random.Generator) -> float:
-        return float(random.uniform(self._config.floor, max_confidence))
+    def _draw_confidence(self, max_confidence: float, rng: np.random.Generator) -> float:
+        """Return a random confidence from the lower limit of the cell file to `max_confidence`."""
+        return float(rng.uniform(self._config.floor, max_confidence))

@@ -1,4 +1,4 @@
-"""Shapes of the fake cell for display: bins, objects as cylinders, and the tool as the whole arm."""
+"""Shapes of the fake cell for display: table, bins, tool, and objects as cylinders."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from executive.cell.config import CellConfig
 from executive.cell.layout import TOOL_RADIUS, list_bin_boxes
 from executive.cell.visuals import Shape
-from executive.cells.fake.world import FakeObject, FakeWorld
+from executive.cells.fake.world import FakeWorld
 from executive.geometry import Pose
 
 TOOL_NAME = "tool"
@@ -19,7 +19,7 @@ TOOL_COLOUR, TABLE_COLOUR = (0.25, 0.28, 0.32), (0.86, 0.78, 0.66)
 TABLE_THICKNESS = 0.02
 """Thickness of the displayed table [m]."""
 TABLE_MARGIN = 0.12
-"""Width of the part of the displayed table on each side of the workspace [m]."""
+"""Distance from the workspace to the edge of the displayed table on each side [m]."""
 
 
 class FakeVisuals:
@@ -27,16 +27,14 @@ class FakeVisuals:
 
     Args:
         config: The cell file.
-        world: The world with all its objects.
-        tool: Returns the pose of the tool centre point.
+        world: The world with all objects.
+        get_tool_pose: Returns the pose of the tool centre point.
     """
 
-    def __init__(self, config: CellConfig, world: FakeWorld, tool: Callable[[], Pose]) -> None:
+    def __init__(self, config: CellConfig, world: FakeWorld, get_tool_pose: Callable[[], Pose]) -> None:
         self._world = world
-        self._tool = tool
-        self._names: dict[FakeObject, str] = {
-            fake_object: f"object {number}" for number, fake_object in enumerate(world.objects)
-        }
+        self._get_tool_pose = get_tool_pose
+        self._names = {body: f"object {number}" for number, body in enumerate(world.objects)}
         tool_shapes = _make_tool_shapes(config)
         self._shapes = (*_make_fixed_shapes(config), *tool_shapes, *self._make_object_shapes(config))
 
@@ -47,10 +45,11 @@ class FakeVisuals:
 
     def poses(self) -> Mapping[str, Pose]:
         """Return the poses of the tool and of the objects, by name."""
-        object_poses = {self._names[obj]: Pose.of(obj.position) for obj in self._world.objects}
-        return {TOOL_NAME: self._tool(), **object_poses}
+        object_poses = {self._names[body]: Pose.of(body.position) for body in self._world.objects}
+        return {TOOL_NAME: self._get_tool_pose(), **object_poses}
 
     def _make_object_shapes(self, config: CellConfig) -> Iterator[Shape]:
+        """Yield the shapes of the objects, which are cylinders with the colour of the class."""
         for fake_object, name in self._names.items():
             object_class = config.objects[fake_object.label]
             size = (2 * object_class.radius, 2 * object_class.radius, object_class.height)
@@ -61,11 +60,11 @@ def _make_fixed_shapes(config: CellConfig) -> Iterator[Shape]:
     """Yield the shapes of the table and of the bins."""
     (left, right), (near, far) = config.table.x, config.table.y
     size = (right - left + 2 * TABLE_MARGIN, far - near + 2 * TABLE_MARGIN, TABLE_THICKNESS)
-    X_WS = Pose.of(((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2))
-    yield Shape("", "box", size, X_WS, TABLE_COLOUR)
+    table_pose = Pose.of(((left + right) / 2, (near + far) / 2, -TABLE_THICKNESS / 2))
+    yield Shape("", "box", size, table_pose, TABLE_COLOUR)
     for bin in config.bins.values():
-        for (x, y, z), centre in list_bin_boxes(bin.size):
-            size = 2 * x, 2 * y, 2 * z
+        for (half_length, half_width, half_height), centre in list_bin_boxes(bin.size):
+            size = 2 * half_length, 2 * half_width, 2 * half_height
             yield Shape("", "box", size, Pose.of(np.add(bin.position, centre)), bin.colour)
 
 

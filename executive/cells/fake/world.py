@@ -46,7 +46,7 @@ class FakeWorld:
         objects: The objects, in the order in which they were added.
         removed_objects: The removed objects.
         bins: The bins of the cell.
-        held: The object that the tool holds, or None.
+        held_object: The object that the tool holds, or None.
         is_commanded: True if arm or tool received a command in this control step.
     """
 
@@ -54,11 +54,11 @@ class FakeWorld:
     objects: list[FakeObject] = field(default_factory=list)
     removed_objects: list[FakeObject] = field(default_factory=list)
     bins: Collection[Bin] = ()
-    held: FakeObject | None = None
+    held_object: FakeObject | None = None
     is_commanded: bool = False
 
     def put(self, label: str, x: float, y: float) -> FakeObject:
-        """Put a new object on the table and return the object.
+        """Put a new object on the table, and return it.
 
         Args:
             label: Class of the object.
@@ -74,52 +74,56 @@ class FakeWorld:
                 f"{list_choices(label, self.classes, 'The cell file has the classes')}"
             )
         position = np.array([x, y, self.classes[label].height / 2])
-        added = FakeObject(label, position, [position.copy()])
-        self.objects.append(added)
-        return added
+        fake_object = FakeObject(label, position, [position.copy()])
+        self.objects.append(fake_object)
+        return fake_object
 
     def remove(self, fake_object: FakeObject) -> None:
         """Remove an object that is not held."""
         self.objects.remove(fake_object)
         self.removed_objects.append(fake_object)
 
-    def roll_to_free_position(self, fallen: FakeObject) -> None:
-        """Move a fallen object from the wall of a bin into that bin, or off other objects on the table.
+    def roll_to_free_position(self, fake_object: FakeObject) -> None:
+        """Move a dropped object off bin walls and off other objects.
 
-        The object is moved once per object that it overlaps. An object inside a bin is not moved.
+        An object on the wall of a bin rolls into the bin. An object outside of all bins rolls off each
+        overlapping object in turn. An object inside a bin stays.
         """
-        if self._move_into_bin(fallen):
+        if self._move_into_bin(fake_object):
             return
-        radius = self.classes[fallen.label].radius
-        for other in self.objects:
-            min_distance = radius + self.classes[other.label].radius
-            direction = fallen.position[:2] - other.position[:2]
+        radius = self.classes[fake_object.label].radius
+        for obstacle in self.objects:
+            min_distance = radius + self.classes[obstacle.label].radius
+            direction = fake_object.position[:2] - obstacle.position[:2]
             distance = float(np.linalg.norm(direction))
-            if other is not fallen and distance < min_distance:
+            if obstacle is not fake_object and distance < min_distance:
                 direction = direction / distance if distance else np.array((1.0, 0.0))
-                fallen.position[:2] = other.position[:2] + min_distance * direction
-        self._move_into_bin(fallen)
+                fake_object.position[:2] = obstacle.position[:2] + min_distance * direction
+        self._move_into_bin(fake_object)
 
-    def _move_into_bin(self, fallen: FakeObject) -> bool:
-        """Move an object on the wall of a bin into the bin; return True if the object is now in a bin."""
-        radius = self.classes[fallen.label].radius
-        if any(bin.contains(fallen.position) for bin in self.bins):
+    def _move_into_bin(self, fake_object: FakeObject) -> bool:
+        """Move an object from the wall of a bin into the bin, and return True if a bin contains it."""
+        radius = self.classes[fake_object.label].radius
+        if any(bin.contains(fake_object.position) for bin in self.bins):
             return True
         for bin in self.bins:
-            if bin.contains(fallen.position, BIN_THICKNESS + radius / 2):
+            if bin.contains(fake_object.position, BIN_THICKNESS + radius / 2):
                 max_offset = np.maximum(bin.size[:2] / 2 - radius, 0.0)
-                offset = fallen.position[:2] - bin.position[:2]
-                fallen.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
+                offset = fake_object.position[:2] - bin.position[:2]
+                fake_object.position[:2] = bin.position[:2] + np.clip(offset, -max_offset, max_offset)
                 return True
         return False
 
-    def find_touched_object(self, tip: Array) -> FakeObject | None:
-        """Return the object whose top a cup at `tip` `(3,)` [m] touches, or None."""
+    def find_touched_object(self, tip_position: Array) -> FakeObject | None:
+        """Return the object that a cup at `tip_position` `(3,)` [m] touches from above, or None."""
         for fake_object in self.objects:
-            distance = float(np.linalg.norm(fake_object.position[:2] - tip[:2]))
-            offset = abs(distance - self.classes[fake_object.label].ring)
-            top = float(fake_object.position[2]) + self.classes[fake_object.label].height / 2
-            is_touched = offset <= MAX_SEAL_OFFSET and abs(top - tip[2]) <= TOUCH_DISTANCE
-            if is_touched and fake_object is not self.held:
+            object_class = self.classes[fake_object.label]
+            distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
+            seal_offset = abs(distance - object_class.ring)
+            top_height = float(fake_object.position[2]) + object_class.height / 2
+            is_touched = (
+                seal_offset <= MAX_SEAL_OFFSET and abs(top_height - tip_position[2]) <= TOUCH_DISTANCE
+            )
+            if is_touched and fake_object is not self.held_object:
                 return fake_object
         return None

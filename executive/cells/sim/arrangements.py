@@ -15,7 +15,7 @@ from pybullet_utils.bullet_client import BulletClient
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
-from executive.cells.audit import UNKNOWN
+from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim.camera import Region
 from executive.cells.sim.models import add_body, compute_upright_pose, load_mesh
 from executive.cells.sim.variations import draw_object_colour
@@ -43,7 +43,7 @@ class SceneObject:
     """An object of a scene.
 
     Attributes:
-        label: Class of the object, or `UNKNOWN`.
+        label: Class of the object, or `UNKNOWN_LABEL`.
         model: Model of the object, already scaled.
         X_WO: Pose of the object.
         colour: Colour of the object.
@@ -100,7 +100,7 @@ def draw_objects(config: CellConfig, count: int, table: Colour, rng: Generator) 
         label, model = str(label), config.objects[str(label)]
         colour = draw_object_colour(model.colours, table, rng)
         if rng.random() < unknown_fraction:
-            label, model = UNKNOWN, load_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS)))
+            label, model = UNKNOWN_LABEL, load_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS)))
             model = scale_model(model, rng.uniform(0.4, 1.0))
         elif rng.random() < scaled_fraction:
             model = scale_model(model, float(rng.choice(SCALE_FACTORS)))

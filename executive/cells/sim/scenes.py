@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig, NoiseConfig
 from executive.cell.frame import Box
-from executive.cells.audit import UNKNOWN
+from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim import arrangements, variations
 from executive.cells.sim.arrangements import SceneObject
 from executive.cells.sim.camera import (
@@ -229,7 +229,7 @@ class SceneRenderer:
         scale = IMAGE_SIZE / (shown.region[2] - shown.region[0])
         for body, scene_object in objects.items():
             mask = shown.bodies == body
-            if scene_object.label == UNKNOWN or not mask.any():
+            if scene_object.label == UNKNOWN_LABEL or not mask.any():
                 continue
             mesh = load_mesh(scene_object.model)
             vertices = scene_object.X_WO.apply(mesh.vertices)

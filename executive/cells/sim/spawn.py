@@ -10,7 +10,7 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.workcell import KeyPath
-from executive.cells.audit import UNKNOWN
+from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, UnknownConfig
 from executive.cells.sim.scene_world import draw_unknown_models, make_true_config, paint_table
@@ -99,7 +99,7 @@ def spawn_objects(
         count = int(rng.integers(table.objects[0], table.objects[1], endpoint=True))
     labels = [str(label) for label in rng.choice(list(config.objects), count)]
     models = [(label, config.objects[label]) for label in labels]
-    models += [(UNKNOWN, model) for model in draw_unknown_models(unknown, rng)]
+    models += [(UNKNOWN_LABEL, model) for model in draw_unknown_models(unknown, rng)]
     positions = _draw_positions(config, [model.radius for _, model in models], rng)
     bodies = []
     for (label, model), position in zip(models, positions, strict=True):

@@ -13,7 +13,7 @@ import numpy as np
 from executive.cell.detection import Detections
 from executive.cell.objects import Item, Target
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import ROUTES, FakeCell, SilentOperator, load_empty_cell
+from executive.cells.fake.cell import SHIPPED_ROUTES, FakeCell, SilentOperator, load_empty_cell
 from executive.geometry import make_tool_down_pose
 from executive.mission.model.port_types import describe_type
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
@@ -184,7 +184,7 @@ def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
         skill: The skill.
         is_holding: True: the tool holds an item of the ledger. False: the tool is empty.
     """
-    fake = FakeCell(options=CellOptions(SilentOperator(list(ROUTES)), base=Path()))
+    fake = FakeCell(options=CellOptions(SilentOperator(list(SHIPPED_ROUTES)), base=Path()))
     table, labels = load_empty_cell().table, list(fake.cell.classes)
     for label, y in zip(labels, np.linspace(*table.y, len(labels) + 2)[1:-1], strict=True):
         fake.world.put(label, sum(table.x) / 2, float(y))

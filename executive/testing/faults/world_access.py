@@ -77,7 +77,7 @@ class FakeWorldAccess(WorldAccess):
     @property
     def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
-        held = self._fake.world.held
+        held = self._fake.world.held_object
         return None if held is None else _describe(held)
 
     def remove(self, true_object: TrueObject) -> None:

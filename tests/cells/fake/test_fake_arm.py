@@ -82,13 +82,13 @@ def test_a_plan_for_another_task_or_from_another_place_is_another_plan(fake: Fak
 
 def test_what_is_out_of_reach_is_said_when_the_plan_is_known(fake: FakeCell) -> None:
     planning = fake.arm.plan(Goal((0.8, 0.4, 0.1)))
-    with pytest.raises(Unreachable, match=r"0\.90 m from the base is more than the arm's 0\.85 m"):
+    with pytest.raises(Unreachable, match=r"the goal is 0\.90 m from the base, the arm reaches 0\.85 m"):
         planning.result()
 
 
 def hold_cube(fake: FakeCell) -> Task:
     """Let the tool hold a cube that stands on the table, and return the task of carrying it."""
-    fake.world.held = fake.world.put("cube", 0.5, 0.0)
+    fake.world.held_object = fake.world.put("cube", 0.5, 0.0)
     fake.arm.set_tool_pose(make_tool_down_pose((0.5, 0.0, 0.05)))
     return Task(Load(fake.cell.classes["cube"]))
 

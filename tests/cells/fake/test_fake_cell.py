@@ -120,11 +120,11 @@ def test_each_bin_and_a_safe_place_beyond_the_arm_are_reported(load: Load) -> No
     assert FakeCell.check(far, Path()) == (
         (
             ("bins", "blue_bin", "position"),
-            'the bin "blue_bin" is out of reach: 0.88 m from the base is more than the arm\'s 0.85 m',
+            'the bin "blue_bin" is out of reach: the goal is 0.88 m from the base, the arm reaches 0.85 m',
         ),
         (
             ("safe_place",),
-            "the safe place is out of reach: 0.91 m from the base is more than the arm's 0.85 m",
+            "the safe place is out of reach: the goal is 0.91 m from the base, the arm reaches 0.85 m",
         ),
     )
 
@@ -200,7 +200,7 @@ def test_what_falls_on_the_wall_of_a_bin_falls_into_the_bin(load: Load, beside: 
     if beside is not None:
         cell.world.put("cube", x, edge + beside)
     cube = cell.world.put("cube", x, edge + 0.01)
-    cell.world.held = cube
+    cell.world.held_object = cube
     cell.tool.break_seal()
     assert bin.contains(cube.position)
     assert beside is not None or np.allclose(cube.position[:2], (x, edge - radius))

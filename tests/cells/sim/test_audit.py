@@ -11,7 +11,7 @@ import pytest
 
 from executive.cell.bins import Bin
 from executive.cell.workcell import AUDIT_KEYS
-from executive.cells.audit import UNKNOWN
+from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim.audit import audit_bodies
 from executive.geometry import Pose
 
@@ -93,4 +93,4 @@ def test_an_unknown_object_counts_if_an_item_stands_for_it_or_if_it_is_in_a_bin(
 ) -> None:
     items = [SimpleNamespace(state=None, first_position=np.array(ON_TABLE))] if claimed else []
     none = dict.fromkeys(AUDIT_KEYS, 0)
-    assert counted(("red_bin",), OneBody(UNKNOWN, place), records=items) == {**none, **end}
+    assert counted(("red_bin",), OneBody(UNKNOWN_LABEL, place), records=items) == {**none, **end}

@@ -12,7 +12,7 @@ import pytest
 
 from executive.cell.config import CellConfig, DepthConfig, ObjectConfig
 from executive.cells.sim.arrangements import (
-    UNKNOWN,
+    UNKNOWN_LABEL,
     SceneObject,
     draw_arrangement,
     draw_held_object,
@@ -86,9 +86,9 @@ def test_an_arrangement_follows_from_its_generator(overhead: CellConfig) -> None
 
 def test_some_scenes_have_objects_of_unknown_kinds_or_other_sizes(overhead: CellConfig) -> None:
     scenes = [draw_objects(overhead, 20, (0.9, 0.8, 0.7), np.random.default_rng(seed)) for seed in range(20)]
-    unknown = [sum(item.label == UNKNOWN for item in scene) for scene in scenes]
+    unknown = [sum(item.label == UNKNOWN_LABEL for item in scene) for scene in scenes]
     resized_ones = [
-        sum(item.label != UNKNOWN and item.model != overhead.objects[item.label] for item in scene)
+        sum(item.label != UNKNOWN_LABEL and item.model != overhead.objects[item.label] for item in scene)
         for scene in scenes
     ]
     assert (sum(map(bool, unknown)), sum(map(bool, resized_ones))) == (5, 7)

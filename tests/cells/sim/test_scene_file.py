@@ -17,8 +17,8 @@ import yaml
 from executive.cell.config import CellConfig, NoiseConfig
 from executive.cell.frame import Frame
 from executive.cell.workcell import CellOptions
-from executive.cells.audit import UNKNOWN
-from executive.cells.fake.cell import ROUTES, SilentOperator
+from executive.cells.audit import UNKNOWN_LABEL
+from executive.cells.fake.cell import SHIPPED_ROUTES, SilentOperator
 from executive.cells.sim.camera import CELL_LIGHT
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
@@ -57,7 +57,7 @@ def cell(overhead: CellConfig, tmp_path: Path, request: pytest.FixtureRequest) -
         path.write_text(yaml.safe_dump({"scene": "changed", **sections}))
         options = CellOptions(SilentOperator(), base=tmp_path, scene=path)
         make = make_oracle_kind(box_std=0.0, renders_images=True)
-        made = make(config, seed=SEED, routes=ROUTES, emit=discard_event, options=options)
+        made = make(config, seed=SEED, routes=SHIPPED_ROUTES, emit=discard_event, options=options)
         request.addfinalizer(made.close)
         return made
 
@@ -164,7 +164,7 @@ def test_unknown_objects_lie_beside_the_others_and_no_detector_knows_them(
     unknown = {"count": [2, 2], "models": [168, 169], "scale": 0.5, "colours": [[0.0, 0.9, 0.0]]}
     made = cell(unknown=unknown, table={"objects": [3, 3], "stacked": 1.0})
     world = made._world
-    strange = [body for body, label in world.bodies.items() if label == UNKNOWN]
+    strange = [body for body, label in world.bodies.items() if label == UNKNOWN_LABEL]
     assert (len(world.bodies), len(strange)) == (5, 2)
     others = [body for body in world.bodies if body not in strange]
     for body in strange:
@@ -179,7 +179,7 @@ def test_unknown_objects_lie_beside_the_others_and_no_detector_knows_them(
     assert {true.label for true in frame.true_detections} <= overhead.objects.keys()
     green = (frame.image[..., 1] > 90) & (frame.image[..., [0, 2]].max(axis=2) < 60)
     assert cv2.connectedComponents(green.astype(np.uint8), connectivity=8)[0] == 1 + 2
-    assert UNKNOWN not in made.cell.classes
+    assert UNKNOWN_LABEL not in made.cell.classes
 
 
 def middles(made: SimCell, matrix: np.ndarray, X_WC: Pose) -> np.ndarray:
@@ -259,7 +259,10 @@ def test_evaluated_frames_are_of_the_scene_and_say_what_the_cell_declares(overhe
         SceneRenderer(overhead, "overhead", randomized=False, scene=s) for s in (DECLARED_SCENE, changed)
     )
     one, sample = usual.render_sample(1), other.render_sample(1)
-    assert (sample.X_WC.to_rounded_list(), UNKNOWN in sample.labels) == (one.X_WC.to_rounded_list(), False)
+    assert (sample.X_WC.to_rounded_list(), UNKNOWN_LABEL in sample.labels) == (
+        one.X_WC.to_rounded_list(),
+        False,
+    )
     scale = (sample.region[2] - sample.region[0]) / 256
     boxes = sample.boxes * scale + [*sample.region[:2], *sample.region[:2]]
     for box, centre in zip(boxes, sample.centres, strict=True):

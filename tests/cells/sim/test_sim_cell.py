@@ -12,7 +12,7 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cell.detection import Detections
 from executive.cell.workcell import CellOptions
-from executive.cells.fake.cell import ROUTES, SilentOperator
+from executive.cells.fake.cell import SHIPPED_ROUTES, SilentOperator
 from executive.cells.sim.cell import SimCell
 from executive.events import discard_event
 from executive.geometry import Pose
@@ -31,7 +31,7 @@ def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
         config = load_cell(path).model_copy(update=changes)
         options = CellOptions(SilentOperator(), base=path.parent)
         made = make_oracle_kind(box_std=0.0)(
-            config, seed=seed, routes=ROUTES, emit=discard_event, options=options
+            config, seed=seed, routes=SHIPPED_ROUTES, emit=discard_event, options=options
         )
         request.addfinalizer(made.close)
         return made
@@ -78,7 +78,7 @@ def test_the_audit_counts_every_body_once_by_where_it_really_is(build_cell: Buil
     }
 
     one, two, three, _ = made._world.bodies
-    home = made.cell.bins[ROUTES[made._world.bodies[one]][0]].position
+    home = made.cell.bins[SHIPPED_ROUTES[made._world.bodies[one]][0]].position
     put(made, one, (home[0] + 0.05, home[1] - 0.05, 0.04))
     assert made.audit() == {
         "right": 1,
@@ -89,7 +89,9 @@ def test_the_audit_counts_every_body_once_by_where_it_really_is(build_cell: Buil
         "unseen": 0,
     }
 
-    strange = next(b for n, b in made.cell.bins.items() if n not in ROUTES[made._world.bodies[two]]).position
+    strange = next(
+        b for n, b in made.cell.bins.items() if n not in SHIPPED_ROUTES[made._world.bodies[two]]
+    ).position
     put(made, two, (strange[0], strange[1] + 0.03, 0.04))
     assert made.audit() == {
         "right": 1,

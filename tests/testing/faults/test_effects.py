@@ -53,7 +53,7 @@ def follow(cell: Any, pose: str = "aside") -> float:
 
 
 def hold(cell: Any, label: str = "cube") -> None:
-    cell.fake.world.held = next(one for one in cell.fake.world.objects if one.label == label)
+    cell.fake.world.held_object = next(one for one in cell.fake.world.objects if one.label == label)
 
 
 def labels(cell: Any) -> list[str]:
@@ -199,10 +199,10 @@ def test_a_seal_breaks_over_a_wrong_bin() -> None:
     follow(cell)
     cell.advance()
     hold(cell)
-    cell.fake.world.held.position[:2] = cell.cell.bins["red_bin"].slots[0][:2]
+    cell.fake.world.held_object.position[:2] = cell.cell.bins["red_bin"].slots[0][:2]
     cell._update_occurrences()
     assert cell.fake.tool.holding, "the red bin is right for a cube"
-    cell.fake.world.held.position[:2] = cell.cell.bins["blue_bin"].slots[0][:2]
+    cell.fake.world.held_object.position[:2] = cell.cell.bins["blue_bin"].slots[0][:2]
     cell._update_occurrences()
     assert not cell.fake.tool.holding
 
@@ -292,7 +292,7 @@ def test_the_object_of_a_node_is_what_the_ledger_takes_for_its_item() -> None:
         item = items["sphere"]
         cell.inner.world.objects[1].position[0] += near
         if state != "seen":
-            cell.inner.world.held = cell.inner.world.objects[1]
+            cell.inner.world.held_object = cell.inner.world.objects[1]
             cell.cell.ledger.record_touch(item)
             cell.cell.ledger.record_grasp(item)
         if state == "placed":

@@ -107,7 +107,7 @@ next        repair the code or the cell: a fault is never retried
 
 def test_a_detector_that_gives_no_answer(at_home) -> None:
     run = FailedRun("sort_overhead", objects=CUBE)
-    run.fake.detector.answers = lambda look, true: "the server is gone"
+    run.fake.detector.make_answer = lambda look, true: "the server is gone"
     story = run.tell()
     chain = [link.explanation for link in story.passed_nodes if link.explanation]
     assert chain[0::2] == ["catches only Detect.unsure", "all 10 attempts failed: 10 x Detect.unavailable"]
@@ -128,7 +128,9 @@ def test_a_camera_that_was_moved_is_mounted_again_and_its_failure_not_caught(at_
 
 def test_a_halt_while_something_hangs_on_the_tool(at_home) -> None:
     run = FailedRun("sort_overhead", objects=[*CUBE, *DUCK])
-    run.at_every_step(lambda: run.run.control.stop() if run.fake.world.held and run.height > 0.1 else None)
+    run.at_every_step(
+        lambda: run.run.control.stop() if run.fake.world.held_object and run.height > 0.1 else None
+    )
     story = run.tell()
     assert (story.held_item, story.unsorted_items, story.can_resume) == ("cube-1", ["cube-1", "duck-1"], True)
     assert story.verdict == "halted by the user during Transit of cube-1 and Wait"
@@ -156,7 +158,7 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
     run = FailedRun("sort_overhead", objects=CUBE)
 
     def bar_the_way() -> None:
-        run.fake.arm.next_obstacle = "link 5 met a wrench" if run.fake.world.held else None
+        run.fake.arm.next_obstacle = "link 5 met a wrench" if run.fake.world.held_object else None
 
     run.at_every_step(bar_the_way)
     assert (

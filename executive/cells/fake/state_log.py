@@ -16,7 +16,7 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose
 
 
-class FakeLog(LogFile):
+class FakeStateLog(LogFile):
     """A file with the last state of a fake world, rewritten after every control step."""
 
     def __init__(self, path: Path) -> None:
@@ -24,23 +24,21 @@ class FakeLog(LogFile):
         self._length = 0
 
     def write_state(self, steps: int, last_command: int, world: FakeWorld, arm: FakeArm) -> None:
-        """Replace the content of the file by the state after `steps` control steps; ignored if closed.
+        """Replace the content of the file by the state after `steps` control steps.
 
         Raises:
             Fault: The disk does not accept the state.
         """
-        if not self.is_open:
-            return
         state = {
             "steps": steps,
             "last_command": last_command,
-            "objects": list(map(_to_json, world.objects)),
-            "removed": list(map(_to_json, world.removed_objects)),
-            "held": next((n for n, obj in enumerate(world.objects) if obj is world.held), None),
+            "objects": list(map(vars, world.objects)),
+            "removed": list(map(vars, world.removed_objects)),
+            "held": None if world.held_object is None else world.objects.index(world.held_object),
             "tool": [arm.tool_pose.rotation, arm.tool_pose.position],
         }
         text = json.dumps(state, default=np.ndarray.tolist).encode()
-        # No write is shorter than an earlier one, so that the file contains one state, followed by blanks.
+        # Blanks pad the text to the length of the longest state so far, and so overwrite the last state.
         self._length = max(self._length, len(text))
         self.write(text.ljust(self._length), 0)
 
@@ -58,7 +56,7 @@ def restore_world(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]
         state: Mapping[str, Any] = json.loads(path.read_bytes())
         world.objects[:] = [_read_object(**fields) for fields in state["objects"]]
         world.removed_objects[:] = [_read_object(**fields) for fields in state["removed"]]
-        world.held = None if state["held"] is None else world.objects[state["held"]]
+        world.held_object = None if state["held"] is None else world.objects[state["held"]]
         rotation, position = map(_read_array, state["tool"])
         arm.set_tool_pose(Pose(rotation.reshape(3, 3), position.reshape(3)))
         return int(state["steps"]), int(state["last_command"])
@@ -68,16 +66,14 @@ def restore_world(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]
         ) from error
 
 
-def _to_json(written: FakeObject) -> Mapping[str, Any]:
-    """Return an object with the keys of the log, which are the arguments of `_read_object`."""
-    state = {"label": written.label, "position": written.position}
-    return {**state, "stood": written.rest_positions, "fell": written.is_dropped}
-
-
 def _read_array(value: object) -> Array:
+    """Return the array of a list in the log."""
     return np.array(value, dtype=np.float64)
 
 
-def _read_object(label: str, position: object, stood: Sequence[object], fell: bool) -> FakeObject:
-    rest_positions = [_read_array(place).reshape(3) for place in stood]
-    return FakeObject(str(label), _read_array(position).reshape(3), rest_positions, bool(fell))
+def _read_object(
+    label: str, position: object, rest_positions: Sequence[object], is_dropped: bool
+) -> FakeObject:
+    """Return an object from its attributes in the log."""
+    positions = [_read_array(rest_position).reshape(3) for rest_position in rest_positions]
+    return FakeObject(str(label), _read_array(position).reshape(3), positions, bool(is_dropped))
