@@ -192,7 +192,7 @@ def test_a_target_out_of_reach_fails_in_its_approach_only(
     bench.fake.world.put("duck", 0.6, 0.2)
     cube, duck = bench.look()
     bench.carry([cube])
-    with pytest.raises(SkillFailed, match=r"more than the arm's") as failure:
+    with pytest.raises(SkillFailed, match=r"the arm reaches") as failure:
         bench.run(Approach(target=duck))
     assert (failure.value.reason, bench.ahead[-1]) == ("unreachable", True)
 
