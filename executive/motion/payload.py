@@ -39,9 +39,8 @@ class PayloadLimit:
     """
 
     def __init__(self, load: Load, kinematics: Kinematics) -> None:
-        self._max_specific_force = (
-            load.holding_force / SAFETY_FACTOR / load.kind.mass
-        )  # maximum of |a + g| [m/s²]
+        # Maximum of |a + g| [m/s²].
+        self._max_specific_force = load.holding_force / SAFETY_FACTOR / load.kind.mass
         self._centre_offset = load.kind.height / 2
         self._kinematics = kinematics
 
@@ -101,7 +100,7 @@ class PayloadLimit:
 
 
 def _find_acceleration_fractions(accelerations: Array, max_specific_force: float) -> Array:
-    """Return the largest `k`, 0 to 1, at which `|k a + g|` keeps its maximum; `a` is `(N, 3)` [m/s²]."""
+    """Return the largest `k`, 0 to 1, at which `|k a + g|` is within its maximum; `a`: `(N, 3)` [m/s²]."""
     square = np.sum(accelerations**2, axis=1) + 1e-12
     product = GRAVITY * accelerations[:, 2]
     discriminant = product**2 - square * (GRAVITY**2 - max_specific_force**2)
