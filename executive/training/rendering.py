@@ -14,7 +14,7 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.frame import Box
-from executive.cells.sim.models import find_missing_models
+from executive.cells.sim.models import find_model_errors
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
 from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
 from executive.errors import InputError
@@ -58,7 +58,7 @@ def generate_dataset(
             + "; ".join(f"{name} has {', '.join(cell.objects)}" for name, cell in configs.items())
         )
     for name, cell in configs.items():
-        for key, message in find_missing_models(cell):
+        for key, message in find_model_errors(cell):
             raise InputError(f"{name}: {'.'.join(map(str, key))}: {message}")
     write_annotations(out, layout, [], classes)
     train_count = image_count - round(image_count * valid_fraction)

@@ -13,7 +13,7 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import build_bin
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import ClearanceChecker
-from executive.cells.sim.models import load_mesh, object_class_with_mass
+from executive.cells.sim.models import build_simulated_class, load_mesh
 from executive.cells.sim.spawn import spawn_objects
 from executive.cells.sim.suction import compute_breakaway_force, measure_contact
 from executive.cells.sim.tool import TOUCH_DISTANCE
@@ -146,7 +146,7 @@ class SceneGenerator:
 
     def _kind(self, body: int) -> ObjectClass:
         label = self._world.bodies[body]
-        return object_class_with_mass(label, self._cell.objects[label])
+        return build_simulated_class(label, self._cell.objects[label])
 
     def _measure_seal(self, body: int, place: tuple[float, float], top: float) -> tuple[float, float]:
         """Return the surface height under a cup at `place` [m], and the breakaway force of a seal there [N].

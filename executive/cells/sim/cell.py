@@ -16,7 +16,7 @@ from executive.cells.sim.camera import SimCamera
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.min_times import SimMinTimes
-from executive.cells.sim.models import find_missing_models, object_class_with_mass
+from executive.cells.sim.models import build_simulated_class, find_model_errors
 from executive.cells.sim.poses import find_places_out_of_reach, find_unusable_poses
 from executive.cells.sim.rebuild import InterruptedArm, rebuild_world
 from executive.cells.sim.scene_file import load_scene
@@ -91,7 +91,7 @@ class SimCell(CellWithoutHardware):
         )
         if options.resume is not None:
             self._camera.set_counts(options.resume.frame_count, options.resume.pose_count)
-        classes = {label: object_class_with_mass(label, kind) for label, kind in config.objects.items()}
+        classes = {label: build_simulated_class(label, kind) for label, kind in config.objects.items()}
         localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
         # Detectors are built last, because their processes would not be ended if a later statement failed.
         folders = (options.base, get_shipped_folder() / "cells")
@@ -117,7 +117,7 @@ class SimCell(CellWithoutHardware):
         """
         if unsupported := tuple(find_arm_errors(config)):
             return unsupported
-        missing = tuple(find_missing_models(config))
+        missing = tuple(find_model_errors(config))
         return (
             *missing,
             *_find_missing_depth_sensors(config),

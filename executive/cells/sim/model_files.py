@@ -1,4 +1,4 @@
-"""Model files: URDF and Wavefront meshes, which are checked before PyBullet opens them."""
+"""Readers of model files, URDF and meshes, that find errors before PyBullet opens the files."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def read_urdf(path: Path) -> ElementTree.Element:
         if element.tag.startswith("{"):
             raise InputError(f"the model {path.name} has an XML namespace, {element.tag}; remove it")
         if "filename" in element.attrib:
-            _check_name(path, element.attrib["filename"])
+            _normalize_name(path, element.attrib["filename"])
         if element.tag == "mesh":
             find_mesh(path, element)
     return root
@@ -64,13 +64,12 @@ def find_mesh(urdf: Path, mesh: ElementTree.Element) -> Path:
     Raises:
         InputError: The mesh is no file in the folder of the URDF, is too large, or has too many triangles.
     """
-    path = find_model(str(urdf.parent / _check_name(urdf, mesh.get("filename", ""))))
-    if _count_triangles(path) > MAX_TRIANGLE_COUNT:
-        raise _make_count_error(path)
+    path = find_model(str(urdf.parent / _normalize_name(urdf, mesh.get("filename", ""))))
+    _check_triangle_count(path)
     return path
 
 
-def _check_name(urdf: Path, name: str) -> str:
+def _normalize_name(urdf: Path, name: str) -> str:
     """Return the name of a file in a URDF without a leading `package://`.
 
     Raises:
@@ -82,8 +81,12 @@ def _check_name(urdf: Path, name: str) -> str:
     return name
 
 
-def _count_triangles(path: Path) -> int:
-    """Return the number of triangles of a mesh in Wavefront or STL format, or 0 for another format."""
+def _check_triangle_count(path: Path) -> None:
+    """Check the number of triangles of a Wavefront or STL file.
+
+    Raises:
+        InputError: The file cannot be read, or has more than `MAX_TRIANGLE_COUNT` triangles.
+    """
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -91,18 +94,19 @@ def _count_triangles(path: Path) -> int:
     if path.suffix.lower() == ".stl":
         # A binary STL file has a header of 80 bytes, the number of triangles, and 50 bytes for each triangle.
         count = int.from_bytes(content[80:84], "little")
-        return count if len(content) == 84 + 50 * count else content.count(b"endfacet")
-    lines = (line.split() for line in content.splitlines())
-    return sum(len(words) - 3 for words in lines if words[:1] == [b"f"])
+        if len(content) != 84 + 50 * count:
+            count = content.count(b"endfacet")  # an STL text file
+    else:
+        # A line "f" of a Wavefront file lists the vertices of a polygon, two more than its triangles.
+        lines = (line.split() for line in content.splitlines())
+        count = sum(len(words) - 3 for words in lines if words[:1] == [b"f"])
+    if count > MAX_TRIANGLE_COUNT:
+        raise InputError(
+            f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles; simplify the mesh"
+        )
 
 
-def _make_count_error(path: Path) -> InputError:
-    return InputError(
-        f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles; simplify the mesh"
-    )
-
-
-def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
+def read_wavefront(path: Path) -> tuple[Array, NDArray[np.intp]]:
     """Return vertices `(N, 3)` and triangles `(M, 3)` of a Wavefront file; polygons are split into triangles.
 
     Raises:
@@ -110,24 +114,24 @@ def read_obj(path: Path) -> tuple[Array, NDArray[np.intp]]:
     """
     vertices: list[list[float]] = []
     triangles: list[tuple[int, int, int]] = []
+    _check_triangle_count(path)
     try:
         for line in path.read_text(encoding="utf-8").splitlines():
-            key, *values = line.split() or [""]
-            if key == "v":
-                vertices.append([float(value) for value in values[:3]])
-            elif key == "f":
-                numbers = [int(value.split("/")[0]) for value in values]
+            keyword, *words = line.split() or [""]
+            if keyword == "v":
+                vertices.append([float(word) for word in words[:3]])
+            elif keyword == "f":
+                # A word such as 3/1/2 starts with the number of a vertex: from 1, or negative from the end.
+                numbers = [int(word.split("/")[0]) for word in words]
                 indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
-                triangles += [(indices[0], a, b) for a, b in pairwise(indices[1:])]
-        if len(triangles) > MAX_TRIANGLE_COUNT:
-            raise _make_count_error(path)
+                triangles += [(indices[0], *pair) for pair in pairwise(indices[1:])]
         faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
         return _check_mesh(np.array(vertices, dtype=float), faces)
     except (OSError, ValueError, IndexError, OverflowError) as error:
         raise InputError(f"the model {path.name} is no Wavefront mesh: {error}") from None
 
 
-def read_numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...]:
+def parse_numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...]:
     """Return the numbers in the text of a URDF attribute, or `default` if the attribute is missing.
 
     Raises:

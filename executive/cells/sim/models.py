@@ -1,4 +1,4 @@
-"""Models of objects: visual mesh, body in PyBullet, mass, and check of the declared size."""
+"""Models of objects: visual mesh, PyBullet body, pose and mass, and check of the declared size."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from executive.cell.config import CellConfig, ObjectConfig
 from executive.cell.layout import build_object_class
 from executive.cell.objects import ObjectClass
 from executive.cell.workcell import KeyPath
-from executive.cells.sim.model_files import find_mesh, find_model, read_numbers, read_obj, read_urdf
+from executive.cells.sim.model_files import find_mesh, find_model, parse_numbers, read_urdf, read_wavefront
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 
@@ -28,7 +28,7 @@ ROLLING_FRICTION = 0.0005
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh in the upright frame O of its object (see `compute_upright_pose`); z points up.
+    """Triangle mesh in the upright frame O of an object (see `compute_upright_pose`).
 
     Attributes:
         vertices: Positions of the vertices `(N, 3)` [m].
@@ -57,6 +57,7 @@ class Mesh:
     @cached_property
     def centroid(self) -> Array:
         """Centroid of the enclosed volume `(3,)` [m]; without a volume, the centre of the bounding box."""
+        # Each triangle and the origin form a tetrahedron with a signed volume and its own centroid.
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
         if abs(volumes.sum()) < 1e-12:
@@ -65,17 +66,18 @@ class Mesh:
 
     @cached_property
     def is_convex(self) -> bool:
-        """True if no vertex is more than 0.1 mm outside of the plane of a triangle."""
+        """True if no vertex is more than 0.1 mm in front of the plane of any triangle."""
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         normals = np.cross(b - a, c - a)
         lengths = np.linalg.norm(normals, axis=1)
-        normals, a = (normals / lengths[:, None].clip(1e-12))[lengths > 0], a[lengths > 0]
+        has_area = lengths > 0
+        normals, a = normals[has_area] / lengths[has_area, None].clip(1e-12), a[has_area]
         distances = self.vertices @ normals.T - (a * normals).sum(axis=1)
         return bool(distances.max() < 1e-4)
 
 
 def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
-    """Add an object and return its body; `X_WO` is the pose of its upright frame O in the world.
+    """Add an object to the world, with its upright frame O at the pose `X_WO`, and return the body.
 
     Raises:
         InputError: The model is missing or invalid.
@@ -87,6 +89,7 @@ def add_body(client: BulletClient, config: ObjectConfig, X_WO: Pose) -> int:
 
 
 def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
+    """Add the object of a URDF, with the frame L of the file at the pose `X_WL`, and return the body."""
     path = str(find_model(config.urdf))
     try:
         return int(client.loadURDF(path, X_WL.position, X_WL.quaternion, globalScaling=config.scale))
@@ -95,7 +98,10 @@ def _add_urdf(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
 
 
 def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
-    """Add a mesh of uniform density and return its body; each group collides as its convex hull + 1 mm."""
+    """Add an object of uniform density with a mesh, and return the body.
+
+    PyBullet replaces each group (`g`) of a Wavefront file by its convex hull, enlarged by 1 mm.
+    """
     shape = {"fileName": str(find_model(config.mesh)), "meshScale": [config.scale] * 3}
     centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
     return int(
@@ -115,72 +121,79 @@ def compute_mass(config: ObjectConfig) -> float:
     if config.mesh:
         return config.mass
     masses = read_urdf(find_model(config.urdf)).iterfind(".//inertial/mass")
-    return sum(sum(read_numbers(mass.get("value"), (0.0,))) for mass in masses)
+    return sum(sum(parse_numbers(mass.get("value"), (0.0,))) for mass in masses)
 
 
-def object_class_with_mass(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return the object class of a section of a cell file, with the mass of its simulated objects."""
+def build_simulated_class(label: str, config: ObjectConfig) -> ObjectClass:
+    """Return the object class of a section of a cell file, with the mass of the simulated objects."""
     return replace(build_object_class(label, config), mass=compute_mass(config))
 
 
-def find_missing_models(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each model of a cell file that is missing, invalid, or of a wrong size."""
-    for label, section in config.objects.items():
-        key: KeyPath = ("objects", label)
+    for label, object_config in config.objects.items():
         try:
-            if section.mesh:
-                load_mesh(section)
+            if object_config.mesh:
+                load_mesh(object_config)
             else:
-                compute_mass(section)
+                compute_mass(object_config)
         except InputError as error:
-            yield (*key, "mesh" if section.mesh else "urdf"), str(error)
+            yield ("objects", label, "mesh" if object_config.mesh else "urdf"), str(error)
         else:
-            yield from (((*key, name), message) for name, message in _find_wrong_sizes(label, section))
+            yield from _find_wrong_sizes(label, object_config)
 
 
-def _find_wrong_sizes(label: str, section: ObjectConfig) -> Iterator[tuple[str, str]]:
-    """Yield `height` or `radius`, with a message, for each declared size that differs from the model.
+def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for the height and the radius of a class if the model has another size.
 
     The executive computes the centre, the top and the free space of an object from these sizes. The size of
     a model without a Wavefront mesh is not checked.
     """
     try:
-        mesh = load_mesh(section)
+        mesh = load_mesh(config)
     except InputError:
         return
-    for name, actual in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
-        declared = getattr(section, name)
-        if not abs(declared - actual) <= SIZE_TOLERANCE:  # also True for NaN
-            yield (
-                name,
-                f"the model of {label} has a {name} of {actual:.4f} m, not {declared:g} m; "
-                "correct the figure, scale or upright_deg",
-            )
+    for name, model_size in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
+        declared_size = getattr(config, name)
+        if not abs(declared_size - model_size) <= SIZE_TOLERANCE:  # also True for NaN
+            message = f"the model of {label} has a {name} of {model_size:.4f} m, not {declared_size:g} m; "
+            yield ("objects", label, name), message + "correct the figure, scale or upright_deg"
 
 
 @lru_cache(maxsize=64)
 def compute_upright_pose(config: ObjectConfig) -> Pose:
     """Return `X_OL`, the pose of the frame L of the model file in the frame O of the upright object.
 
-    For a URDF, O has the origin of the file. For a mesh, whose origin is arbitrary, the origin of O is the
-    centre of the bounding box.
+    The z axis of O points up. The origin of O is the origin of a URDF, but the centre of the bounding box of
+    a mesh, because meshes have arbitrary origins.
     """
     X_OL = Pose(_make_rotation(*(math.radians(angle) for angle in config.upright_deg)), np.zeros(3))
     if not config.mesh:
         return X_OL
-    vertices = X_OL.apply(read_obj(find_model(config.mesh))[0] * config.scale)
+    vertices = X_OL.apply(read_wavefront(find_model(config.mesh))[0] * config.scale)
     return Pose(X_OL.rotation, -(vertices.min(axis=0) + vertices.max(axis=0)) / 2)
+
+
+def get_inertial_pose(client: BulletClient, body: int) -> Pose:
+    """Return `X_LI`, the pose of the inertial frame I, at the centre of mass, in the model frame L."""
+    return Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
+
+
+def get_upright_pose(client: BulletClient, body: int, config: ObjectConfig) -> Pose:
+    """Return `X_WO`, the pose of the upright frame O of an object in the world."""
+    X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
+    return X_WI @ get_inertial_pose(client, body).inverse() @ compute_upright_pose(config).inverse()
 
 
 @lru_cache(maxsize=64)
 def load_mesh(config: ObjectConfig) -> Mesh:
-    """Return the scaled visual mesh of a class of objects in the frame O of the upright object.
+    """Return the scaled visual mesh of an object class in the upright frame O.
 
     Raises:
         InputError: The model has no visual mesh in Wavefront format.
     """
     if config.mesh:
-        points, faces = read_obj(find_model(config.mesh))
+        points, faces = read_wavefront(find_model(config.mesh))
         return Mesh(compute_upright_pose(config).apply(points * config.scale), faces)
     path = find_model(config.urdf)
     vertices: list[Array] = []
@@ -189,13 +202,13 @@ def load_mesh(config: ObjectConfig) -> Mesh:
         mesh = visual.find("geometry/mesh")
         if mesh is None or not mesh.get("filename", "").endswith(".obj"):
             raise InputError(f"{path}: only visuals made of .obj meshes can be labelled")
-        points, faces = read_obj(find_mesh(path, mesh))
-        scale = np.array(read_numbers(mesh.get("scale"), (1.0, 1.0, 1.0)))
+        points, faces = read_wavefront(find_mesh(path, mesh))
+        scale = np.array(parse_numbers(mesh.get("scale"), (1.0, 1.0, 1.0)))
         origin = visual.find("origin")
-        rpy = read_numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0))
-        xyz = read_numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0))
+        rpy = parse_numbers(None if origin is None else origin.get("rpy"), (0.0, 0.0, 0.0))
+        xyz = parse_numbers(None if origin is None else origin.get("xyz"), (0.0, 0.0, 0.0))
         X_LV = Pose(_make_rotation(*rpy), np.array(xyz) * config.scale)
-        triangles.append(faces + sum(map(len, vertices)))
+        triangles.append(faces + sum(map(len, vertices)))  # indices count the vertices of earlier visuals
         vertices.append((compute_upright_pose(config) @ X_LV).apply(points * scale * config.scale))
     if not vertices:
         raise InputError(f"the model {path.name} has no visual, so no camera would see it")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig, ObjectConfig
-from executive.cells.sim.model_files import read_obj
-from executive.cells.sim.models import find_missing_models, load_mesh
+from executive.cells.sim.model_files import read_wavefront
+from executive.cells.sim.models import find_model_errors, load_mesh
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Pose, rotate_about_z
@@ -116,7 +116,7 @@ def test_what_is_no_mesh_is_refused_with_the_reason(text: str, complaint: str, t
     path = tmp_path / "thing.obj"
     path.write_text(text)
     with pytest.raises(InputError, match=rf"the model thing\.obj is no Wavefront mesh: {complaint}"):
-        read_obj(path)
+        read_wavefront(path)
 
 
 def test_missing_and_broken_meshes_and_wrong_sizes_are_named_with_their_keys(
@@ -130,7 +130,7 @@ def test_missing_and_broken_meshes_and_wrong_sizes_are_named_with_their_keys(
         flat=wedge.model_copy(update={"height": 0.02, "radius": 0.03}),
         cube=overhead.objects["cube"].model_copy(update={"scale": 0.5}),
     )
-    found = {".".join(map(str, key[1:])): sentence for key, sentence in find_missing_models(config)}
+    found = {".".join(map(str, key[1:])): sentence for key, sentence in find_model_errors(config)}
     assert found == {
         "gone.mesh": "there is no model gone.obj, neither beside the cell file nor in pybullet_data",
         "empty.mesh": "the model empty.obj is no Wavefront mesh: it has no faces (lines beginning with f)",
