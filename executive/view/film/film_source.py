@@ -20,7 +20,7 @@ class FilmSource:
 
     Attributes:
         directory: The run directory.
-        events: Events of the journal in order, without those that a later resumption voided.
+        events: Events of the journal in order, without the events that a resumption discarded.
         start: Event of the start of the run.
         nodes: Nodes of the tree.
         config: Configuration of the cell.

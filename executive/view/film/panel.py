@@ -16,18 +16,26 @@ from executive.view.tree.tree_text import draw_line_prefixes, select_active_node
 
 TEXT_SIZE, HEADING_SIZE, MARK_SIZE = 14, 12, 11
 """Font sizes of text and of column headings, and side of a status mark [pixel]."""
-NODE_ROW, ITEM_ROW, INDENT = 18, 20, 17
+NODE_ROW_HEIGHT, ITEM_ROW_HEIGHT, INDENT = 18, 20, 17
 """Height of a row of the tree, height of a row of the items, and indentation per tree level [pixel]."""
 MAX_ITEM_ROWS = 9
 """Maximum number of items that are drawn."""
 _CHARACTERS_PER_LEVEL = 3
 """Number of characters per tree level in a result of `draw_line_prefixes`."""
-_COLUMNS = {"item": 0.0, "class": 0.32, "state": 0.53, "bin": 0.74}
+_COLUMN_STARTS = {"item": 0.0, "class": 0.32, "state": 0.53, "bin": 0.74}
 """Left end of each column [fraction of the width]."""
-_COLOURS = {"placed": SUCCESS, "rejected": FAILURE, "lost": FAILURE, "held": RUNNING, "dropped": RUNNING}
+_STATE_COLOURS = {
+    "placed": SUCCESS,
+    "rejected": FAILURE,
+    "lost": FAILURE,
+    "held": RUNNING,
+    "dropped": RUNNING,
+}
 """Colour of the name of a state, by state; other states have the colour `MINOR_TEXT`."""
 _FINAL_STATES = ("placed", "rejected", "skipped", "lost", "phantom")
+"""States of items that no longer change."""
 _SWATCH_SIZE = 9
+"""Side of the square with the colour of a bin [pixel]."""
 
 
 def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state: FilmRunState) -> None:
@@ -40,13 +48,13 @@ def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state:
         state: State of the run, with the active nodes.
     """
     left, top, right, bottom = box
-    shown = select_nodes(nodes, state, int((bottom - top) // NODE_ROW))
+    shown_nodes = select_nodes(nodes, state, int((bottom - top) // NODE_ROW_HEIGHT))
     draw, font = ImageDraw.Draw(image), style.load_font(TEXT_SIZE)
-    for row, (node, prefix) in enumerate(zip(shown, draw_line_prefixes(shown), strict=True)):
-        middle = top + NODE_ROW * (row + 0.5)
+    for row, (node, prefix) in enumerate(zip(shown_nodes, draw_line_prefixes(shown_nodes), strict=True)):
+        middle = top + NODE_ROW_HEIGHT * (row + 0.5)
         _draw_lines(draw, prefix, left, middle)
-        last = state.timeline.find_current_activation(node.path)
-        status = last.status if last else ""
+        activation = state.timeline.find_current_activation(node.path)
+        status = activation.status if activation else ""
         x = left + INDENT * (len(prefix) // _CHARACTERS_PER_LEVEL)
         style.draw_mark(image, status, (x + MARK_SIZE / 2, middle), MARK_SIZE)
         x += MARK_SIZE + 8
@@ -56,30 +64,34 @@ def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state:
         name = style.truncate(node.name, TEXT_SIZE, right - x)
         draw.text((x, middle), name, colour, font, "lm")
         x += font.getlength(name) + 10
-        note = style.truncate(last.note if last else "", TEXT_SIZE, right - x)
+        note = style.truncate(activation.note if activation else "", TEXT_SIZE, right - x)
         draw.text((x, middle), note, FAILURE if status == "FAILURE" else MINOR_TEXT, font, "lm")
 
 
 def select_nodes(nodes: Sequence[OutlineNode], state: FilmRunState, max_count: int) -> list[OutlineNode]:
     """Return the active nodes and their children, at most `max_count` nodes.
 
-    Nodes that never ran are omitted first, then inactive nodes; of these, the last nodes of the tree first.
+    Nodes that never ran are omitted first, then other inactive nodes, from the last node of the tree.
     """
     active_paths = state.active_paths
-    shown = select_active_nodes(nodes, active_paths)
+    shown_nodes = select_active_nodes(nodes, active_paths)
 
     def rank(index: int) -> tuple[bool, bool, int]:
-        path = shown[index].path
-        last = state.timeline.find_current_activation(path)
-        return path in active_paths, last is not None and last.status in style.STATUS_COLOURS, -index
+        path = shown_nodes[index].path
+        activation = state.timeline.find_current_activation(path)
+        return (
+            path in active_paths,
+            activation is not None and activation.status in style.STATUS_COLOURS,
+            -index,
+        )
 
-    kept_indices = sorted(sorted(range(len(shown)), key=rank, reverse=True)[:max_count])
-    return [shown[index] for index in kept_indices]
+    kept_indices = sorted(sorted(range(len(shown_nodes)), key=rank, reverse=True)[:max_count])
+    return [shown_nodes[index] for index in kept_indices]
 
 
 def compute_height(item_count: int) -> int:
     """Return the height of the drawing of `item_count` items [pixel]."""
-    return ITEM_ROW * (min(item_count, MAX_ITEM_ROWS) + 1)
+    return ITEM_ROW_HEIGHT * (min(item_count, MAX_ITEM_ROWS) + 1)
 
 
 def draw_items(
@@ -95,15 +107,15 @@ def draw_items(
     """
     left, top, right, _ = box
     draw = ImageDraw.Draw(image)
-    starts = [left + fraction * (right - left) for fraction in _COLUMNS.values()]
+    starts = [left + fraction * (right - left) for fraction in _COLUMN_STARTS.values()]
     ends = [start - 8 for start in starts[1:]] + [right]
-    for title, start in zip(_COLUMNS, starts, strict=True):
-        draw.text((start, top + ITEM_ROW / 2), title, INACTIVE, style.load_font(HEADING_SIZE), "lm")
+    for title, start in zip(_COLUMN_STARTS, starts, strict=True):
+        draw.text((start, top + ITEM_ROW_HEIGHT / 2), title, INACTIVE, style.load_font(HEADING_SIZE), "lm")
     for number, item in enumerate(select_items(items), start=1):
-        middle = top + ITEM_ROW * (number + 0.5)
+        middle = top + ITEM_ROW_HEIGHT * (number + 0.5)
         cells = (item.item, item.label, item.state, item.bin)
         name_colour = MINOR_TEXT if item.state in _FINAL_STATES else TEXT
-        colours = (name_colour, MINOR_TEXT, _COLOURS.get(item.state, MINOR_TEXT), MINOR_TEXT)
+        colours = (name_colour, MINOR_TEXT, _STATE_COLOURS.get(item.state, MINOR_TEXT), MINOR_TEXT)
         offsets = (0, 0, 0, _SWATCH_SIZE + 6)
         for cell, colour, offset, start, end in zip(cells, colours, offsets, starts, ends, strict=True):
             text = style.truncate(cell, TEXT_SIZE, end - start - offset)
@@ -127,7 +139,7 @@ def _draw_lines(draw: ImageDraw.ImageDraw, prefix: str, left: float, middle: flo
         joint = prefix[level]
         x = left + INDENT * (level // _CHARACTERS_PER_LEVEL) + MARK_SIZE // 2
         if joint != " ":
-            bottom = middle if joint == "└" else middle + NODE_ROW / 2
-            draw.line((x, middle - NODE_ROW / 2, x, bottom), LINE, 1)
+            bottom = middle if joint == "└" else middle + NODE_ROW_HEIGHT / 2
+            draw.line((x, middle - NODE_ROW_HEIGHT / 2, x, bottom), LINE, 1)
         if joint in "├└":
             draw.line((x, middle, x + INDENT - MARK_SIZE // 2 - 3, middle), LINE, 1)

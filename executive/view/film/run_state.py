@@ -19,7 +19,7 @@ class FilmRunState:
     """State of a run at a control step, computed from the events up to that step.
 
     Args:
-        events: Events of the run in order, without those that were discarded when the run was resumed.
+        events: Events of the run in order, without the events that a resumption discarded.
         nodes: Nodes of the tree.
         image_files: Image files on which decisions are based; their names start with the control step.
 
@@ -42,13 +42,13 @@ class FilmRunState:
 
     @property
     def active_paths(self) -> frozenset[str]:
-        """Paths of the running nodes; after its end, paths of the nodes that ended with the tree."""
+        """Paths of the running nodes, or after the run of the nodes that ended with the tree."""
         timeline = self.timeline
         if running := timeline.find_running_activations():
             return frozenset(activation.node for activation in running)
-        end = _get_end(timeline.last_end)
+        end = _get_end_key(timeline.last_end)
         activations = timeline.activation_by_path.items()
-        return frozenset(path for path, activation in activations if _get_end(activation) == end)
+        return frozenset(path for path, activation in activations if _get_end_key(activation) == end)
 
     @property
     def failure_text(self) -> str:
@@ -75,18 +75,18 @@ class FilmRunState:
         while self._events and self._events[-1].tick <= step:
             timed_event = self._events.pop()
             self.timeline(timed_event)
-            if failure := _describe_failure(timed_event):
+            if failure := _describe_incident(timed_event):
                 self._failure = (timed_event.clock, failure)
         while self._image_files and int(self._image_files[-1].stem.partition("_")[0]) <= step:
             self.picture_file = self._image_files.pop()
 
 
-def _get_end(activation: Activation | None) -> tuple[int, str]:
+def _get_end_key(activation: Activation | None) -> tuple[int, str]:
     """Return the control step and the status with which an activation ended; (0, "") for None."""
     return (0, "") if activation is None else (activation.end_tick, activation.status)
 
 
-def _describe_failure(timed_event: TimedEvent) -> str:
+def _describe_incident(timed_event: TimedEvent) -> str:
     """Return a text about the failure of a skill with an item, a halt, a fault or a resumption; else ""."""
     match timed_event.event:
         case NodeEnded(status="FAILURE", skill=skill, item=item) as ended if skill and item:

@@ -39,7 +39,7 @@ class LineView:
 
     def __call__(self, timed: events.TimedEvent) -> None:
         """Write the line of an event, if it has one."""
-        if text := self._describe(timed.event):
+        if text := self._describe_event(timed.event):
             self._stream.write(f"{timed.clock:9.2f} s  {text}\n")
             self._stream.flush()
         self.timeline(timed)
@@ -51,7 +51,7 @@ class LineView:
         """Write a message about the record of the run on a separate line."""
         self._stream.write(f"note: {message}\n")
 
-    def _describe(self, event: events.Event) -> str:
+    def _describe_event(self, event: events.Event) -> str:
         match event:
             case events.RunStarted():
                 return f"{event.mission} starts, seed {event.seed}"
@@ -60,10 +60,10 @@ class LineView:
             case events.FaultInjected():
                 return f"injected fault: {event.name}"
             case events.NodeStarted() if event.skill:
-                return f"{self._name_skill(event)} ..."
+                return f"{self._format_skill(event)} ..."
             case events.NodeEnded() if event.skill:
                 details = "".join(f": {text}" for text in (event.reason, event.message) if text)
-                return f"{self._name_skill(event)} {STATUS_TEXTS[event.status]}{details}"
+                return f"{self._format_skill(event)} {STATUS_TEXTS[event.status]}{details}"
             case events.BranchChosen():
                 after = f", after {event.reason}" if event.reason else ""
                 return f"{self._names_by_path[event.node]}: {event.choice}{after}"
@@ -73,7 +73,7 @@ class LineView:
                 return self._describe_change(event)
         return ""
 
-    def _name_skill(self, event: events.NodeStarted | events.NodeEnded) -> str:
+    def _format_skill(self, event: events.NodeStarted | events.NodeEnded) -> str:
         return self._skill_names_by_path[event.node] + (f" [{event.item}]" if event.item else "")
 
     def _describe_change(self, change: events.ItemChanged) -> str:

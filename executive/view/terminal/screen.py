@@ -103,11 +103,11 @@ class TerminalView:
 
     def _render_tree(self) -> RenderableType:
         """Return a drawing of the running nodes and their children; a whole tree does not fit."""
-        shown = select_active_nodes(
+        shown_nodes = select_active_nodes(
             self._nodes, {running.node for running in self.timeline.find_running_activations()}
         )
         lines = Text()
-        for node, prefix in zip(shown, draw_line_prefixes(shown), strict=True):
+        for node, prefix in zip(shown_nodes, draw_line_prefixes(shown_nodes), strict=True):
             last = self.timeline.activation_by_path.get(node.path)
             mark, style = _STATUS_MARKS.get(last.status if last else "", ("·", "dim"))
             note = escape_control_characters(last.note) if last else ""
