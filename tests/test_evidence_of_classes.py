@@ -64,8 +64,8 @@ def test_a_touch_that_is_too_low_for_all_classes_may_have_missed_the_top(
     ("side", "contradiction"),
     [
         (24.0, ""),
-        (40.0, "its box is 102 mm long, and that of a sphere is 31 to 76 mm long"),
-        (10.0, "its box is 25 mm long, and that of a sphere is 31 to 76 mm long"),
+        (40.0, "its box is 102 mm long, and the box of a sphere is 31 to 76 mm long"),
+        (10.0, "its box is 25 mm long, and the box of a sphere is 31 to 76 mm long"),
     ],
 )
 def test_the_size_of_a_box_has_to_be_that_of_the_class(side: float, contradiction: str) -> None:
@@ -118,17 +118,17 @@ def describe_top(label: str, frame: Frame, box: Box = BOX) -> str:
         (
             "cube",
             0.08,
-            "its top is 80 mm above the table, and that of a cube 50, 100, 106 or 110 mm",
+            "its top is 80 mm above the table, and the top of a cube is at 50, 100, 106 or 110 mm",
         ),
         (
             "cube",
             0.16,
-            "its top is 160 mm above the table, and that of a cube 50, 100, 106 or 110 mm",
+            "its top is 160 mm above the table, and the top of a cube is at 50, 100, 106 or 110 mm",
         ),
         (
             "duck",
             0.02,
-            "its top is 20 mm above the table, and that of a duck 56, 106, 112 or 116 mm",
+            "its top is 20 mm above the table, and the top of a duck is at 56, 106, 112 or 116 mm",
         ),
     ],
 )

@@ -1,6 +1,6 @@
 """Pinhole camera model: projection of points into an image, and rays through its pixels.
 
-Camera frames follow OpenCV (z along the optical axis, x to the right, y down). Image coordinates are
+Camera frames follow OpenCV: z along the optical axis, x to the right, y down. Image coordinates are
 continuous: pixel i covers [i, i + 1), so that the centre of an image is (W / 2, H / 2).
 """
 
@@ -20,15 +20,15 @@ NEAR_PLANE, FAR_PLANE = 0.02, 5.0
 
 
 def compute_camera_matrix(width: int, height: int, fov_deg: float) -> Array:
-    """Return the camera matrix `(3, 3)` [pixel] for square pixels and a principal point in the image centre.
+    """Return the camera matrix `(3, 3)` [pixel] of a camera with square pixels and a centred principal point.
 
     Args:
         width: Image width [pixel].
         height: Image height [pixel].
         fov_deg: Vertical field of view [degree].
     """
-    focal = height / 2 / math.tan(math.radians(fov_deg) / 2)
-    return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
+    focal_length = height / 2 / math.tan(math.radians(fov_deg) / 2)
+    return np.array([[focal_length, 0.0, width / 2], [0.0, focal_length, height / 2], [0.0, 0.0, 1.0]])
 
 
 def compute_field_of_view(matrix: Array, height: int) -> float:
@@ -61,22 +61,22 @@ def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) 
 def convert_from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Array, Pose]:
     """Return camera matrix `(3, 3)` [pixel] and pose `X_WC` of a camera calibrated with OpenCV.
 
-    This is the inverse of `Frame.to_opencv`. Pixel centres have integer coordinates in OpenCV; here, 0.5 is
-    added to both coordinates. rvec [rad] and tvec [m] of `cv2.solvePnP` transform points from W to C.
+    `rvec` [rad] and `tvec` [m] of `cv2.solvePnP` transform points from W to C. The function is the inverse of
+    `Frame.to_opencv`.
     """
-    # The import takes 0.3 s, and few cells have a camera calibrated with OpenCV.
+    # scipy.spatial is imported here because the import takes 0.3 s, and few cells need it.
     from scipy.spatial.transform import Rotation
 
-    shifted = np.array(matrix, dtype=float)
-    shifted[:2, 2] += 0.5
+    camera_matrix = np.array(matrix, dtype=float)
+    camera_matrix[:2, 2] += 0.5  # In OpenCV, the centre of the first pixel is (0, 0) instead of (0.5, 0.5).
     X_CW = Pose(Rotation.from_rotvec(rvec).as_matrix(), np.asarray(tvec, dtype=float))
-    return shifted, X_CW.inverse()
+    return camera_matrix, X_CW.inverse()
 
 
 def compute_calibration(config: CameraConfig) -> tuple[Array, Pose]:
     """Return the camera matrix `(3, 3)` [pixel] and the pose `X_MC` of a camera of a cell file.
 
-    M is the coordinate frame of the world for a fixed camera, and of the flange for a wrist camera.
+    M is the mount: the world for a fixed camera, the flange for a wrist camera.
     """
     calibration = config.calibration
     if calibration is None:
@@ -99,27 +99,30 @@ def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:
 
 
 def compute_pixel_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:
-    """Return the direction in the world, a unit vector `(3,)`, of the ray through `pixel` `(2,)`."""
-    u, v = np.asarray(pixel, dtype=float)
-    direction = X_WC.rotation @ np.linalg.solve(matrix, np.array([u, v, 1.0]))
-    return np.asarray(direction / np.linalg.norm(direction))
+    """Return the unit vector `(3,)` in the world along the ray through `pixel` `(2,)`."""
+    ray = _compute_ray(matrix, X_WC, pixel)
+    return np.asarray(ray / np.linalg.norm(ray))
+
+
+def _compute_ray(matrix: Array, X_WC: Pose, pixel: ArrayLike) -> Array:
+    """Return the vector `(3,)` [m] from the camera to the point at depth 1 m on the ray through `pixel`."""
+    return np.asarray(X_WC.rotation @ np.linalg.solve(matrix, np.append(np.asarray(pixel, dtype=float), 1.0)))
 
 
 def intersect_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Array:
-    """Return the point `(3,)` [m] at height `z` [m] in the world that appears at `pixel` `(2,)`.
+    """Return the point `(3,)` [m] at height `z` [m] in the world whose image is at `pixel` `(2,)`.
 
     Raises:
         ValueError: The ray through the pixel does not intersect the plane in front of the camera.
     """
-    u, v = np.asarray(pixel, dtype=float)
-    direction = X_WC.rotation @ np.linalg.solve(matrix, np.array([u, v, 1.0]))
+    ray = _compute_ray(matrix, X_WC, pixel)
     height = z - X_WC.position[2]
-    if abs(direction[2]) < 1e-9 or height / direction[2] <= 0:
+    if abs(ray[2]) < 1e-9 or height / ray[2] <= 0:
         raise ValueError(
-            f"pixel {np.asarray(pixel, dtype=float).tolist()} of a camera {X_WC.position[2]:.3f} m high "
-            f"has a ray that does not intersect the plane z = {z:.3f} m in front of the camera"
+            f"the ray through pixel {np.asarray(pixel, dtype=float).tolist()} of a camera at z = "
+            f"{X_WC.position[2]:.3f} m does not intersect the plane z = {z:.3f} m in front of the camera"
         )
-    return np.asarray(X_WC.position + height / direction[2] * direction)
+    return np.asarray(X_WC.position + height / ray[2] * ray)
 
 
 def compute_view_matrix(X_WC: Pose) -> tuple[float, ...]:
@@ -127,6 +130,7 @@ def compute_view_matrix(X_WC: Pose) -> tuple[float, ...]:
     X_CW = X_WC.inverse()
     view = np.eye(4)
     view[:3, :3], view[:3, 3] = X_CW.rotation, X_CW.position
+    # Cameras of OpenGL look along -z, and their y axis points up.
     return tuple((np.diag([1.0, -1.0, -1.0, 1.0]) @ view).T.ravel().tolist())
 
 
@@ -135,13 +139,12 @@ def compute_projection_matrix(
 ) -> tuple[float, ...]:
     """Return OpenGL's projection matrix for a region of an image: 16 numbers in column-major order.
 
-    A renderer with this matrix draws only `region` (left, top, right, bottom [pixel]) of the full image.
+    A renderer with the matrix draws only `region` (left, top, right, bottom [pixel]) of the full image.
     `near` and `far` are the distances of the clipping planes [m].
     """
-    (left, top), (right, bottom) = (
-        ((x - matrix[0, 2]) / matrix[0, 0] * near, (matrix[1, 2] - y) / matrix[1, 1] * near)
-        for x, y in (region[:2], region[2:])
-    )
+    # Sides of the region in the near plane [m], in OpenGL's camera frame.
+    left, right = ((x - matrix[0, 2]) / matrix[0, 0] * near for x in region[::2])
+    top, bottom = ((matrix[1, 2] - y) / matrix[1, 1] * near for y in region[1::2])
     projection = np.array(
         [
             [2 * near / (right - left), 0.0, (right + left) / (right - left), 0.0],

@@ -1,4 +1,8 @@
-"""Tests of a detected class by other evidence than the confidence: measured heights, and box size."""
+"""Evidence against a detected class: height of a touch, height in the depth image, size of the box.
+
+An object may stand on the table or on one object of any class. In the functions, `label` is the assumed class
+of the object, and `classes` contains the classes of the cell by label.
+"""
 
 from __future__ import annotations
 
@@ -17,166 +21,153 @@ from executive.perception.camera_model import project
 from executive.perception.depth_image import measure_top_height
 
 MAX_TOUCH_HEIGHT_ERROR = 0.003
-"""Maximum difference between the height of a touch and the expected height of a class [m]; 52 touches of
-the mission `sort_overhead` had errors of at most 0.4 mm."""
+"""Maximum difference between the height of a touch and the height of a class [m]; 52 touches of the mission
+`sort_overhead` had errors of at most 0.4 mm."""
 OTHER_CLASS_TOLERANCE = 0.0025
-"""Maximum height difference at which a touch that is too low for its class matches another class [m]."""
+"""Maximum difference between the height of a touch and the height of a class that was not assumed [m]."""
 TOP_TOLERANCE = 0.012
 """Maximum difference between the height of a top in the depth image and an expected height [m].
 
 In 480 scenes of the cell `depth` (60 crowded, 60 with unknown objects), the tops of 1894 correctly detected
-objects had a mean error of 2.1 mm and a maximum error of 10.1 mm: none contradicted its class. 20 of 26 boxes
-of unknown objects contradicted their label.
+objects had a mean error of 2.1 mm and a maximum error of 10.1 mm. The tops of 20 of 26 unknown objects
+contradicted the detected class.
 """
 REFERENCE_DISTANCE = 1.2
 """Maximum distance from the camera at which `TOP_TOLERANCE` applies [m].
 
-At larger distances, the tolerance grows with the squared distance, like the noise of a stereo camera: at
-1.8 m, the tolerance is 27 mm, and 160 tops had errors of at most 18.3 mm.
+At larger distances, the tolerance grows with the squared distance, like the noise of a stereo camera. The
+tolerance at 1.8 m is 27 mm; 160 tops had errors of at most 18.3 mm there.
 """
 SIZE_TOLERANCE = 0.15
 """Maximum relative difference between the size of a box and the sizes that its class allows."""
-SIZE_MARGIN = 2.0
-"""Absolute tolerance that is added to `SIZE_TOLERANCE` [pixel]."""
+SIZE_TOLERANCE_PX = 2.0
+"""Maximum additional difference between the sizes, for small boxes [pixel]."""
 MIN_BORDER_DISTANCE = 2.0
-"""Boxes nearer to the border of the searched region may be truncated [pixel]."""
+"""Minimum distance of a completely visible box from the border of the searched region [pixel]."""
 
 
 def describe_unknown_labels(counts: Mapping[str, int]) -> str:
-    """Return the counts of boxes by unknown label as a text: `unknown: rubber-duck ×2`; "" if empty."""
-    items = ", ".join(f"{label} ×{count}" for label, count in counts.items())  # noqa: RUF001
-    return f"unknown: {items}" if items else ""
+    """Return a text with the number of boxes of each unknown label: `unknown: rubber-duck ×2`; "" if none."""
+    labels = ", ".join(f"{label} ×{count}" for label, count in counts.items())  # noqa: RUF001
+    return f"unknown: {labels}" if labels else ""
 
 
 def describe_touch_contradiction(label: str, height: float, classes: Mapping[str, ObjectClass]) -> str:
-    """Return a sentence if the height of a touch contradicts a class, otherwise "".
-
-    The object may stand on the table or on one object of any class.
-
-    Args:
-        label: Assumed class of the object.
-        height: Height of the touch above the table [m].
-        classes: Classes of the cell by label.
-    """
+    """Return a sentence on the contradiction between a touch at `height` [m] and a class; "" without."""
     if abs(_compute_height_error(label, height, classes)) <= MAX_TOUCH_HEIGHT_ERROR:
         return ""
-    measured = f"it was touched {height * 1000:.0f} mm above the table"
-    return f"{measured}, and a {label} is {classes[label].height * 1000:.0f} mm high"
+    return (
+        f"it was touched {height * 1000:.0f} mm above the table, and a {label} is "
+        f"{classes[label].height * 1000:.0f} mm high"
+    )
 
 
 def find_classes_distinct_by_touch(config: CellConfig) -> frozenset[str]:
     """Return the classes whose heights differ from all others by more than `MAX_TOUCH_HEIGHT_ERROR`."""
-    heights = {label: kind.height for label, kind in config.objects.items()}
+    heights = {label: section.height for label, section in config.objects.items()}
     return frozenset(
         label
         for label, height in heights.items()
-        if all(
-            abs(height - other) > MAX_TOUCH_HEIGHT_ERROR for name, other in heights.items() if name != label
-        )
+        if sum(abs(height - h) <= MAX_TOUCH_HEIGHT_ERROR for h in heights.values()) == 1
     )
 
 
 def may_miss_top(label: str, height: float, classes: Mapping[str, ObjectClass]) -> bool:
-    """Return True if a touch is too low for a class and at the height of no other class.
+    """Return True if a touch may have hit the assumed object below its top.
 
-    The touch may have missed the top of the object.
-
-    Args:
-        label: Assumed class of the object.
-        height: Height of the touch above the table [m].
-        classes: Classes of the cell by label.
+    The touch at `height` [m] is then too low for the assumed class, and no class has this height.
     """
-    errors = {other: _compute_height_error(other, height, classes) for other in classes}
+    errors = {name: _compute_height_error(name, height, classes) for name in classes}
     return errors[label] < 0 and all(abs(error) > OTHER_CLASS_TOLERANCE for error in errors.values())
 
 
 def _compute_height_error(label: str, height: float, classes: Mapping[str, ObjectClass]) -> float:
-    """Return the signed difference [m] between a height and the nearest possible top of a class."""
-    return min((height - top for top in _list_tops(label, classes)), key=abs)
+    """Return the signed distance [m] from the nearest possible top of a class up to a height."""
+    return min((height - top for top in _list_top_heights(label, classes)), key=abs)
 
 
 def describe_top_contradiction(
     detection: Detection, position: Array, frame: Frame, area: Box, classes: Mapping[str, ObjectClass]
 ) -> str:
-    """Return a sentence if the height of a top in the depth image contradicts a class, otherwise "".
+    """Return a sentence on the contradiction between the depth image and the detected class; "" without.
 
-    The object may lie on the table or on one object of any class. In a stack, the box of the lower object
-    shows the top of the upper object; the sum of both heights is valid for both classes.
+    "" also for a truncated or occluded box, or too few depth values. In a stack of two objects, both boxes
+    show the upper object; the height of the stack is a possible height for both classes.
 
     Args:
-        detection: The box and its class.
+        detection: Box and detected class.
         position: Centre of the object `(3,)` [m].
-        frame: The frame. Without enough depth values in the box, the result is "".
-        area: Searched region of the image [pixel]. For a truncated or occluded box, the result is "".
+        frame: The searched frame.
+        area: Searched region of the image [pixel].
         classes: Classes of the cell by label.
     """
-    if not _is_whole(detection, frame, area):
+    if not _is_completely_visible(detection, frame, area):
         return ""
     try:
         top = measure_top_height(detection, frame)
     except NoDepth:
         return ""
-    expected = _list_tops(detection.label, classes)
+    top_heights = _list_top_heights(detection.label, classes)
     tolerance = TOP_TOLERANCE * max(1.0, (frame.compute_depth(position) / REFERENCE_DISTANCE) ** 2)
-    if min(abs(top - height) for height in expected) <= tolerance:
+    if min(abs(top - height) for height in top_heights) <= tolerance:
         return ""
-    *lower, highest = [f"{height * 1000:.0f}" for height in expected]
-    measured = f"its top is {top * 1000:.0f} mm above the table"
-    return f"{measured}, and that of a {detection.label} {', '.join(lower)} or {highest} mm"
+    *lower, highest = [f"{height * 1000:.0f}" for height in top_heights]
+    return (
+        f"its top is {top * 1000:.0f} mm above the table, and the top of a {detection.label} is at "
+        f"{', '.join(lower)} or {highest} mm"
+    )
 
 
-def _list_tops(label: str, classes: Mapping[str, ObjectClass]) -> list[float]:
-    """Return all possible heights [m] above the table of the top of an object of a class, ascending.
-
-    The object may lie on the table or on one object of any class.
-    """
-    supports = {0.0, *(other.height for other in classes.values())}
-    return sorted(classes[label].height + support for support in supports)
+def _list_top_heights(label: str, classes: Mapping[str, ObjectClass]) -> list[float]:
+    """Return all possible heights above the table [m] of the top of an object of a class, ascending."""
+    support_heights = {0.0, *(object_class.height for object_class in classes.values())}
+    return sorted(classes[label].height + support_height for support_height in support_heights)
 
 
 def describe_size_contradiction(
     detection: Detection, position: Array, frame: Frame, area: Box, object_class: ObjectClass
 ) -> str:
-    """Return a sentence if the size of a box contradicts a class, otherwise "".
+    """Return a sentence on the contradiction between the size of a box and its class; "" without.
 
-    A cylinder with the radius and height of the class encloses the object. The longer side of the box is at
-    most the longer side of the image of the cylinder, and at least the side of the square inscribed in the
-    base of the cylinder.
+    "" also for a truncated or occluded box. A cylinder with radius and height of the class encloses the
+    object. The longer side of the box is at most the longer side of the image of the cylinder, and at least
+    the side of the square that is inscribed in the base of the cylinder.
 
     Args:
-        detection: The box and its class.
+        detection: Box and detected class.
         position: Centre of the object `(3,)` [m].
-        frame: The frame.
-        area: Searched region of the image [pixel]. For a truncated or occluded box, the result is "".
-        object_class: Class of the object.
+        frame: The searched frame.
+        area: Searched region of the image [pixel].
+        object_class: The detected class.
     """
-    if not _is_whole(detection, frame, area):
+    if not _is_completely_visible(detection, frame, area):
         return ""
     left, top, right, bottom = detection.box
     sides = _project_cylinder(position, frame, object_class)
     scale = float(frame.matrix[0, 0]) / frame.compute_depth(position)
-    min_length = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_MARGIN
-    max_length = max(sides) * (1 + SIZE_TOLERANCE) + SIZE_MARGIN
+    min_length = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_TOLERANCE_PX
+    max_length = max(sides) * (1 + SIZE_TOLERANCE) + SIZE_TOLERANCE_PX
     length = max(right - left, bottom - top)
     if min_length <= length <= max_length:
         return ""
     return (
-        f"its box is {length / scale * 1000:.0f} mm long, and that of a {detection.label} is "
+        f"its box is {length / scale * 1000:.0f} mm long, and the box of a {detection.label} is "
         f"{min_length / scale * 1000:.0f} to {max_length / scale * 1000:.0f} mm long"
     )
 
 
-def _is_whole(detection: Detection, frame: Frame, area: Box) -> bool:
-    """Return True if a box is neither truncated by the searched region nor occluded by the arm."""
+def _is_completely_visible(detection: Detection, frame: Frame, area: Box) -> bool:
+    """Return True if a box is inside the searched region and the arm does not occlude it."""
     left, top, right, bottom = detection.box
     border_distance = min(left - area[0], top - area[1], area[2] - right, area[3] - bottom)
     return border_distance >= MIN_BORDER_DISTANCE and frame.compute_visible_fraction(detection.box) >= 1.0
 
 
 def _project_cylinder(position: Array, frame: Frame, object_class: ObjectClass) -> tuple[float, float]:
-    """Return width and height [pixel] of the image of a cylinder with the size of a class."""
+    """Return width and height [pixel] of the image of the cylinder that encloses an object."""
     angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
     x, y = object_class.radius * np.cos(angles), object_class.radius * np.sin(angles)
-    circles = [np.stack((x, y, np.full(16, level * object_class.height)), axis=1) for level in (-0.5, 0.5)]
+    half = object_class.height / 2
+    circles = [np.stack((x, y, np.full(16, z)), axis=1) for z in (-half, half)]
     width, height = np.ptp(project(frame.matrix, frame.X_WC, position + np.concatenate(circles)), axis=0)
     return float(width), float(height)

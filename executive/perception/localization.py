@@ -21,17 +21,18 @@ HeightMethod = Callable[[Detection, Frame, ObjectClass], float]
 """Function that returns the height of the centre of a detected object [m], or raises NoDepth."""
 
 RayTest = Callable[[Array, Array], Array | None]
-"""Function of origin `(3,)` [m] and direction `(3,)` that returns the first hit `(3,)` [m], or None."""
+"""Function of origin `(3,)` [m] and direction `(3,)` of a ray; returns the first hit `(3,)` [m], or None."""
 
 
 @dataclass(frozen=True, eq=False)
 class CellLocalizer:
     """Localizes detections and checks their classes; implements `executive.cell.protocols.Localizer`.
 
-    The centre of an object is the point at the height from `find_height` on the ray through the box centre.
+    The centre of an object is the intersection of the ray through the centre of the box with a horizontal
+    plane, whose height `find_height` determines.
 
     Attributes:
-        find_height: Method that finds the height of the centre of an object.
+        find_height: Method that determines the height of the centre of an object.
         classes: Classes of the cell by label.
         bins: Bins of the cell.
     """
@@ -41,10 +42,10 @@ class CellLocalizer:
     bins: Collection[Bin] = ()
 
     def locate(self, detection: Detection, frame: Frame) -> Array:
-        """Return the centre of the detected object `(3,)` [m], from the camera pose of the frame.
+        """Return the centre of the detected object `(3,)` [m] in the world.
 
         Raises:
-            NoDepth: The height is unknown, or the ray does not reach it in front of the camera.
+            NoDepth: The height is unknown, or the ray does not intersect the plane in front of the camera.
         """
         height = self.find_height(detection, frame, self.classes[detection.label])
         try:
@@ -57,9 +58,9 @@ class CellLocalizer:
             ) from None
 
     def localize(self, detections: Detections) -> list[Observation]:
-        """Return an observation for each doubtful and each found detection, in this order.
+        """Return the observations of all doubtful detections, then of all found detections.
 
-        If any object was found, doubtful detections that cannot be localized are omitted.
+        Doubtful detections that cannot be localized are omitted, unless there is no found detection.
 
         Raises:
             NoDepth: A detection cannot be localized.
@@ -77,6 +78,7 @@ class CellLocalizer:
     def _observe(
         self, detections: Detections, detection: Detection, *, is_doubtful: bool = False
     ) -> Observation:
+        """Return the observation of one detection: position, standard deviation and contradiction."""
         frame = detections.frame
         position = self.locate(detection, frame)
         std = detections.error_rates.jitter * frame.compute_depth(position) / float(frame.matrix[0, 0])
@@ -84,12 +86,12 @@ class CellLocalizer:
         return Observation(detection, position, std, not (is_doubtful or contradiction), contradiction)
 
     def _describe_contradiction(self, detections: Detections, detection: Detection, position: Array) -> str:
-        """Return a sentence if box or height contradicts the class, else ""; bins are not checked."""
+        """Return a sentence on the evidence against the detected class; "" without evidence, and in a bin."""
         if any(bin.contains(position, BIN_THICKNESS) for bin in self.bins):
             return ""
-        frame, area, kind = detections.frame, detections.area, self.classes[detection.label]
+        frame, area, object_class = detections.frame, detections.area, self.classes[detection.label]
         return describe_size_contradiction(
-            detection, position, frame, area, kind
+            detection, position, frame, area, object_class
         ) or describe_top_contradiction(detection, position, frame, area, self.classes)
 
 
@@ -102,9 +104,9 @@ def build_localizer(
     """Return the localizer of a cell.
 
     Args:
-        method: Source of the height of an object: its class, the depth image, or a ray test.
+        method: Source of the height of an object: class (`plane`), depth image (`depth`), ray test (`ray`).
         classes: Classes of the cell by label.
-        bins: Bins of the cell; the class of an object in a bin is not checked.
+        bins: Bins of the cell; classes of objects in bins are not checked.
         cast_ray: Ray test of the simulator, for the method `ray`.
     """
     if method == "ray":
@@ -113,25 +115,25 @@ def build_localizer(
     return CellLocalizer(_find_height_by_depth if method == "depth" else _find_height_on_table, classes, bins)
 
 
-def _find_height_on_table(detection: Detection, frame: Frame, kind: ObjectClass) -> float:
-    """Return half the height of the class [m], as if the object stood on the table."""
+def _find_height_on_table(detection: Detection, frame: Frame, object_class: ObjectClass) -> float:
+    """Return the height of the centre [m] of an object of a class that stands on the table."""
     del detection, frame
-    return kind.height / 2
+    return object_class.height / 2
 
 
-def _find_height_by_depth(detection: Detection, frame: Frame, kind: ObjectClass) -> float:
-    """Return the height of the centre [m]: half the height of the class below the top in the depth image.
-
-    The object may lie on another object.
+def _find_height_by_depth(detection: Detection, frame: Frame, object_class: ObjectClass) -> float:
+    """Return the height of the centre [m], from the height of the top in the depth image.
 
     Raises:
         NoDepth: The frame has no depth image, or too few depth values in the box.
     """
-    return measure_top_height(detection, frame) - kind.height / 2
+    return measure_top_height(detection, frame) - object_class.height / 2
 
 
-def _find_height_by_ray(cast_ray: RayTest, detection: Detection, frame: Frame, kind: ObjectClass) -> float:
-    """Return the height of the centre [m]: half the height of the class below the hit of a simulated ray.
+def _find_height_by_ray(
+    cast_ray: RayTest, detection: Detection, frame: Frame, object_class: ObjectClass
+) -> float:
+    """Return the height of the centre [m], from the hit of a simulated ray on the top of the object.
 
     The ray test uses the current scene, not the scene at capture; a hardware cell has no ray test.
 
@@ -142,4 +144,4 @@ def _find_height_by_ray(cast_ray: RayTest, detection: Detection, frame: Frame, k
     if hit is None:
         column, row = detection.centre
         raise NoDepth(f"the ray through pixel ({column:.0f}, {row:.0f}) of frame {frame.id} hits nothing")
-    return float(hit[2]) - kind.height / 2
+    return float(hit[2]) - object_class.height / 2

@@ -22,7 +22,7 @@ class MountedCamera:
         config: Section of the camera in the cell file.
         get_flange_pose: Function that returns the pose `X_WF` of the flange, the mount of a wrist camera.
         clock: Clock of the run, for the capture times of frames.
-        get_change_count: Function that returns the number of changes of the table (`Ledger`).
+        get_change_count: Function that returns how often the robot has changed the objects on the table.
 
     Attributes:
         name: Name of the camera in the cell file.
@@ -45,7 +45,7 @@ class MountedCamera:
 
     @property
     def scan_poses(self) -> Sequence[str]:
-        """Names of the arm poses from which the camera sees the table, best first."""
+        """Names of the arm poses from which the camera sees the table; the first has the best view."""
         return self.config.scan_poses
 
     def next_pose(self) -> str:
@@ -54,7 +54,7 @@ class MountedCamera:
         return self.scan_poses[self._pose_count % len(self.scan_poses)]
 
     def get_view_box(self, view: str) -> Box:
-        """Return the region of the image [pixel] of a view: `table` or `full`."""
+        """Return the region of the image [pixel] that belongs to a view: `table` or `full`."""
         return self.config.get_view_box(view)
 
     def capture(self) -> Frame:
@@ -83,8 +83,9 @@ class MountedCamera:
         raise NotImplementedError
 
     def set_counts(self, frame_count: int, pose_count: int) -> None:
-        """Set the numbers of captured frames and of calls of `next_pose`, for the resumption of a run."""
+        """Set the counters of captured frames and of calls of `next_pose` when a run is resumed."""
         self._frame_count, self._pose_count = frame_count, pose_count
 
     def _compute_pose(self) -> Pose:
+        """Return the current pose `X_WC` of the camera."""
         return self._X_MC if self.config.mount == "fixed" else self._get_flange_pose() @ self._X_MC

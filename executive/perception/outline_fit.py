@@ -1,7 +1,9 @@
 """Estimation of a camera pose from the outlines of the bins in an image.
 
-The outlines of a bin are the silhouette of its outer box, and the outer edges of its rim. Edges of the
-image are searched along the normals of the projected outlines; robust least squares estimates the pose.
+The outlines of a bin are the silhouette of the outer box and the outer edges of the rim. The fit searches
+image edges along the normals of the projected outlines; robust least squares estimates the pose. A pose
+offset `(6,)` is the rotation vector [rad] and the translation [m] of a camera from its declared pose. The
+support of a pose is the fraction of the outlines (0 to 1) at which the image has an edge.
 """
 
 from __future__ import annotations
@@ -22,8 +24,8 @@ from executive.perception.camera_model import NEAR_PLANE
 MIN_SAMPLES = 60
 """Minimum number of visible samples for an estimate of the pose."""
 MIN_NORMAL_EIGENVALUE = 0.12
-"""Minimum of the smaller eigenvalue (0 to 0.5) of the mean outer product of the normals: they must point in
-different directions."""
+"""Minimum of the smaller eigenvalue (0 to 0.5) of the mean outer product of the normals; 0 if all normals are
+parallel, so that the image does not determine the pose."""
 SAMPLE_SPACING = 6.0
 """Distance between neighbouring samples of an outline [pixel]."""
 BORDER_WIDTH = 4.0
@@ -32,17 +34,20 @@ SMOOTHING_STD = 1.0
 """Standard deviation of the Gaussian filter that smooths the image before the search for edges [pixel]."""
 MIN_CONTRAST = 4.0
 """Minimum difference between neighbouring pixels of the smoothed image at an edge [grey level]."""
-FIT_EDGE_DISTANCES, SEARCH_EDGE_DISTANCES, SUPPORT_EDGE_DISTANCE = (8, 4, 3), (16, 8, 4, 3), 2
-"""Maximum distances between outline and edge [pixel]: in each iteration of a fit from the declared pose, in
-each iteration of a fit from a pose of the search grid, and for the support of a pose."""
+FIT_EDGE_DISTANCES = (8, 4, 3)
+"""Maximum distances between outline and edge in the iterations of a fit from the declared pose [pixel]."""
+SEARCH_EDGE_DISTANCES = (16, 8, 4, 3)
+"""Maximum distances between outline and edge in the iterations of a fit from the search grid [pixel]."""
+SUPPORT_EDGE_DISTANCE = 2
+"""Maximum distance between outline and edge for the support of a pose [pixel]."""
 EDGE_STD = 2.0
-"""Standard deviation of an edge position [pixel]; large, because errors of neighbouring samples correlate."""
+"""Standard deviation of an edge position [pixel]; large, because errors of neighbouring edges correlate."""
 MIN_OUTLIER_RESIDUAL = 0.5
 """Minimum residual of an edge that is treated as an outlier [pixel]."""
 PRIOR_STD = np.full(6, 0.1)
 """Prior standard deviations of the rotation vector [rad] and the translation [m]."""
 REWEIGHTING_ITERATIONS = 8
-"""Number of iterations of the iteratively reweighted least squares."""
+"""Number of iterations of iteratively reweighted least squares."""
 TILTS_DEG, ROLLS_DEG = np.arange(-10.0, 11.0), np.arange(-8.0, 9.0, 4.0)
 """Rotations of the search grid about the axes x and y of the camera, and about the optical axis [degree]."""
 AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
@@ -50,34 +55,35 @@ AXIAL_SHIFTS = np.linspace(-0.21, 0.21, 7)
 MAX_REFINED_POSES = 6
 """Maximum number of poses of the search grid that are refined."""
 IMAGE_REDUCTION, SAMPLE_REDUCTION = 4, 4
-"""Factors by which the image size and the number of samples are reduced for the search grid."""
+"""Factors that reduce the size of the image and the number of samples for the search grid."""
 
 
 class EdgeSamples(NamedTuple):
     """Visible samples of the outlines.
 
     Attributes:
-        points: Positions in the world frame `(N, 3)` [m].
-        in_camera: Positions in the camera frame `(N, 3)` [m].
-        pixels, normals: Image positions [pixel] and unit normals of the outlines in the image, each `(N, 2)`.
-        bins: Index of the bin of each sample `(N,)`.
+        world_points: Positions in the world frame `(N, 3)` [m].
+        camera_points: Positions in the camera frame `(N, 3)` [m].
+        pixels: Positions in the image `(N, 2)` [pixel].
+        normals: Unit normals of the outlines in the image `(N, 2)`.
+        bin_indices: Index of the bin of each sample `(N,)`.
     """
 
-    points: Array
-    in_camera: Array
+    world_points: Array
+    camera_points: Array
     pixels: Array
     normals: Array
-    bins: NDArray[np.intp]
+    bin_indices: NDArray[np.intp]
 
 
 class PoseFit(NamedTuple):
     """A camera pose fitted to the edges of an image.
 
     Attributes:
-        offset: Rotation vector [rad] and translation [m] of the camera from its declared pose `(6,)`.
-        covariance: Covariance of `offset` `(6, 6)`.
-        samples: Samples of the outlines at this pose.
-        support: Fraction of the samples (0 to 1) with an edge within `SUPPORT_EDGE_DISTANCE`.
+        offset: Pose offset `(6,)`.
+        covariance: Covariance of the pose offset `(6, 6)`.
+        samples: Visible samples of the outlines at the fitted pose.
+        support: Support of the fitted pose.
     """
 
     offset: Array
@@ -93,28 +99,31 @@ class OutlineFitter:
         self._frame, self._bins = frame, bins
         self._image = cv2.GaussianBlur(frame.image, (0, 0), SMOOTHING_STD)
 
-    def refine(self, offset: Array, ranges: Sequence[int] = FIT_EDGE_DISTANCES) -> PoseFit | None:
-        """Return the fit that starts at an offset `(6,)`; None if too few samples or edges are visible."""
+    def refine(self, offset: Array, max_distances: Sequence[int] = FIT_EDGE_DISTANCES) -> PoseFit | None:
+        """Return the fit that starts at a pose offset; None if too few samples or edges are visible.
+
+        `max_distances` are the maximum distances between outline and edge in the iterations [pixel].
+        """
         covariance = np.diag(PRIOR_STD**2)
-        for max_distance in ranges:
+        for max_distance in max_distances:
             samples = self._find_visible_samples(offset)
-            distances, found = self._find_edges(samples, max_distance)
-            if not _is_sufficient(samples) or found.sum() < MIN_SAMPLES / 2:
+            distances, has_edge = self._find_edges(samples, max_distance)
+            if not _is_sufficient(samples) or has_edge.sum() < MIN_SAMPLES / 2:
                 return None
-            jacobian = _compute_jacobian(samples, self._frame.matrix)[found]
-            offset, covariance = _solve_robustly(jacobian, distances[found], offset, max_distance / 2)
+            jacobian = _compute_jacobian(samples, self._frame.matrix)[has_edge]
+            offset, covariance = _solve_robustly(jacobian, distances[has_edge], offset, max_distance / 2)
         samples = self._find_visible_samples(offset)
         if not _is_sufficient(samples):
             return None
         return PoseFit(offset, covariance, samples, self.compute_support(offset))
 
     def compute_support(self, offset: Array) -> float:
-        """Return the fraction of the visible samples (0 to 1) with an edge within `SUPPORT_EDGE_DISTANCE`."""
-        _, found = self._find_edges(self._find_visible_samples(offset), SUPPORT_EDGE_DISTANCE)
-        return float(found.mean()) if len(found) else 0.0
+        """Return the support of the pose with the given offset."""
+        _, has_edge = self._find_edges(self._find_visible_samples(offset), SUPPORT_EDGE_DISTANCE)
+        return float(has_edge.mean()) if len(has_edge) else 0.0
 
     def search(self) -> Iterator[PoseFit]:
-        """Yield fits that start at the poses of the search grid with the strongest image edges."""
+        """Yield fits that start at the poses of the search grid with the strongest edges at the outlines."""
         small_image = cv2.resize(
             self._image, None, fx=1 / IMAGE_REDUCTION, fy=1 / IMAGE_REDUCTION, interpolation=cv2.INTER_AREA
         )
@@ -122,11 +131,8 @@ class OutlineFitter:
         gradients = np.stack(
             [cv2.Sobel(small_image, cv2.CV_32F, 1, 0), cv2.Sobel(small_image, cv2.CV_32F, 0, 1)], axis=-1
         )
-        matrix, X_CW, last = (
-            self._frame.matrix,
-            self._frame.X_WC.inverse(),
-            np.array(small_image.shape[1::-1]) - 1,
-        )
+        matrix, X_CW = self._frame.matrix, self._frame.X_WC.inverse()
+        last_pixel = np.array(small_image.shape[1::-1]) - 1
         if (
             not _is_sufficient(self._find_visible_samples(np.zeros(6)))
             or np.abs(gradients).max() < MIN_CONTRAST
@@ -145,123 +151,128 @@ class OutlineFitter:
             pixels = _project((points - shift) @ rotations, matrix)
             normals = _compute_normals(_project((next_points - shift) @ rotations, matrix) - pixels)
             small_pixels = np.floor(pixels / IMAGE_REDUCTION).astype(int)
-            inside = ((small_pixels >= 0) & (small_pixels <= last)).all(axis=-1)
-            columns, rows = np.moveaxis(small_pixels.clip(0, last), -1, 0)
-            strength = np.abs((gradients[rows, columns] * normals[:, :, None]).sum(axis=-1)).sum(axis=-1)
+            is_inside = ((small_pixels >= 0) & (small_pixels <= last_pixel)).all(axis=-1)
+            columns, rows = np.moveaxis(small_pixels.clip(0, last_pixel), -1, 0)
+            contrast = np.abs((gradients[rows, columns] * normals[:, :, None]).sum(axis=-1)).sum(axis=-1)
             # The square root gives many weak edges a higher score than a few strong edges.
-            score = (np.sqrt(strength) * inside).sum(axis=1) / np.maximum(inside.sum(axis=1), len(points) / 2)
-            best = int(score.argmax())
-            scored_offsets.append((float(score[best]), np.concatenate([rotation_vectors[best], shift])))
+            inside_count = np.maximum(is_inside.sum(axis=1), len(points) / 2)
+            scores = (np.sqrt(contrast) * is_inside).sum(axis=1) / inside_count
+            best = int(scores.argmax())
+            scored_offsets.append((float(scores[best]), np.concatenate([rotation_vectors[best], shift])))
         for _, offset in sorted(scored_offsets, key=lambda pair: -pair[0])[:MAX_REFINED_POSES]:
             fit = self.refine(offset, SEARCH_EDGE_DISTANCES)
             if fit is not None:
                 yield fit
 
     def _find_visible_samples(self, offset: Array) -> EdgeSamples:
-        """Return the samples of the outlines that a camera at an offset `(6,)` shows."""
+        """Return the samples of the outlines that are visible from the pose with the given offset."""
         rotation = np.asarray(cv2.Rodrigues(offset[:3])[0], dtype=float)
-        X_WC, visible = self._frame.X_WC @ Pose(rotation, offset[3:]), self._frame.visible
-        points, next_points, bins = _sample_outlines(self._bins, X_WC, self._frame.matrix)
-        in_camera = X_WC.inverse().apply(points)
-        pixels = _project(in_camera, self._frame.matrix)
+        X_WC, is_unoccluded = self._frame.X_WC @ Pose(rotation, offset[3:]), self._frame.visible
+        world_points, next_points, bin_indices = _sample_outlines(self._bins, X_WC, self._frame.matrix)
+        camera_points = X_WC.inverse().apply(world_points)
+        pixels = _project(camera_points, self._frame.matrix)
         normals = _compute_normals(_project(X_WC.inverse().apply(next_points), self._frame.matrix) - pixels)
-        size = np.array(visible.shape[::-1])
-        is_shown = ((pixels >= BORDER_WIDTH) & (pixels < size - BORDER_WIDTH)).all(axis=1)
+        size = np.array(is_unoccluded.shape[::-1])
+        is_visible = ((pixels >= BORDER_WIDTH) & (pixels < size - BORDER_WIDTH)).all(axis=1)
         columns, rows = pixels.clip(0, size - 1).astype(int).T
-        is_shown &= visible[rows, columns]
-        return EdgeSamples(*(values[is_shown] for values in (points, in_camera, pixels, normals, bins)))
+        is_visible &= is_unoccluded[rows, columns]
+        samples = EdgeSamples(world_points, camera_points, pixels, normals, bin_indices)
+        return EdgeSamples(*(values[is_visible] for values in samples))
 
     def _find_edges(self, samples: EdgeSamples, max_distance: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the distance `(N,)` [pixel] along each normal to the strongest edge, and a mask of hits."""
-        n = samples.normals[:, None, None]
-        across = np.arange(-max_distance - 1.5, max_distance + 2)[:, None, None]
-        along = np.array([-2.0, 0.0, 2.0])[:, None] * n[..., ::-1] * (-1, 1)
-        # Pixel centres have integer coordinates in OpenCV.
-        positions = (samples.pixels[:, None, None] + across * n + along - 0.5).astype(np.float32)
-        count, steps, width, _ = positions.shape
-        positions = positions.reshape(count, steps * width, 2)
-        if not count:
+        """Return the distances `(N,)` [pixel] along the normals to the edges, and a mask of found edges."""
+        if not len(samples.pixels):
             return np.zeros(0), np.zeros(0, dtype=bool)
-        colours = cv2.remap(
-            self._image,
-            positions[..., 0],
-            positions[..., 1],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
-        profiles = colours.reshape(count, steps, width, 3).astype(float).mean(axis=2)
+        normals = samples.normals[:, None, None]
+        normal_steps = np.arange(-max_distance - 1.5, max_distance + 2)[:, None, None] * normals
+        tangent_steps = np.array([-2.0, 0.0, 2.0])[:, None] * normals[..., ::-1] * (-1, 1)
+        # Pixel centres have integer coordinates in OpenCV.
+        positions = (samples.pixels[:, None, None] + normal_steps + tangent_steps - 0.5).astype(np.float32)
+        count, length, width, _ = positions.shape
+        x, y = positions.reshape(count, length * width, 2).transpose(2, 0, 1)
+        colours = cv2.remap(self._image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        profiles = colours.reshape(count, length, width, 3).astype(float).mean(axis=2)
         contrast = np.linalg.norm(np.diff(profiles, axis=1), axis=2)
-        before, middle, after = contrast[:, :-2], contrast[:, 1:-1], contrast[:, 2:]
-        is_edge = (middle >= before) & (middle > after) & (middle > MIN_CONTRAST)
-        each, best = np.arange(count), np.where(is_edge, middle, 0.0).argmax(axis=1)
-        # The parabola through the three values around the maximum gives the edge position below one pixel.
-        curvature = np.minimum(before - 2 * middle + after, -1e-6)[each, best]
-        vertex = 0.5 * (before - after)[each, best] / curvature
-        return best - max_distance + vertex.clip(-0.5, 0.5), is_edge[each, best]
+        previous, current, following = contrast[:, :-2], contrast[:, 1:-1], contrast[:, 2:]
+        is_edge = (current >= previous) & (current > following) & (current > MIN_CONTRAST)
+        strongest = np.where(is_edge, current, 0.0).argmax(axis=1)
+        edge_index = np.arange(count), strongest
+        # The vertex of the parabola through three contrasts is the edge position with subpixel accuracy.
+        curvature = np.minimum(previous - 2 * current + following, -1e-6)[edge_index]
+        vertex = 0.5 * (previous - following)[edge_index] / curvature
+        return strongest - max_distance + vertex.clip(-0.5, 0.5), is_edge[edge_index]
 
 
 def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Return points `(N, 3)` [m] on the outlines, the points slightly further along, and the bin indices."""
+    """Return points `(N, 3)` [m] on the outlines, neighbouring points for the tangents, and bin indices."""
     points, next_points, bin_indices = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, dtype=np.intp)]
     for index, bin in enumerate(bins):
-        half = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
-        signs = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)])
-        box = np.array([[*sign, side] for side in (1, -1) for sign in signs])
-        corners = bin.position + (0.0, 0.0, half[2]) + half * box
-        in_camera = X_WC.inverse().apply(corners)
-        if np.any(in_camera[:, 2] < NEAR_PLANE):
+        half_size = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
+        # The first four corners are the rim.
+        signs = [(*xy, z) for z in (1, -1) for xy in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+        corners = bin.position + (0.0, 0.0, half_size[2]) + half_size * signs
+        corners_C = X_WC.inverse().apply(corners)
+        if np.any(corners_C[:, 2] < NEAR_PLANE):
             continue
-        pixels = _project(in_camera, matrix)
+        pixels = _project(corners_C, matrix)
         silhouette = cv2.convexHull(pixels.astype(np.float32), returnPoints=False)[:, 0].tolist()
-        loops = (silhouette, range(4))
-        edges = {frozenset(pair) for loop in loops for pair in zip(loop, [*loop[1:], loop[0]], strict=True)}
+        polygons: tuple[list[int], ...] = (silhouette, [0, 1, 2, 3])
+        edges = {
+            frozenset(edge)
+            for corner in polygons
+            for edge in zip(corner, [*corner[1:], corner[0]], strict=True)
+        }
         for start, end in sorted(sorted(edge) for edge in edges):
             count = int(np.linalg.norm(pixels[end] - pixels[start]) / SAMPLE_SPACING)
-            fraction = ((np.arange(count) + 0.5) / max(count, 1))[:, None]
-            points.append(corners[start] + fraction * (corners[end] - corners[start]))
-            next_points.append(corners[start] + (fraction + 0.01) * (corners[end] - corners[start]))
+            fractions = ((np.arange(count) + 0.5) / max(count, 1))[:, None]
+            points.append(corners[start] + fractions * (corners[end] - corners[start]))
+            next_points.append(corners[start] + (fractions + 0.01) * (corners[end] - corners[start]))
             bin_indices.append(np.full(count, index, dtype=np.intp))
     return np.concatenate(points), np.concatenate(next_points), np.concatenate(bin_indices)
 
 
-def _project(in_camera: Array, matrix: Array) -> Array:
+def _project(camera_points: Array, matrix: Array) -> Array:
     """Return the image positions `(..., 2)` [pixel] of points `(..., 3)` [m] in the camera frame."""
-    p = in_camera @ matrix.T
+    p = camera_points @ matrix.T
     return np.asarray(p[..., :2] / np.maximum(p[..., 2:], NEAR_PLANE))
 
 
 def _compute_normals(directions: Array) -> Array:
     """Return unit vectors `(..., 2)` perpendicular to directions in the image."""
-    rotated = directions[..., ::-1] * (-1.0, 1.0)
-    return np.asarray(rotated / np.maximum(np.linalg.norm(rotated, axis=-1, keepdims=True), 1e-9))
+    normals = directions[..., ::-1] * (-1.0, 1.0)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-9))
 
 
 def _is_sufficient(samples: EdgeSamples) -> bool:
-    """Return True if there are enough samples, and their normals have different directions."""
-    count = len(samples.points)
+    """Return True if there are enough samples with normals in different directions."""
+    count = len(samples.pixels)
     if count < MIN_SAMPLES:
         return False
     return bool(np.linalg.eigvalsh(samples.normals.T @ samples.normals / count)[0] >= MIN_NORMAL_EIGENVALUE)
 
 
 def _compute_jacobian(samples: EdgeSamples, matrix: Array) -> Array:
-    """Return the Jacobian `(N, 6)` [pixel/rad, pixel/m] of positions along the normals by the offset."""
-    x, y, z = samples.in_camera.T
+    """Return the derivatives `(N, 6)` of positions along the normals with respect to the pose offset."""
+    x, y, z = samples.camera_points.T
     u, v = (samples.normals * matrix.diagonal()[:2]).T
+    # Derivative with respect to the point: for a normal n and a focal length f, of n·f·(x/z, y/z).
     gradient = np.column_stack([u / z, v / z, -(u * x + v * y) / z**2])
-    return np.column_stack([np.cross(gradient, samples.in_camera), -gradient])
+    # A camera that moves by (w, t) moves the point by -(w × p + t) in the camera frame.
+    return np.column_stack([np.cross(gradient, samples.camera_points), -gradient])
 
 
 def _solve_robustly(jacobian: Array, distances: Array, offset: Array, scale: float) -> tuple[Array, Array]:
-    """Return the offset `(6,)` that fits edges at `distances` `(N,)` [pixel], and its covariance `(6, 6)`.
+    """Return the pose offset that fits edges at `distances` `(N,)` [pixel], and its covariance `(6, 6)`.
 
-    Edges with residuals above `scale` [pixel], or above 1.5 times the median residual, get a low weight.
+    Maximum a posteriori estimate with Geman-McClure weights: edges with residuals above `scale` [pixel], or
+    above 1.5 times the median residual, get a low weight.
     """
-    change, covariance = np.zeros(6), np.zeros((6, 6))
+    correction, covariance = np.zeros(6), np.zeros((6, 6))
     for _ in range(REWEIGHTING_ITERATIONS):
-        residuals = distances - jacobian @ change
+        residuals = distances - jacobian @ correction
         scale = max(MIN_OUTLIER_RESIDUAL, min(scale, 1.5 * float(np.median(np.abs(residuals)))))
-        weighted = jacobian * ((1 + (residuals / scale) ** 2) ** -2)[:, None] / EDGE_STD**2
+        weights = (1 + (residuals / scale) ** 2) ** -2
+        weighted = jacobian * weights[:, None] / EDGE_STD**2
         covariance = np.asarray(np.linalg.inv(weighted.T @ jacobian + np.diag(PRIOR_STD**-2.0)), dtype=float)
-        change = covariance @ (weighted.T @ distances - offset / PRIOR_STD**2)
-    return offset + change, covariance
+        correction = covariance @ (weighted.T @ distances - offset / PRIOR_STD**2)
+    return offset + correction, covariance

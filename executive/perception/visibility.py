@@ -14,15 +14,17 @@ from executive.perception.camera_model import project
 
 TOOL_SPHERE_RADIUS = 0.02
 """Radius of the spheres that enclose the tool, including tube and fittings [m]."""
+SPHERES_PER_SEGMENT = 9
+"""Number of spheres that cover the segment between two points on the axis of a part of the arm."""
 
 ArmPart = tuple[Sequence[Array], float]
-"""Points `(3,)` [m] on the axis of a part of the arm, and the radius of spheres that enclose the part [m]."""
+"""Points `(3,)` [m] along a part of the arm, and the radius of the spheres that enclose the part [m]."""
 
 
 def compute_occlusion_mask(
     parts: Sequence[ArmPart], matrix: Array, X_WC: Pose, size: tuple[int, int]
 ) -> NDArray[np.bool_]:
-    """Return the mask `(H, W)` of the pixels that the arm may occlude: the images of spheres along its parts.
+    """Return the mask `(H, W)` of the pixels that the arm may occlude: the images of all its spheres.
 
     Args:
         parts: The links, the tool and the held object.
@@ -33,13 +35,14 @@ def compute_occlusion_mask(
     mask = np.zeros((size[1], size[0]), dtype=np.uint8)
     for points, radius in parts:
         for start, end in itertools.pairwise(points):
-            for fraction in np.linspace(0.0, 1.0, 9):
+            for fraction in np.linspace(0.0, 1.0, SPHERES_PER_SEGMENT):
                 x, y, z = X_WC.inverse().apply(start + fraction * (end - start))
-                # Spheres behind or around the camera are skipped: the sphere around the link on which a
-                # wrist camera is mounted would occlude the whole image.
+                # A sphere behind the camera is invisible. The link that carries a wrist camera has a sphere
+                # around the camera, which would occlude the whole image.
                 if z <= radius:
                     continue
                 column, row, _ = matrix @ np.array([x / z, y / z, 1.0])
+                # OpenCV cannot draw circles with very large coordinates.
                 if abs(column) > 4 * size[0] or abs(row) > 4 * size[1]:
                     continue
                 cv2.circle(mask, (round(column), round(row)), max(1, round(matrix[0, 0] * radius / z)), 1, -1)
@@ -49,9 +52,9 @@ def compute_occlusion_mask(
 def compute_hull_mask(
     corners: Array, matrix: Array, X_WC: Pose, size: tuple[int, int]
 ) -> NDArray[np.bool_] | None:
-    """Return the mask `(H, W)` of the pixels in the convex hull of the images of world points `(N, 3)` [m].
+    """Return the mask `(H, W)` of the pixels in the convex hull of world points `(N, 3)` [m].
 
-    None if the image of any point is outside the image.
+    Return None if the camera does not see all points.
     """
     if np.any(X_WC.inverse().apply(corners)[:, 2] <= 0):
         return None

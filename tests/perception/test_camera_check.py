@@ -72,7 +72,7 @@ def test_a_camera_in_its_place_is_believed_to_be_there(light: float) -> None:
     frame = draw(DECLARED, light=light)
     offset = estimate_offset(frame, BINS)
     assert offset is not None
-    assert offset.distance < MAX_OUTLINE_DISTANCE / 3 and offset.support > 0.8
+    assert offset.outline_distance < MAX_OUTLINE_DISTANCE / 3 and offset.support > 0.8
     assert describe_displacement(frame, BINS) == ""
 
 
@@ -82,7 +82,7 @@ def test_a_camera_in_its_place_is_believed_to_be_there(light: float) -> None:
 )
 def test_a_shift_is_measured(shift: tuple[float, float, float]) -> None:
     offset = estimate_offset(draw(moved(shift)), BINS)
-    assert offset is not None and offset.distance > MAX_OUTLINE_DISTANCE
+    assert offset is not None and offset.outline_distance > MAX_OUTLINE_DISTANCE
     assert offset.shift == pytest.approx(shift, abs=0.015)
     assert np.all(np.abs(offset.shift - shift) < 3 * offset.shift_std + 0.001)
     assert offset.rotation_deg < 1.0
@@ -91,7 +91,7 @@ def test_a_shift_is_measured(shift: tuple[float, float, float]) -> None:
 @pytest.mark.parametrize("turn_deg", [(2, 0, 0), (0, -6, 0), (0, 0, 2), (0, 0, -10), (5, 5, 3)])
 def test_a_rotation_is_measured(turn_deg: tuple[float, float, float]) -> None:
     offset = estimate_offset(draw(moved(turn_deg=turn_deg)), BINS)
-    assert offset is not None and offset.distance > MAX_OUTLINE_DISTANCE
+    assert offset is not None and offset.outline_distance > MAX_OUTLINE_DISTANCE
     assert offset.rotation_deg == pytest.approx(np.linalg.norm(turn_deg), abs=1.0)
 
 

@@ -77,7 +77,7 @@ def test_opengl_matrices_draw_a_point_where_it_is_projected(X_WC, point):
 
 
 def test_what_determines_no_ray_or_pose_is_refused():
-    with pytest.raises(ValueError, match=r"1\.200 m high has a ray that does not intersect the plane z = 2"):
+    with pytest.raises(ValueError, match=r"z = 1\.200 m does not intersect the plane z = 2"):
         intersect_plane(K, looking_down([0, 0, 1.2]), (320, 240), 2.0)
     with pytest.raises(ValueError, match="up must not be parallel to the axis"):
         compute_look_at_pose([0, 0, 1], [0, 0, 0], [0, 0, 1])
