@@ -65,8 +65,9 @@ def describe_displacement(frame: Frame, bins: Sequence[Bin]) -> str:
         f"camera {frame.camera} is not at its declared pose: the outlines of {', '.join(offset.bins)} "
         f"appear {offset.pixel_distance:.0f} pixels ({1e3 * offset.outline_distance:.0f} mm) away from their "
         f"expected positions, as if the camera had moved by ({x:+.0f}, {y:+.0f}, {z:+.0f}) mm (standard "
-        f"deviation {1e3 * offset.shift_std.max():.0f} mm) and turned by {offset.rotation_deg:.1f} degrees; limit "
-        f"{1e3 * MAX_OUTLINE_DISTANCE:.0f} mm; mount camera and bins as declared, or measure the pose again"
+        f"deviation {1e3 * offset.shift_std.max():.0f} mm) and turned by {offset.rotation_deg:.1f} degrees; "
+        f"limit {1e3 * MAX_OUTLINE_DISTANCE:.0f} mm; mount camera and bins as declared, or "
+        "measure the pose again"
     )
 
 
