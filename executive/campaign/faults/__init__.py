@@ -1,1 +1,1 @@
-"""Fault campaigns: everything that can go wrong in a mission, one thing at a time, and in pairs."""
+"""Fault campaigns: runs of a mission with all possible faults, singly and in pairs."""

@@ -1,4 +1,4 @@
-"""Fault campaign of a mission: one run for each single fault, or for each of some random pairs."""
+"""Fault campaign of a mission: one run for each single fault, or one run for each random pair of faults."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from executive.mission.source import Mark
 from executive.view.results.fault_results import Branch, FaultCampaignResults, Trial
 
 MAX_FAULTS_PER_RUN = 4
-"""Maximum number of faults in a run: the fault under test, and the faults that let it occur."""
+"""Maximum number of faults in a run: the fault under test, and the faults that activate its node."""
 
 FaultNumbers = tuple[int, ...]
 """Numbers of the faults of a run; the last fault is under test."""
@@ -39,7 +39,7 @@ class Campaign:
     Attributes:
         mission: The mission and its cell.
         nominal_run: Results of the run without a fault.
-        faults: All single faults; the number of a fault is its position in the list, from 1.
+        faults: All single faults; the number of a fault is its position in this list, from 1.
 
     Raises:
         ExecutiveError: The mission does not succeed without a fault.
@@ -76,46 +76,47 @@ class Campaign:
     def run_single_faults(self) -> FaultCampaignResults:
         """Execute a run for each single fault and return the results.
 
-        If a node runs only after other faults, the smallest set of such faults is injected, too. If a fault
-        of the cell does not cause the intended failure, a failure of the skill is injected instead.
+        If a node runs only after other faults, the smallest combination of faults that activates the node is
+        injected, too. If a fault of the cell does not let the node fail, its skill fails in another run.
         """
-        trials: dict[FaultNumbers, Trial] = {}
-        complete = True
-        while complete and (next_runs := self._list_next_runs(trials)):
-            done, complete = self._run_trials(next_runs, len(trials))
-            trials |= {trial.fault_numbers: trial for trial in done}
-        ordered = sorted(trials.values(), key=lambda trial: (trial.fault_numbers[-1], trial.fault_numbers))
-        return self._make_results(ordered, complete, pairs=False)
+        trials: list[Trial] = []
+        is_complete = True
+        while is_complete and (combinations := self._list_next_combinations(trials)):
+            ended_trials, is_complete = self._run_trials(combinations, len(trials))
+            trials += ended_trials
+        trials.sort(key=lambda trial: (trial.fault_numbers[-1], trial.fault_numbers))
+        return self._make_results(trials, is_complete=is_complete, has_pairs=False)
 
     def run_fault_pairs(self, count: int) -> FaultCampaignResults:
         """Execute a run for each of `count` random pairs of faults and return the results.
 
-        The seed of the mission determines the pairs. Excluded are faults that end the run, that require
-        another fault, or that replace one.
+        The seed of the mission determines the pairs. Bugs, faults that require another fault, and faults that
+        replace another fault are excluded.
         """
         numbers = [
             number
             for number, fault in enumerate(self.faults, 1)
-            if not (fault.is_conditional or fault.replaced_number or fault.ends_run)
+            if not (fault.is_conditional or fault.replaced_number or fault.is_bug)
         ]
-        generator, pairs = random.Random(self.mission.seed), dict[FaultNumbers, None]()
+        random_generator, pairs = random.Random(self.mission.seed), dict[FaultNumbers, None]()
         while len(pairs) < min(count, math.comb(len(numbers), 2)):
-            pairs[tuple(sorted(generator.sample(numbers, 2)))] = None
-        trials, complete = self._run_trials(list(pairs), 0)
-        return self._make_results(trials, complete, pairs=True)
+            pairs[tuple(sorted(random_generator.sample(numbers, 2)))] = None
+        trials, is_complete = self._run_trials(list(pairs), 0)
+        return self._make_results(trials, is_complete=is_complete, has_pairs=True)
 
-    def _make_results(self, trials: Iterable[Trial], complete: bool, *, pairs: bool) -> FaultCampaignResults:
-        mission, done = self.mission, tuple(trials)
+    def _make_results(self, trials: Sequence[Trial], *, is_complete: bool, has_pairs: bool) -> FaultCampaignResults:
+        """Return the results of the campaign."""
+        mission, branches = self.mission, find_branches(self.mission.loaded.tree, trials)
         return FaultCampaignResults(
             mission.name, mission.cell_description, mission.seed, self.nominal_run.robot_time,
-            len(self.faults), done, find_branches(mission.loaded.tree, done), complete, pairs,
+            len(self.faults), tuple(trials), branches, is_complete, has_pairs,
         )  # fmt: skip
 
-    def _list_next_runs(self, trials: dict[FaultNumbers, Trial]) -> list[FaultNumbers]:
-        """Return the faults of the next runs, which these trials have made possible."""
-        triggers_by_path = self._find_smallest_triggers(trials.values())
-        trials_by_number = {numbers[-1]: trial for numbers, trial in trials.items()}
-        next_runs = []
+    def _list_next_combinations(self, trials: Sequence[Trial]) -> list[FaultNumbers]:
+        """Return the combinations of faults that can occur according to the ended trials."""
+        triggers_by_path = self._find_smallest_triggers(trials)
+        trials_by_number = {trial.fault_numbers[-1]: trial for trial in trials}
+        combinations = []
         for number, fault in enumerate(self.faults, 1):
             if number in trials_by_number:
                 continue
@@ -124,56 +125,59 @@ class Campaign:
                 continue
             required = triggers_by_path.get(fault.location) if fault.is_conditional else ()
             if required is not None and len(required) < MAX_FAULTS_PER_RUN:
-                next_runs.append((*required, number))
-        return next_runs
+                combinations.append((*required, number))
+        return combinations
 
     def _find_smallest_triggers(self, trials: Iterable[Trial]) -> dict[str, FaultNumbers]:
-        """Return for each entered node, by path, the smallest set of faults of a run that entered it."""
+        """Return the smallest combination of faults that activated a node, by path of the node."""
         triggers_by_path: dict[str, FaultNumbers] = {}
         for trial in sorted(trials, key=lambda trial: (len(trial.fault_numbers), trial.fault_numbers)):
-            if not self.faults[trial.fault_numbers[-1] - 1].ends_run:
+            if not self.faults[trial.fault_numbers[-1] - 1].is_bug:
                 for path in trial.entered_paths:
                     triggers_by_path.setdefault(path, trial.fault_numbers)
         return triggers_by_path
 
     def _run_trials(self, combinations: Sequence[FaultNumbers], offset: int) -> tuple[list[Trial], bool]:
-        """Execute a trial for each combination of faults.
+        """Execute a trial for each combination of faults; `offset` is the number of earlier trials.
 
-        Return the complete trials, and True if all are complete. `offset` is the number of earlier trials.
+        Return the complete trials, and True if the user halted no trial.
         """
 
-        def report(done: int, total: int) -> None:
+        def report_progress(ended_count: int, total: int) -> None:
             if self._progress is not None:
-                self._progress(offset + done, offset + total)
+                self._progress(offset + ended_count, offset + total)
 
-        work = partial(run_trial, self.mission, self.nominal_run)
-        jobs = [self.select_faults(numbers) for numbers in combinations]
         trials = run_jobs(
-            jobs, work, _make_broken_trial, workers=self._workers, progress=report, on_halt=self._on_halt
+            list(map(self.select_faults, combinations)),
+            partial(run_trial, self.mission, self.nominal_run),
+            _make_aborted_trial,
+            workers=self._workers,
+            progress=report_progress,
+            on_halt=self._on_halt,
         )
-        done = [trial for trial in trials if trial is not None and not trial.is_halted_by_user]
-        return done, len(done) == len(combinations)
+        complete = [trial for trial in trials if trial is not None and not trial.is_halted_by_user]
+        return complete, len(complete) == len(combinations)
 
 
-def _make_broken_trial(faults: FaultsByNumber, error: BaseException) -> Trial:
+def _make_aborted_trial(faults: FaultsByNumber, error: BaseException) -> Trial:
     """Return the trial of a run that raised an exception or whose process died."""
     problem = f"the run was aborted: {type(error).__name__}: {error}"
     return replace(make_empty_trial(faults), status="FAULT", problems=(problem,))
 
 
-def find_branches(tree: Node, trials: Iterable[Trial]) -> tuple[Branch, ...]:
-    """Return the branches that run after failures or at the end, with the number of trials that entered them.
+def find_branches(tree: Node, trials: Sequence[Trial]) -> tuple[Branch, ...]:
+    """Return the branches that run only after failures or at the end, in the order of the tree.
 
-    The order is that of the tree. A branch in a subtree that is used twice has two paths.
+    A branch in a subtree that is used twice has two paths.
     """
-    entered = [trial.entered_paths for trial in trials]
     paths_by_key: dict[tuple[str, int, int, str], list[str]] = {}
     for mark, name, node in _walk_branches(tree):
         paths_by_key.setdefault((mark.source.path, mark.line, mark.col, name), []).append(_find_path(node))
-    return tuple(
-        Branch(f"{file}:{line}", name, tuple(paths), sum(not nodes.isdisjoint(paths) for nodes in entered))
-        for (file, line, _, name), paths in paths_by_key.items()
-    )
+    branches = []
+    for (file, line, _, name), paths in paths_by_key.items():
+        trial_count = sum(not trial.entered_paths.isdisjoint(paths) for trial in trials)
+        branches.append(Branch(f"{file}:{line}", name, tuple(paths), trial_count))
+    return tuple(branches)
 
 
 def _walk_branches(tree: Node) -> Iterator[tuple[Mark, str, Node]]:
@@ -185,7 +189,7 @@ def _walk_branches(tree: Node) -> Iterator[tuple[Mark, str, Node]]:
 
 
 def _find_path(node: Node) -> str:
-    """Return the path of a node in the built tree, in which a subtree without a label is only its body."""
+    """Return the path of a node in the built tree, which contains no node for a use without a label."""
     while isinstance(node, UseNode) and not node.label and node.body is not None:
         node = node.body
     return node.path

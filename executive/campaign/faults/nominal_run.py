@@ -14,6 +14,11 @@ from executive.events import NodeEnded, NodeStarted, TimedEvent
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 
+MIN_TIMEOUT = 60.0
+"""Minimum time on the run's clock after which a run with faults ends as a fault [s]."""
+MAX_DELAY_FACTOR = 10.0
+"""Maximum duration of a run with faults, relative to the nominal run, in addition to `MIN_TIMEOUT`."""
+
 
 @dataclass(frozen=True)
 class NominalRun:
@@ -21,7 +26,7 @@ class NominalRun:
 
     Attributes:
         robot_time: Duration on the run's clock [s].
-        placed_count: Number of objects that were placed in bins.
+        placed_count: Number of objects in bins at the end.
         steps_by_path: Number of control steps of each activation of a node, by path of the node.
     """
 
@@ -32,35 +37,35 @@ class NominalRun:
     @property
     def timeout(self) -> float:
         """Time on the run's clock after which a run with faults ends as a fault [s]."""
-        return 60.0 + 10 * self.robot_time
+        return MIN_TIMEOUT + MAX_DELAY_FACTOR * self.robot_time
 
 
 class ActivationRecorder:
     """Observer that records the activations of nodes.
 
     Attributes:
-        counts: Number of activations, by path of the node.
+        start_counts: Number of activations, by path of the node.
         start_ticks: Tick of the start of each running node, by path.
-        durations: Number of control steps of each finished activation, by path.
+        step_counts: Number of control steps of each ended activation, by path.
     """
 
     def __init__(self) -> None:
-        self.counts: Counter[str] = Counter()
+        self.start_counts: Counter[str] = Counter()
         self.start_ticks: dict[str, int] = {}
-        self.durations: dict[str, list[int]] = defaultdict(list)
+        self.step_counts: dict[str, list[int]] = defaultdict(list)
 
     def __call__(self, timed: TimedEvent) -> None:
         """Record the start or the end of a node."""
         match timed.event:
             case NodeStarted(node):
-                self.counts[node] += 1
+                self.start_counts[node] += 1
                 self.start_ticks[node] = timed.tick
             case NodeEnded(node) if node in self.start_ticks:
-                self.durations[node].append(timed.tick - self.start_ticks.pop(node))
+                self.step_counts[node].append(timed.tick - self.start_ticks.pop(node))
 
 
 def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
-    """Execute a mission without a fault, and return the results.
+    """Execute a mission without a fault and return the results.
 
     Raises:
         InputError: The mission does not succeed, or ledger and ground truth disagree.
@@ -70,23 +75,22 @@ def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
     options = RunOptions(mission.seed, mission.requests, kind=mission.make_cell)
     run = assemble(mission.loaded, mission.skills, options, [activations])
     with closing(run):
-        outcome = run.execute()
-        if outcome.status == "HALTED":
+        run_end = run.execute()
+        if run_end.status == "HALTED":
             raise KeyboardInterrupt
         items, audit = run.count_items(), run.count_ground_truth()
     description = f"without a fault, {mission.name} with seed {mission.seed}"
-    if outcome.status != "SUCCESS":
+    if run_end.status != "SUCCESS":
         raise InputError(
-            f"{description} ends as {outcome.status} {outcome.reason}: {outcome.message}; "
+            f"{description} ends as {run_end.status} {run_end.reason}: {run_end.message}; "
             "a campaign needs a run that succeeds: choose another seed"
         )
     if audit is not None and (
-        audit["unseen"] or not is_confirmed_by_audit(items, audit, outcome.is_table_empty)
+        audit["unseen"] or not is_confirmed_by_audit(items, audit, run_end.is_table_empty)
     ):
         raise InputError(
-            f"{description} ends with a wrong ledger: the ledger says {format_counts(items)}; "
-            f"the audit {format_counts(audit)}; choose another seed, or a mission that observes the "
-            "whole table"
+            f"{description} ends with a wrong ledger: the ledger says {format_counts(items)}; the audit "
+            f"{format_counts(audit)}; choose another seed, or a mission that observes the whole table"
         )
-    steps_by_path = {node: tuple(ticks) for node, ticks in activations.durations.items()}
-    return NominalRun(outcome.robot_time, items["placed"], steps_by_path)
+    steps_by_path = {path: tuple(counts) for path, counts in activations.step_counts.items()}
+    return NominalRun(run_end.robot_time, items["placed"], steps_by_path)

@@ -13,57 +13,56 @@ from executive.testing.faults.script import ScheduledFault
 from executive.testing.substitutes import make_raising, make_raising_when_halted, make_substitute
 
 Occasion = Literal["first", "middle", "late", "lasting"]
-"""Occasion of a fault: first activation or start of the run, middle, near the end, or repeatedly."""
+"""Occasion of a fault in a run or in a motion: at the start, in the middle, near the end, or repeatedly."""
 INJECTED_MESSAGE = "failure injected by the campaign"
-"""Message of a skill that the campaign lets fail without a cause in the cell."""
+"""Message of an injected failure of a skill that has no cause in the cell."""
 
 
 class InjectedError(Exception):
-    """The error that a campaign raises in a skill to simulate a bug."""
+    """Injected error that simulates a bug of a skill."""
 
 
 @dataclass(frozen=True)
 class SkillFault:
-    """A misbehaviour of a skill without a cause in the cell.
+    """A failure or bug of a skill without a cause in the cell.
 
     Attributes:
         node: Path of the node that runs the skill.
-        kind: The skill fails, raises an error, or raises an error when it is halted.
+        kind: `fails` for a failure; `raises` for an error; `raises when halted` for an error during a halt.
         reason: Reason of the failure; "" for an error.
-        start_numbers: Numbers of the activations in which the skill misbehaves, from 1; empty: all.
+        activations: Numbers of the affected activations of the node, from 1; empty: all.
         delay_steps: Number of control steps from the start of the skill to the error.
     """
 
     node: str
     kind: Literal["fails", "raises", "raises when halted"]
     reason: str = ""
-    start_numbers: tuple[int, ...] = ()
+    activations: tuple[int, ...] = ()
     delay_steps: int = 0
 
 
 @dataclass(frozen=True)
 class PlannedFault:
-    """A fault of a mission that a campaign injects into a run; can be pickled.
+    """A fault that a campaign injects into a run of a mission; can be pickled.
 
     Attributes:
         location: Path of the affected node, or affected part of the cell: `detector`, `object`, `tool`.
         name: Label or skill of the node; name of the part.
-        place: File and line of the node in the mission; "" for a part.
-        kind: Reason with which the node must fail, or kind of the fault: `target removed`.
+        mission_line: File and line of the node in the mission; "" for a part.
+        kind: Failure reason of the node, or kind of the fault, for instance `target removed`.
         occasion: Occasion of the fault in the run.
         cause: Cause of the fault, a few words.
-        cell_faults: Faults of the cell that cause the fault.
-        skill_faults: Misbehaviours of skills that cause the fault.
-        is_failure_reason: True if `kind` is a reason of the node.
+        cell_faults: Injected faults of the cell.
+        skill_faults: Injected faults of skills.
+        is_failure_reason: True if `kind` is a failure reason, with which the node must fail.
         expected_reason: Reason with which skills should fail because of a fault of a part; "": no reason.
         is_conditional: True if the node runs only after another fault.
-        replaced_number: Number of another fault, from 1, which this fault replaces if the node did not fail
-            with its reason; 0: no fault.
+        replaced_number: Number of the fault that this fault replaces if the node does not fail; 0: none.
     """
 
     location: str
     name: str
-    place: str
+    mission_line: str
     kind: str
     occasion: Occasion
     cause: str
@@ -75,8 +74,8 @@ class PlannedFault:
     replaced_number: int = 0
 
     @property
-    def ends_run(self) -> bool:
-        """True if the run must end with the status FAULT, as after any bug."""
+    def is_bug(self) -> bool:
+        """True if the fault simulates a bug, after which the run must end with the status FAULT."""
         return any(skill_fault.kind != "fails" for skill_fault in self.skill_faults)
 
     def __str__(self) -> str:
@@ -87,7 +86,12 @@ class PlannedFault:
 def make_substitutes(
     skill_faults: Iterable[SkillFault], skills: Mapping[str, type[Skill]]
 ) -> dict[str, type[Skill]]:
-    """Return the substitutes of misbehaving skills by path of the node; `skills`: all skills by path."""
+    """Return the substitutes of the faulty skills, by path of the node.
+
+    Args:
+        skill_faults: Injected faults of skills.
+        skills: Skills of all nodes, by path of the node.
+    """
     substitutes: dict[str, type[Skill]] = {}
     for fault in skill_faults:
         skill = substitutes.get(fault.node, skills[fault.node])
@@ -98,19 +102,19 @@ def make_substitutes(
             faulty = make_raising(skill, error, delay_steps=fault.delay_steps)
         else:
             faulty = make_raising_when_halted(skill, error)
-        substitutes[fault.node] = make_substitute(skill, "Faulty", faulty.run, fault.start_numbers or None)
+        substitutes[fault.node] = make_substitute(skill, "Faulty", faulty.run, fault.activations or None)
     return substitutes
 
 
 def _make_failing(skill: type[Skill], reason: str) -> type[Skill]:
-    """Return a skill that fails at its start; it drops its object if `tool_left` is EMPTY for the reason.
+    """Return a skill that fails at the start with this reason.
 
-    If the object sticks to the tool and cannot fall, the original skill runs instead.
+    If the declared state of the tool after the failure is EMPTY, the skill drops the held object. If the
+    object sticks to the tool, the original skill runs instead.
     """
-    is_dropping = skill.tool_left.get(reason) is EMPTY
 
     def run(self: Skill, cell: Cell) -> Steps:
-        if is_dropping:
+        if skill.tool_left.get(reason) is EMPTY:
             cell.tool.open()
             if cell.tool.holding:
                 yield from skill.run(self, cell) or ()

@@ -1,10 +1,11 @@
-"""Checks of an ended run with injected faults; each check yields one text per problem."""
+"""Checks of an ended run with injected faults."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
@@ -25,38 +26,43 @@ MIN_BORDER_DISTANCE = 30.0
 
 
 class UnobservedCounts(NamedTuple):
-    """Numbers of unobserved objects, whose places no image shows: `outside` and `inside` of bins."""
+    """Numbers of objects that no image shows at their present positions.
 
-    outside: int
-    inside: int
+    Attributes:
+        outside_bins: Number of these objects on the table or the ground.
+        inside_bins: Number of these objects in bins.
+    """
 
-
-NO_UNOBSERVED_OBJECTS = UnobservedCounts(0, 0)
+    outside_bins: int = 0
+    inside_bins: int = 0
 
 
 def check_end(
-    outcome: RunEnded,
+    run_end: RunEnded,
     faults: Sequence[PlannedFault],
     unhandled_failures: Sequence[UnhandledFailure],
     is_bug_raised: bool,
 ) -> Iterator[str]:
     """Yield a problem if the run did not end as its faults require.
 
-    `unhandled_failures` are the failures with which the mission may end. If `is_bug_raised` is True, an
-    injected bug was raised, and the run must end as a fault at the node of the bug.
+    Args:
+        run_end: End of the run.
+        faults: Injected faults.
+        unhandled_failures: Failures with which the mission may end, according to the check of the mission.
+        is_bug_raised: True if an injected bug was raised; then the run must end as a fault at its node.
     """
-    if outcome.status == "FAULT":
-        nodes = [fault.location for fault in faults if fault.ends_run]
-        if not is_bug_raised or InjectedError.__name__ not in outcome.message:
-            yield f"it ended as FAULT at {outcome.node or 'no node'}: {outcome.message}"
-        elif not any(node == outcome.node or outcome.message.startswith(f"{node}: ") for node in nodes):
-            yield f"the bug was in {' or '.join(nodes)}, but the run names {outcome.node}: {outcome.message}"
+    if run_end.status == "FAULT":
+        nodes = [fault.location for fault in faults if fault.is_bug]
+        if not is_bug_raised or InjectedError.__name__ not in run_end.message:
+            yield f"it ended as FAULT at {run_end.node or 'no node'}: {run_end.message}"
+        elif not any(node == run_end.node or run_end.message.startswith(f"{node}: ") for node in nodes):
+            yield f"the bug was in {' or '.join(nodes)}, but the run names {run_end.node}: {run_end.message}"
     elif is_bug_raised:
-        yield f"a bug was raised, but the run ended as {outcome.status} {outcome.reason}"
-    if outcome.status == "FAILURE" and outcome.reason != "lost":
-        known = {(failure.node, f"{failure.source}.{failure.reason}") for failure in unhandled_failures}
-        if (outcome.node, outcome.reason) not in known:
-            yield f"it ended with {outcome.reason} at {outcome.node}, which the mission checker excludes"
+        yield f"a bug was raised, but the run ended as {run_end.status} {run_end.reason}"
+    if run_end.status == "FAILURE" and run_end.reason != "lost":
+        ends = {(failure.node, f"{failure.source}.{failure.reason}") for failure in unhandled_failures}
+        if (run_end.node, run_end.reason) not in ends:
+            yield f"it ended with {run_end.reason} at {run_end.node}; according to `check` this cannot occur"
 
 
 def check_tree(root: Behaviour) -> Iterator[str]:
@@ -69,31 +75,36 @@ def check_tree(root: Behaviour) -> Iterator[str]:
 def count_unobserved_objects(
     objects: Sequence[TrueObject], bins: Collection[Bin], events: Sequence[TimedEvent]
 ) -> UnobservedCounts:
-    """Return the numbers of objects whose places no image has shown since the last drop."""
+    """Return the numbers of objects whose positions no image has shown since the last drop."""
     changes = [(timed.tick, timed.event) for timed in events if isinstance(timed.event, ItemChanged)]
     drop_ticks = [tick for tick, change in changes if change.state == State.DROPPED.value]
     if not drop_ticks:
-        return NO_UNOBSERVED_OBJECTS
-    later = (timed.event for timed in events if timed.tick > drop_ticks[-1])
-    frames = [event.frame for event in later if isinstance(event, FrameCaptured)]
-    positions = (true_object.position for true_object in objects)
-    unseen = [position for position in positions if not any(_is_visible(position, frame) for frame in frames)]
-    inside = sum(any(bin.contains(position, BIN_THICKNESS) for bin in bins) for position in unseen)
-    return UnobservedCounts(len(unseen) - inside, inside)
+        return UnobservedCounts()
+    later_events = (timed.event for timed in events if timed.tick > drop_ticks[-1])
+    frames = [event.frame for event in later_events if isinstance(event, FrameCaptured)]
+    all_positions = [true_object.position for true_object in objects]
+    positions = [xyz for xyz in all_positions if not any(_is_visible(xyz, frame) for frame in frames)]
+    inside_count = sum(any(bin.contains(position, BIN_THICKNESS) for bin in bins) for position in positions)
+    return UnobservedCounts(len(positions) - inside_count, inside_count)
 
 
 def check_ledger(
-    outcome: RunEnded,
+    run_end: RunEnded,
     items: Mapping[str, Any],
     audit: Mapping[str, int] | None,
-    removed_count: int = 0,
-    unobserved: UnobservedCounts = NO_UNOBSERVED_OBJECTS,
+    removed_count: int,
+    unobserved: UnobservedCounts,
 ) -> Iterator[str]:
     """Yield a problem if the ledger does not balance, an object is misplaced, or the audit disagrees.
 
-    Allowed differences: if the run ended early, the ledger lacks unseen objects, and an object that has just
-    fallen counts as lost wherever it lies. `unobserved` objects may always count as lost. The run need not
-    notice the removal of `removed_count` objects.
+    After an early end of the run, the ledger may lack objects, and dropped items may count as lost.
+
+    Args:
+        run_end: End of the run.
+        items: Number of items in the ledger, by state.
+        audit: Number of objects, by true place; None if the places are unknown.
+        removed_count: Number of removed objects, which the ledger need not count as lost.
+        unobserved: Numbers of unobserved objects, which the ledger may count as lost.
     """
     ledger_text = f"the ledger says {format_counts(items)}"
     if not is_balanced(items):
@@ -103,28 +114,29 @@ def check_ledger(
     if audit["wrong_bin"]:
         yield f"{audit['wrong_bin']} objects in wrong bins; {ledger_text}; the audit {format_counts(audit)}"
     unnoticed_count = min(max(audit["elsewhere"] - items["lost"], 0), removed_count)
-    left = audit["left"] + unnoticed_count
-    not_placed = items["rejected"] + items["skipped"]
-    if outcome.status == "FAULT" or outcome.node:
-        agrees = items["placed"] <= audit["right"] and not_placed <= left
+    left_count = audit["left"] + unnoticed_count
+    unplaced_count = items["rejected"] + items["skipped"]
+    if run_end.status == "FAULT" or run_end.node:
+        is_confirmed = items["placed"] <= audit["right"] and unplaced_count <= left_count
     else:
-        agrees = any(
-            items["placed"] == audit["right"] + audit["wrong_bin"] - inside
-            and not_placed <= left - outside <= not_placed + audit["unseen"]
-            and items["lost"] == audit["elsewhere"] - unnoticed_count + outside + inside
-            for outside in range(unobserved.outside + 1)
-            for inside in range(unobserved.inside + 1)
+        # Any number of the unobserved objects outside of bins, and inside of bins, may count as lost.
+        is_confirmed = any(
+            items["placed"] == audit["right"] + audit["wrong_bin"] - inside_count
+            and unplaced_count <= left_count - outside_count <= unplaced_count + audit["unseen"]
+            and items["lost"] == audit["elsewhere"] - unnoticed_count + outside_count + inside_count
+            for outside_count in range(unobserved.outside_bins + 1)
+            for inside_count in range(unobserved.inside_bins + 1)
         )
-    if not agrees:
+    if not is_confirmed:
         yield f"{ledger_text}; the audit {format_counts(audit)}"
 
 
 def check_success(
-    outcome: RunEnded, audit: Mapping[str, int] | None, events: Sequence[TimedEvent]
+    run_end: RunEnded, audit: Mapping[str, int] | None, events: Sequence[TimedEvent]
 ) -> Iterator[str]:
-    """Yield a problem if a run that searched an image succeeded although objects were never detected."""
+    """Yield a problem if the run searched images and succeeded, but never detected some of the objects."""
     has_searched = any(isinstance(timed.event, FrameSearched) for timed in events)
-    is_complete = outcome.status in ("SUCCESS", "INCOMPLETE")
+    is_complete = run_end.status in ("SUCCESS", "INCOMPLETE")
     if has_searched and is_complete and audit is not None and audit["unseen"]:
         yield f"it succeeded, but {audit['unseen']} objects were never seen; the audit {format_counts(audit)}"
 
@@ -139,9 +151,9 @@ def check_losses(audit: Mapping[str, int] | None, events: Sequence[TimedEvent]) 
 def _is_visible(position: Array, frame: Frame) -> bool:
     """Return True if an object with its centre at `position` `(3,)` [m] would be visible in the frame."""
     height, width = frame.visible.shape
-    place = position[None]
-    is_inside = frame.is_in_area(place, (0, 0, width, height), MIN_BORDER_DISTANCE)
-    return bool((is_inside & frame.is_unoccluded(place))[0])
+    positions = position[np.newaxis]
+    is_inside = frame.is_in_area(positions, (0, 0, width, height), MIN_BORDER_DISTANCE)
+    return bool((is_inside & frame.is_unoccluded(positions))[0])
 
 
 def count_injected_faults(events: Sequence[TimedEvent], name: str) -> int:
@@ -149,16 +161,16 @@ def count_injected_faults(events: Sequence[TimedEvent], name: str) -> int:
     return sum(isinstance(timed.event, FaultInjected) and timed.event.name == name for timed in events)
 
 
-def describe_unexpected_reason(outcome: RunEnded, faults: Sequence[PlannedFault]) -> str:
-    """Return a remark if the run failed with another reason than those of the faults, or ""."""
-    if outcome.status != "FAILURE" or outcome.reason == "lost":
+def describe_unexpected_reason(run_end: RunEnded, faults: Sequence[PlannedFault]) -> str:
+    """Return a remark if the run failed with a reason that no fault should cause; otherwise ""."""
+    if run_end.status != "FAILURE" or run_end.reason == "lost":
         return ""
     reasons = [fault.kind if fault.is_failure_reason else fault.expected_reason for fault in faults]
-    intended = [reason for reason in reasons if reason]
-    if outcome.reason.rpartition(".")[2] in intended:
+    expected_reasons = list(filter(None, reasons))
+    if run_end.reason.rpartition(".")[2] in expected_reasons:
         return ""
-    intention = f", not of {' and '.join(intended)}" if intended else ""
-    return f"failed because of {outcome.reason}{intention}"
+    expectation = f", not of {' and '.join(expected_reasons)}" if expected_reasons else ""
+    return f"failed because of {run_end.reason}{expectation}"
 
 
 def format_counts(counts: Mapping[str, Any]) -> str:

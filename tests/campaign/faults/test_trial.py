@@ -101,7 +101,7 @@ def test_what_cannot_happen_there_found_no_occasion(campaign: Campaign) -> None:
 def test_a_run_that_never_ends_is_ended_and_found(campaign: Campaign) -> None:
     number = number_of(campaign, "SelectTarget", "unseen", "lasting")
     fault = campaign.faults[number - 1]
-    ever = replace(fault, skill_faults=(replace(fault.skill_faults[0], start_numbers=()),))
+    ever = replace(fault, skill_faults=(replace(fault.skill_faults[0], activations=()),))
     short = replace(campaign.nominal_run, robot_time=-5.0)
     trial = run_trial(campaign.mission, short, {number: ever})
     assert trial.problems[0] == (
