@@ -23,14 +23,14 @@ SEEDS = range(171000, 171006)
 
 def exchange_objects(occurrence: Occurrence) -> bool:
     """Swap the target object with one of another class, once."""
-    world = occurrence.scene.world
-    if (first := occurrence.scene.find_object("node", occurrence.item)) is None:
+    world = occurrence.context.world
+    if (first := occurrence.context.find_object("node", occurrence.item)) is None:
         return False
     others = [
         thing
         for thing in world.objects
         if thing.label != first.label
-        and not any(b.contains(thing.position) for b in occurrence.scene.cell.bins.values())
+        and not any(b.contains(thing.position) for b in occurrence.context.cell.bins.values())
     ]
     if not others:
         return False
@@ -43,11 +43,11 @@ def exchange_objects(occurrence: Occurrence) -> bool:
 
 def empty_bin(occurrence: Occurrence) -> bool:
     """Take all objects out of the first bin that holds some, once."""
-    for bin in occurrence.scene.cell.bins.values():
-        inside = [thing for thing in occurrence.scene.world.objects if bin.contains(thing.position)]
+    for bin in occurrence.context.cell.bins.values():
+        inside = [thing for thing in occurrence.context.world.objects if bin.contains(thing.position)]
         for thing in inside:
             occurrence.emit_event(thing)
-            occurrence.scene.world.remove(thing)
+            occurrence.context.world.remove(thing)
         if inside:
             return True
     return False
@@ -83,7 +83,7 @@ def schedule(kind: str, seed: int) -> list[ScheduledFault]:
     if kind == "wrong classes in a third of the looks":
         return [with_probability(0.3, "*/Detect", detector_swaps_classes(), seed=seed)]
     if kind == "exchanged before an approach":
-        return [during("*/Approach", Effect("objects_exchanged", exchange_objects), nth=1 + seed % 3)]
+        return [during("*/Approach", Effect("objects_exchanged", exchange_objects), activations=1 + seed % 3)]
     assert kind == "emptied bin"
     return [after(4.0 + seed % 6, Effect("bin_emptied", empty_bin))]
 

@@ -84,7 +84,7 @@ def test_the_first_other_decision_of_an_edited_mission_is_reported(missions: Pat
 
 def test_a_mission_that_gives_up_sooner_says_where(missions: Path) -> None:
     file, skills = missions / "sort_overhead.yaml", load_skills()
-    four_times = [during("*/Grasp", seal_fails(), nth=(1, 2, 3, 4))]
+    four_times = [during("*/Grasp", seal_fails(), activations=(1, 2, 3, 4))]
     log = InputLog.from_events(run_mission(file, seed=3, faults=four_times).events)
     assert replay_and_compare(load_mission(file, skills), skills, log, 3).is_equal
     done = replay_and_compare(load_mission(file, skills, {"attempts": "2"}), skills, log, 3, edited=True)

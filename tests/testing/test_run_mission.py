@@ -65,7 +65,7 @@ def test_the_cell_is_arranged_before_the_run(look: Path) -> None:
 
 
 def test_entered_and_failed_nodes_are_listed_in_order() -> None:
-    result = run_mission("sort_overhead", faults=[during("*/Grasp", seal_fails(), nth=1)])
+    result = run_mission("sort_overhead", faults=[during("*/Grasp", seal_fails(), activations=1)])
     assert len(result.list_activated_nodes("*/Grasp")) == result.items["placed"] + 1
     assert (result.list_activated_nodes("tree/look*")[0], result.list_failure_reasons()[0]) == (
         "tree/look/try",

@@ -118,7 +118,9 @@ class _FaultLister:
                 fault = replace(fault, is_failure_reason=True)
                 if cause is not None and cause.can_affect(skill):
                     lasting_activations = () if cause.can_last else REPEATED_ACTIVATIONS
-                    cell_fault = during(node.path, cause.effect, nth=activations or lasting_activations)
+                    cell_fault = during(
+                        node.path, cause.effect, activations=activations or lasting_activations
+                    )
                     yield replace(fault, cause=cause.description, skill_faults=(), cell_faults=(cell_fault,))
                     fault = replace(fault, replaced_number=-1)
                 yield fault
@@ -173,7 +175,7 @@ class _FaultLister:
                 removed = effects.object_removed("node", fraction)
                 bumped = effects.object_bumped(x, y, "node", fraction)
                 for kind, effect in (("target removed", removed), ("target bumped", bumped)):
-                    cell_fault = during(node.path, effect, nth=middle_activation)
+                    cell_fault = during(node.path, effect, activations=middle_activation)
                     yield self._make_node_fault(node, kind, occasion, _describe_time(fraction), cell_fault)
 
     def list_tool_faults(self) -> Iterator[PlannedFault]:
@@ -183,7 +185,7 @@ class _FaultLister:
             if not (skill.moves and skill.tool_state[0] is HOLDING and self._has_run(node)):
                 continue
             for occasion, fraction in TRANSPORT_FRACTIONS:
-                cell_fault = during(node.path, effects.seal_breaks(fraction), nth=1)
+                cell_fault = during(node.path, effects.seal_breaks(fraction), activations=1)
                 cause = _describe_time(fraction)
                 yield self._make_node_fault(node, "seal breaks", occasion, cause, cell_fault)
             kind, effect = "seal breaks over a wrong bin", effects.seal_breaks_over_wrong_bin()

@@ -56,7 +56,7 @@ def list_skill_faults(skill: type[Skill], ticks: int, *, is_holding: bool) -> It
 
 def _move_arm(occurrence: Occurrence) -> bool:
     """Start a motion of the arm, as a preceding skill could have done."""
-    arm = occurrence.scene.cell.arm
+    arm = occurrence.context.cell.arm
     arm.start(FakeMotion([arm.tool_pose] * START_MOTION_STEPS))
     return True
 

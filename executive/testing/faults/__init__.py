@@ -2,7 +2,7 @@
 
 Examples of faults in a script for `run_mission(faults=[...])`:
 
-* The second grasp fails: `during("*/Grasp", seal_fails(), nth=2)`
+* The second grasp fails: `during("*/Grasp", seal_fails(), activations=2)`
 * The detector does not answer from 4 s to 9 s: `between(4.0, 9.0, detector_hangs())`
 * The object nearest to the tool is removed at 12 s: `after(12.0, object_removed("nearest"))`
 * In each transit the seal breaks with probability 0.1:

@@ -1,6 +1,6 @@
 """Faults of detectors: no answers, late answers, empty answers, or only low confidences.
 
-A fault affects each request that is made while the fault lasts; earlier requests are answered as usual.
+A fault affects only the requests that a skill makes while the fault lasts.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from executive.cell.detection import Answer
 from executive.cell.protocols import Request
@@ -42,31 +43,32 @@ def _remove_detections(answer: Answer) -> Answer:
 
 
 def make_detector_effect(
-    name: str, change: AnswerChange | None = None, delay: float = 0.0, hang_end: float = 0.0
+    name: str, change_answer: AnswerChange | None = None, delay: float = 0.0, hang_end: float = 0.0
 ) -> Effect:
     """Return an effect: the detector answers late, with changed answers, or not at all.
 
     Args:
         name: Name of the effect in the journal.
-        change: Changes the answer of the detector; None: no change.
+        change_answer: Function that changes an answer of the detector; None: no change.
         delay: Delay of each answer [s].
-        hang_end: While the effect lasts, no request is answered before this time on the run's clock [s].
+        hang_end: Time on the run's clock until which the detector hangs while the effect lasts [s].
     """
-    return Effect(name, interceptors={"request": _make_faulty_request}, arguments=(change, delay, hang_end))
+    arguments = (change_answer, delay, hang_end)
+    return Effect(name, interceptors={"request": FaultyRequest.begin}, arguments=arguments)
 
 
 def detector_dead() -> Effect:
-    """Return an effect: requests fail at their usual time, and `Detect` fails with `unavailable`."""
+    """Return an effect: requests fail without an additional delay, and `Detect` fails with `unavailable`."""
     return make_detector_effect("detector_dead", _raise_unavailable)
 
 
 def detector_hangs(hang_end: float = math.inf) -> Effect:
-    """Return an effect: requests are answered only after the fault.
+    """Return an effect: requests are answered when the fault ends, but not later than at `hang_end`.
 
-    If the fault ends only when a node that waits for the answer ends, the request is never answered.
+    A fault that lasts until the end of the waiting node prevents the answer.
 
     Args:
-        hang_end: Time on the run's clock at which requests are answered in any case [s].
+        hang_end: Time on the run's clock until which the detector hangs at most [s].
     """
     return make_detector_effect("detector_hangs", hang_end=hang_end)
 
@@ -75,7 +77,7 @@ def detector_times_out(delay: float) -> Effect:
     """Return an effect: requests fail after a delay, and `Detect` fails with `unavailable`.
 
     Args:
-        delay: Time from the usual answer to the failure [s].
+        delay: Time from the answer of the detector without the fault to the failure [s].
     """
     return make_detector_effect("detector_hangs", _raise_unavailable, delay=delay)
 
@@ -111,22 +113,29 @@ class FaultyRequest:
     Attributes:
         request: The request without a fault.
         occurrence: Occurrence of the fault during which the request was made.
-        change: Changes the answer; None: no change.
+        change_answer: Function that changes the answer; None: no change.
         delay: Delay of the answer [s].
-        hang_end: Time on the run's clock before which the request hangs during the occurrence [s].
+        hang_end: Time on the run's clock until which the request hangs during the occurrence [s].
+        _answer_time: Time on the run's clock of the delayed answer [s]; infinite while it is unknown.
     """
 
     request: Request
     occurrence: Occurrence
-    change: AnswerChange | None
+    change_answer: AnswerChange | None
     delay: float
     hang_end: float
     _answer_time: float = math.inf
 
+    @classmethod
+    def begin(cls, proceed: Callable[[], Request], occurrence: Occurrence, *arguments: Any) -> FaultyRequest:
+        """Make a request to the detector; `arguments` are those of the effect."""
+        occurrence.emit_event()
+        return cls(proceed(), occurrence, *arguments)
+
     @property
     def ready(self) -> bool:
         """True if the answer is available: the delay is over, and the detector does not hang."""
-        now = self.occurrence.scene.now
+        now = self.occurrence.context.now
         if math.isinf(self._answer_time) and self.request.ready:
             self._answer_time = now + self.delay
         is_hanging = not self.occurrence.is_over and now < self.hang_end - TIME_TOLERANCE
@@ -135,15 +144,4 @@ class FaultyRequest:
     def result(self) -> Answer:
         """Return the changed answer of the detector, or raise Unavailable."""
         answer = self.request.result()
-        return answer if self.change is None else self.change(answer)
-
-
-def _make_faulty_request(
-    proceed: Callable[[], Request],
-    occurrence: Occurrence,
-    change: AnswerChange | None,
-    delay: float,
-    hang_end: float,
-) -> Request:
-    occurrence.emit_event()
-    return FaultyRequest(proceed(), occurrence, change, delay, hang_end)
+        return answer if self.change_answer is None else self.change_answer(answer)

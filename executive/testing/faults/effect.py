@@ -1,4 +1,4 @@
-"""Effect of a fault on a cell, one occurrence of an effect, and access to the cell for effects."""
+"""Effect of a fault on a cell, occurrence of an effect, and access to the cell for effects."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from executive.geometry import Array
 from executive.testing.faults.world_access import TrueObject, WorldAccess
 
 MAX_ITEM_POSITION_ERROR = 0.05
-"""Maximum horizontal distance between an item of the ledger and the object that counts as this item [m]."""
+"""Maximum horizontal distance between the position of an item in the ledger and its true object [m]."""
 TIME_TOLERANCE = 1e-9
 """Tolerance for rounding errors in comparisons of times on the run's clock [s]."""
 
 ObjectChoice = int | Literal["node", "nearest"]
-"""Choice of an object: its number, from 1; `nearest`: nearest to the tool; `node`: the object of the node.
+"""Choice of an object: the number of an object, from 1; `nearest` to the tool; or the object of the `node`.
 
-For `node`: the true object of the node's item in the ledger, or the nearest object if the node has no item.
+`node` chooses the true object of the item that the node handles, or the nearest object without an item.
 """
 
 
-class FaultScene:
+class FaultContext:
     """The cell without faults, access to its world, and the current motion of its arm.
 
     Args:
@@ -40,15 +40,15 @@ class FaultScene:
         emit: Emits events of the run.
 
     Attributes:
-        cell: The cell, as skills would see it without faults.
+        cell: The cell without faults, as skills see it.
         emit: Emits events of the run.
-        motion: Start time [s] of the last motion, and the motion; None if none began, or it was stopped.
+        motion: Last motion of the arm and its start time [s]; None before a motion and after a stop.
     """
 
     def __init__(self, workcell: Workcell, open_world: Callable[[Workcell], WorldAccess], emit: Emit) -> None:
         self._workcell, self._open_world = workcell, open_world
         self.cell, self.emit = workcell.cell, emit
-        self.motion: tuple[float, Motion] | None = None
+        self.motion: tuple[Motion, float] | None = None
 
     @cached_property
     def world(self) -> WorldAccess:
@@ -63,9 +63,10 @@ class FaultScene:
     @property
     def motion_progress(self) -> float:
         """Elapsed fraction of the duration of the motion, 0 to 1; 0 without a motion or after its end."""
-        if self.motion is None or self.motion[1].duration == 0.0:
+        motion, start_time = self.motion or (None, 0.0)
+        if motion is None or motion.duration == 0.0:
             return 0.0
-        fraction = (self.now - self.motion[0]) / self.motion[1].duration
+        fraction = (self.now - start_time) / motion.duration
         return fraction if fraction <= 1.0 else 0.0
 
     def find_object(self, choice: ObjectChoice, item: Item) -> TrueObject | None:
@@ -74,7 +75,8 @@ class FaultScene:
             return next(iter(self.world.objects[choice - 1 : choice]), None)
         if choice == "nearest" or not item:
             return self._find_nearest(self.cell.arm.tool_pose.position, np.inf)
-        summary = next((row for row in self._workcell.accounts.list_items() if row.item == item), None)
+        summaries = {summary.item: summary for summary in self._workcell.accounts.list_items()}
+        summary = summaries.get(item)
         if summary is None or summary.state == "placed":
             return None
         if summary.state == "held":
@@ -82,35 +84,39 @@ class FaultScene:
         return self._find_nearest(np.array(summary.position), MAX_ITEM_POSITION_ERROR)
 
     def _find_nearest(self, position: Array, max_distance: float) -> TrueObject | None:
-        """Return the object on the table with the smallest horizontal distance from `position` `(3,)` [m].
+        """Return the object outside of bins and tool that is nearest to `position` `(3,)` [m] horizontally.
 
-        None if this distance exceeds `max_distance` [m]. Objects in bins or in the tool are ignored.
+        Return None if no object is within `max_distance` [m].
         """
-        held, bins = self.world.held_object, self.cell.bins.values()
-        distances = [
-            (float(np.linalg.norm((true.position - position)[:2])), true)
-            for true in self.world.objects
-            if not any(bin.contains(true.position) for bin in bins)
-            and (held is None or true.body != held.body)
+
+        def measure_distance(true_object: TrueObject) -> float:
+            return float(np.linalg.norm((true_object.position - position)[:2]))
+
+        held_object, bins = self.world.held_object, self.cell.bins.values()
+        candidates = [
+            true_object
+            for true_object in self.world.objects
+            if not any(bin.contains(true_object.position) for bin in bins)
+            and (held_object is None or true_object.body != held_object.body)
+            and measure_distance(true_object) <= max_distance
         ]
-        distance, nearest = min(distances, key=lambda pair: pair[0], default=(np.inf, None))
-        return nearest if distance <= max_distance else None
+        return min(candidates, key=measure_distance, default=None)
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Effect of a fault on a cell: an action, or changed results of calls; without state.
+    """Stateless effect of a fault on a cell: an action, or changed results of calls.
 
     Attributes:
         name: Name of the effect in the journal.
-        action: Function `action(occurrence, *arguments)` that changes the cell and returns True, or returns
-            False if this is not possible yet. It is called when the effect begins and after each control step
-            until it returns True. None: no action.
-        interceptors: Functions `interceptor(proceed, occurrence, *arguments)` that return the result of a
-            call, by method of the cell: `close`, `open` (tool), `plan` (arm), `sees_table`, `capture`
-            (camera), `request` (detector), `localize` (localizer) or `ask` (operator). `proceed()` calls the
-            method itself.
-        arguments: Further arguments of these functions.
+        action: Function `action(occurrence, *arguments)`, which is called when the effect begins and after
+            each control step until the function returns True. The function changes the cell and returns True,
+            or returns False if the change is not possible yet. None: no action.
+        interceptors: Functions `interceptor(proceed, occurrence, *arguments)`, by the name of the method of
+            the cell whose result they return: `close`, `open` (tool), `plan` (arm), `sees_table`, `capture`
+            (camera), `request` (detector), `localize` (localizer), `ask` (operator). `proceed()` calls the
+            method.
+        arguments: Further arguments of the action and of the interceptors.
     """
 
     name: str
@@ -125,16 +131,17 @@ class Occurrence:
 
     Attributes:
         effect: The effect.
-        scene: The cell without faults, and its world.
+        context: The cell without faults, and access to its world.
         node: Path of the node during which the effect occurs, or "".
-        item: Item of the ledger that this node handles, or "".
+        item: Item that the node handles, or "".
         end: Time on the run's clock at which the effect ends [s].
         has_acted: True if the action has changed the cell.
         is_over: True if the effect has ended.
+        _last_event_time: Time on the run's clock of the last event [s].
     """
 
     effect: Effect
-    scene: FaultScene
+    context: FaultContext
     node: str = ""
     item: str = ""
     end: float = math.inf
@@ -149,16 +156,16 @@ class Occurrence:
 
     def emit_event(self, affected: TrueObject | None = None) -> None:
         """Emit a `FaultInjected` event with the affected object; at most one event per control step."""
-        if self._last_event_time == self.scene.now:
+        if self._last_event_time == self.context.now:
             return
-        self._last_event_time = self.scene.now
+        self._last_event_time = self.context.now
         label = affected.label if affected else ""
         position = round_values(affected.position, 4) if affected else []
-        self.scene.emit(FaultInjected(self.effect.name, self.node, self.item, label, position))
+        self.context.emit(FaultInjected(self.effect.name, self.node, self.item, label, position))
 
 
 def validate_fraction(fraction: float | None) -> float:
-    """Return the fraction of a motion after which a fault occurs; 0 (at once, also at rest) for None.
+    """Return the fraction of a motion after which a fault occurs; 0, at once, for None.
 
     Raises:
         InputError: The fraction is not between 0 and 1, both excluded.

@@ -14,11 +14,12 @@ from executive.cell.proxy import Access, intercept
 from executive.cell.workcell import Workcell
 from executive.errors import Fault, InputError
 from executive.events import Emit, NodeEnded, NodeStarted, TimedEvent, discard_event
-from executive.testing.faults.effect import TIME_TOLERANCE, FaultScene, Occurrence
+from executive.testing.faults.effect import TIME_TOLERANCE, FaultContext, Occurrence
 from executive.testing.faults.script import NodeActivations, ScheduledFault, TimeSpan
 from executive.testing.faults.world_access import WorldAccess, open_world
 
 _INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "localizer", "operator")
+"""Parts of the cell that effects can change or observe."""
 _INTERCEPTED_CALLS = frozenset(
     {
         "arm.plan", "tool.close", "tool.open", "camera.sees_table", "camera.capture", "detector.request",
@@ -31,7 +32,7 @@ _INTERCEPTED_CALLS = frozenset(
 class FaultyCell(CellWrapper):
     """A work cell with injected faults; implements `Workcell`.
 
-    Faults of nodes require that `on_event` observes the events of the run. Each fault emits `FaultInjected`.
+    Faults of nodes occur only if `on_event` observes the events of the run. Each fault emits `FaultInjected`.
 
     Args:
         inner: The cell without faults.
@@ -50,14 +51,13 @@ class FaultyCell(CellWrapper):
         timeout: float = math.inf,
     ) -> None:
         super().__init__(inner)
-        self._scene = FaultScene(inner, open_world, emit)
+        self._context = FaultContext(inner, open_world, emit)
         self._timeout = timeout
+        scheduled = [(fault.effect, fault.time) for fault in faults]
         self._node_faults = [
-            (fault.effect, fault.time) for fault in faults if isinstance(fault.time, NodeActivations)
+            (effect, time) for effect, time in scheduled if isinstance(time, NodeActivations)
         ]
-        self._time_faults = [
-            (fault.effect, fault.time) for fault in faults if isinstance(fault.time, TimeSpan)
-        ]
+        self._time_faults = [(effect, time) for effect, time in scheduled if isinstance(time, TimeSpan)]
         self._activation_counts: Counter[int] = Counter()
         self._occurrences: list[Occurrence] = []
         self._cell = intercept(inner.cell, self._intercept_access, _INTERCEPTED_ROLES)
@@ -70,7 +70,7 @@ class FaultyCell(CellWrapper):
     @property
     def world(self) -> WorldAccess:
         """Access to the world of the cell."""
-        return self._scene.world
+        return self._context.world
 
     def on_event(self, timed: TimedEvent) -> None:
         """Begin or end the faults of a node; an observer of the run on this cell."""
@@ -78,9 +78,10 @@ class FaultyCell(CellWrapper):
             case NodeStarted(node, _, item):
                 for index, (effect, time) in enumerate(self._node_faults):
                     if time.matches(node):
+                        # Each fault counts the activations of all nodes that match its pattern.
                         self._activation_counts[index] += 1
                         if time.includes(self._activation_counts[index]):
-                            self._begin_occurrence(Occurrence(effect, self._scene, node, item))
+                            self._begin_occurrence(Occurrence(effect, self._context, node, item))
             case NodeEnded(node):
                 self._end_occurrences(lambda occurrence: occurrence.node == node)
 
@@ -101,21 +102,21 @@ class FaultyCell(CellWrapper):
         """Advance the cell by one control step, and inject the faults that are due.
 
         Raises:
-            Fault: The timeout has expired. Raised only once, so that the arm can brake afterwards.
+            Fault: The timeout has expired. A later call does not raise it again, so that the arm can brake.
         """
         self.inner.advance()
         self._update_occurrences()
-        if self._scene.now > self._timeout:
+        if self._context.now > self._timeout:
             timeout, self._timeout = self._timeout, math.inf
             raise Fault(f"the mission has not ended after {timeout:g} s on its clock")
 
     def _update_occurrences(self) -> None:
         """Begin and end the faults with a time span, and run the actions of the active faults."""
-        now = self._scene.now + TIME_TOLERANCE
-        due = [(effect, time) for effect, time in self._time_faults if time.start <= now]
+        now = self._context.now + TIME_TOLERANCE
+        due_faults = [(effect, time) for effect, time in self._time_faults if time.start <= now]
         self._time_faults = [(effect, time) for effect, time in self._time_faults if time.start > now]
-        for effect, time in due:
-            self._begin_occurrence(Occurrence(effect, self._scene, end=time.end))
+        for effect, time in due_faults:
+            self._begin_occurrence(Occurrence(effect, self._context, end=time.end))
         self._end_occurrences(lambda occurrence: occurrence.end <= now)
         for occurrence in self._occurrences:
             occurrence.run_action()
@@ -124,8 +125,8 @@ class FaultyCell(CellWrapper):
         self._occurrences.append(occurrence)
         occurrence.run_action()
 
-    def _end_occurrences(self, is_ending: Callable[[Occurrence], bool]) -> None:
-        for occurrence in filter(is_ending, list(self._occurrences)):
+    def _end_occurrences(self, has_ended: Callable[[Occurrence], bool]) -> None:
+        for occurrence in filter(has_ended, list(self._occurrences)):
             occurrence.is_over = True
             self._occurrences.remove(occurrence)
 
@@ -139,9 +140,9 @@ class FaultyCell(CellWrapper):
                     proceed = partial(interceptor, proceed, occurrence, *occurrence.effect.arguments)
         result = proceed()
         if access.name == "arm.start":
-            self._scene.motion = self._scene.now, access.all_arguments[0]
+            self._context.motion = access.all_arguments[0], self._context.now
         elif access.name == "arm.stop":
-            self._scene.motion = None
+            self._context.motion = None
         return result
 
 

@@ -1,12 +1,13 @@
 """Faults of arm, tool, camera, localizer, table and operator.
 
-Some effects occur once; every other effect lasts until its fault ends.
+An effect that does not occur "once" lasts until the end of the fault.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ def seal_breaks_over_wrong_bin() -> Effect:
 
 def tool_sticks() -> Effect:
     """Return an effect: the object sticks to the opened tool, and `Release` fails with `stuck`."""
-    return Effect("tool_sticks", interceptors={"open": _keep_held_object})
+    return Effect("tool_sticks", interceptors={"open": _prevent_opening})
 
 
 def arm_collides(obstacle: str = "something", fraction: float = 0.5) -> Effect:
@@ -54,7 +55,7 @@ def arm_collides(obstacle: str = "something", fraction: float = 0.5) -> Effect:
     Raises:
         InputError: The fraction is not more than 0 and less than 1.
     """
-    return Effect("arm_collides", _block_arm, arguments=(obstacle, validate_fraction(fraction)))
+    return Effect("arm_collides", _collide_arm, arguments=(obstacle, validate_fraction(fraction)))
 
 
 def no_path(*, is_blocked: bool = False) -> Effect:
@@ -68,8 +69,8 @@ def no_path(*, is_blocked: bool = False) -> Effect:
 
 def workspace_occluded() -> Effect:
     """Return an effect: the arm occludes the table, and `Detect` fails with `hidden`, or detects nothing."""
-    interceptors = {"sees_table": _return_constant, "capture": _occlude_frame}
-    return Effect("workspace_occluded", interceptors=interceptors, arguments=(False,))
+    hide_table = partial(_return_constant, answer=False)
+    return Effect("workspace_occluded", interceptors={"sees_table": hide_table, "capture": _occlude_frame})
 
 
 def no_depth() -> Effect:
@@ -93,61 +94,63 @@ def operator_asks_rescan() -> Effect:
 
 
 def _return_constant(proceed: Callable[[], object], occurrence: Occurrence, answer: object) -> object:
-    """Return `answer` without a call of the method of the cell."""
+    """Return `answer` without calling the method of the cell."""
     del proceed
     occurrence.emit_event()
     return answer
 
 
-def _keep_held_object(proceed: Callable[[], None], occurrence: Occurrence) -> None:
-    if (held := occurrence.scene.world.held_object) is None:
+def _prevent_opening(proceed: Callable[[], None], occurrence: Occurrence) -> None:
+    """Open the tool only if it is empty."""
+    held_object = occurrence.context.world.held_object
+    if held_object is None:
         proceed()
     else:
-        occurrence.emit_event(held)
+        occurrence.emit_event(held_object)
 
 
 def _break_seal(occurrence: Occurrence, fraction: float) -> bool:
-    world = occurrence.scene.world
-    if (held := world.held_object) is None or occurrence.scene.motion_progress < fraction:
+    context, held_object = occurrence.context, occurrence.context.world.held_object
+    if held_object is None or context.motion_progress < fraction:
         return False
-    occurrence.emit_event(held)
-    world.break_seal()
+    occurrence.emit_event(held_object)
+    context.world.break_seal()
     return True
 
 
 def _break_seal_over_wrong_bin(occurrence: Occurrence) -> bool:
-    scene, held = occurrence.scene, occurrence.scene.world.held_object
-    if held is None or scene.motion_progress == 0.0:
+    context, held_object = occurrence.context, occurrence.context.world.held_object
+    if held_object is None or context.motion_progress == 0.0:
         return False
-    right_bins = scene.cell.routes.get(held.label, ())
-    bins = scene.cell.bins.items()
-    is_over_wrong_bin = any(name not in right_bins and bin.contains(held.position) for name, bin in bins)
+    right_bins = context.cell.routes.get(held_object.label, ())
+    wrong_bins = [bin for name, bin in context.cell.bins.items() if name not in right_bins]
+    is_over_wrong_bin = any(bin.contains(held_object.position) for bin in wrong_bins)
     return is_over_wrong_bin and _break_seal(occurrence, 0.0)
 
 
-def _block_arm(occurrence: Occurrence, obstacle: str, fraction: float) -> bool:
-    if occurrence.scene.motion_progress < fraction:
+def _collide_arm(occurrence: Occurrence, obstacle: str, fraction: float) -> bool:
+    if occurrence.context.motion_progress < fraction:
         return False
     occurrence.emit_event()
-    occurrence.scene.world.block_arm(f"the arm ran into {obstacle}")
+    occurrence.context.world.simulate_collision(f"the arm ran into {obstacle}")
     return True
 
 
 def _bump_table(occurrence: Occurrence) -> bool:
     occurrence.emit_event()
-    occurrence.scene.cell.ledger.invalidate_positions()
+    occurrence.context.cell.ledger.invalidate_positions()
     return True
 
 
-def _occlude_frame(proceed: Callable[[], Frame], occurrence: Occurrence, answer: object) -> Frame:
+def _occlude_frame(proceed: Callable[[], Frame], occurrence: Occurrence) -> Frame:
     """Return the captured frame with all pixels marked as occluded by the arm."""
-    del answer
     occurrence.emit_event()
     frame = proceed()
     return replace(frame, visible=np.zeros_like(frame.visible))
 
 
 def _raise_no_depth(proceed: Callable[[], Any], occurrence: Occurrence) -> Any:
+    """Raise NoDepth instead of localizing the detection."""
     del proceed
     occurrence.emit_event()
     raise NoDepth("the frame has no depth there (injected fault)")
@@ -155,7 +158,12 @@ def _raise_no_depth(proceed: Callable[[], Any], occurrence: Occurrence) -> Any:
 
 @dataclass(frozen=True)
 class FailingPlanning:
-    """A planning that takes as long as `planning`, and then finds no motion; implements `Planning`."""
+    """A planning that ends without a motion; implements `Planning`.
+
+    Attributes:
+        planning: The planning without the fault, which determines the time of the end.
+        is_blocked: True if the planning fails with Blocked; False if it fails with Unreachable.
+    """
 
     planning: Planning
     is_blocked: bool

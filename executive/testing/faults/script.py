@@ -1,4 +1,4 @@
-"""Times of the faults of a script: during nodes, in random activations, or in a time span."""
+"""Faults with their times: in activations of a node, in random activations, or in a time span."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from executive.testing.faults.effect import Effect
 
 @dataclass(frozen=True)
 class NodeActivations:
-    """Activations of nodes, from the start to the end of a node, in which a fault occurs.
+    """Activations of nodes in which a fault occurs; an activation lasts from the start to the end of a node.
 
     Attributes:
         pattern: Pattern that the path of the node matches; `*` matches any text, also with `/`.
-        nth: Numbers of activations, counted from 1 over all matching nodes; empty: all activations.
+        numbers: Numbers of the activations, counted from 1 over all matching nodes; empty: all activations.
         probability: Probability of the fault in each of these activations, 0 to 1.
         seed: Random seed, which determines the activations.
     """
 
     pattern: str
-    nth: tuple[int, ...] = ()
+    numbers: tuple[int, ...] = ()
     probability: float = 1.0
     seed: int = 0
 
@@ -35,14 +35,14 @@ class NodeActivations:
 
     def includes(self, number: int) -> bool:
         """Return True if the fault occurs in the activation with this number, from 1."""
-        if self.nth and number not in self.nth:
+        if self.numbers and number not in self.numbers:
             return False
         return float(np.random.default_rng([self.seed, number]).random()) < self.probability
 
 
 @dataclass(frozen=True)
 class TimeSpan:
-    """Time span on the run's clock in which a fault occurs: from `start`, until before `end` [s]."""
+    """Time span on the run's clock of a fault, from `start` (included) to `end` (excluded) [s]."""
 
     start: float
     end: float
@@ -56,21 +56,21 @@ class ScheduledFault:
     time: NodeActivations | TimeSpan
 
 
-def during(pattern: str, effect: Effect, *, nth: int | Collection[int] = ()) -> ScheduledFault:
+def during(pattern: str, effect: Effect, *, activations: int | Collection[int] = ()) -> ScheduledFault:
     """Return a fault that lasts while a node runs.
 
     Args:
         pattern: Pattern that the path of the node matches, for instance `*/Grasp`.
         effect: Effect of the fault.
-        nth: Numbers of activations, counted from 1 over all matching nodes; empty: all activations.
+        activations: One or more numbers of activations, counted from 1 over all matching nodes; empty: all.
 
     Raises:
         InputError: A number is less than 1.
     """
-    activation_numbers = (nth,) if isinstance(nth, int) else tuple(nth)
-    if any(number < 1 for number in activation_numbers):
-        raise InputError(f"the number of an activation must be at least 1, not {nth}")
-    return ScheduledFault(effect, NodeActivations(pattern, activation_numbers))
+    numbers = (activations,) if isinstance(activations, int) else tuple(activations)
+    if any(number < 1 for number in numbers):
+        raise InputError(f"the number of an activation must be at least 1, not {activations}")
+    return ScheduledFault(effect, NodeActivations(pattern, numbers))
 
 
 def with_probability(probability: float, pattern: str, effect: Effect, *, seed: int) -> ScheduledFault:
@@ -91,7 +91,7 @@ def with_probability(probability: float, pattern: str, effect: Effect, *, seed: 
 
 
 def between(start: float, end: float, effect: Effect) -> ScheduledFault:
-    """Return a fault that lasts from `start` until before `end`, times on the run's clock [s].
+    """Return a fault that lasts from `start` (included) to `end` (excluded) on the run's clock [s].
 
     Raises:
         InputError: `start` is negative, or not before `end`.
@@ -102,5 +102,5 @@ def between(start: float, end: float, effect: Effect) -> ScheduledFault:
 
 
 def after(start: float, effect: Effect) -> ScheduledFault:
-    """Return a fault that lasts from `start`, a time on the run's clock [s], until the end of the run."""
+    """Return a fault that lasts from `start` on the run's clock [s] until the end of the run."""
     return between(start, math.inf, effect)

@@ -1,4 +1,4 @@
-"""Access to the world of a simulated cell; the only module of fault scripts that imports the simulator."""
+"""Access to the world of a simulated cell, in a separate module because it imports the simulator."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.geometry import Pose
 from executive.testing.faults.world_access import TrueObject, WorldAccess
 
 SETTLING_STEPS = 240
-"""Number of control steps in which arm and displaced objects come to rest, 1 s."""
+"""Number of control steps until arm and displaced objects are at rest; 1 s."""
 
 
 class SimWorldAccess(WorldAccess):
@@ -53,12 +53,12 @@ class SimWorldAccess(WorldAccess):
         """Break the seal of the tool."""
         self._tool.break_seal()
 
-    def block_arm(self, message: str) -> None:
-        """Let the arm collide; `message` is the reported cause."""
+    def simulate_collision(self, message: str) -> None:
+        """Simulate a collision of the arm; `message` is the reported cause."""
         self._arm.run_into(message)
 
     def settle(self) -> None:
-        """Simulate one second that does not belong to a run."""
+        """Simulate `SETTLING_STEPS` control steps between two runs."""
         self._world.is_idle = True
         for _ in range(SETTLING_STEPS):
             self._workcell.advance()

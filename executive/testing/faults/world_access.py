@@ -21,7 +21,7 @@ class TrueObject:
     """True state of an object.
 
     Attributes:
-        body: Id of the object in a simulated world; the `FakeObject` of a fake world.
+        body: Identity of the object: a body id in a simulated world, a `FakeObject` in a fake world.
         label: Class of the object.
         position: Centre of the object `(3,)` [m].
     """
@@ -32,7 +32,7 @@ class TrueObject:
 
 
 class WorldAccess(Protocol):
-    """Reads and changes the true state of the world of a cell, which skills cannot do."""
+    """Access of fault scripts to the true state of the world of a cell; skills have no such access."""
 
     @property
     def objects(self) -> Sequence[TrueObject]:
@@ -43,19 +43,19 @@ class WorldAccess(Protocol):
         """The object at the tool, or None."""
 
     def remove(self, true_object: TrueObject) -> None:
-        """Remove an object from the world, released if it is held."""
+        """Remove an object from the world; a held object is released first."""
 
     def move(self, true_object: TrueObject, displacement: tuple[float, float]) -> None:
-        """Displace an object by `(x, y)` [m], released if it is held; the object is at rest afterwards."""
+        """Displace an object by `(x, y)` [m]; a held object is released first."""
 
     def break_seal(self) -> None:
         """Break the seal of the tool; a held object falls."""
 
-    def block_arm(self, message: str) -> None:
-        """Let the arm collide: it brakes and reports `message` as the cause."""
+    def simulate_collision(self, message: str) -> None:
+        """Simulate a collision: the arm brakes and reports `message` as the cause."""
 
     def settle(self) -> None:
-        """Let the arm and the objects come to rest; the elapsed time belongs to no run."""
+        """Let the arm and the objects come to rest between two runs."""
 
     def release_if_held(self, true_object: TrueObject) -> None:
         """Break the seal of the tool if the tool holds this object."""
@@ -77,8 +77,8 @@ class FakeWorldAccess(WorldAccess):
     @property
     def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
-        held = self._fake.world.held_object
-        return None if held is None else _describe(held)
+        held_object = self._fake.world.held_object
+        return None if held_object is None else _describe(held_object)
 
     def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world."""
@@ -95,8 +95,8 @@ class FakeWorldAccess(WorldAccess):
         """Break the seal of the tool."""
         self._fake.tool.break_seal()
 
-    def block_arm(self, message: str) -> None:
-        """Let the arm collide; `message` is the reported cause."""
+    def simulate_collision(self, message: str) -> None:
+        """Simulate a collision of the arm; `message` is the reported cause."""
         self._fake.arm.run_into(message)
 
     def settle(self) -> None:

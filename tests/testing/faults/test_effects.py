@@ -61,27 +61,69 @@ def labels(cell: Any) -> list[str]:
 
 
 MISSIONS: list[tuple[ScheduledFault, str, list[str], str, int]] = [
-    (during("*/Grasp", effects.seal_fails(), nth=2), "*/Grasp", ["missed"], "SUCCESS", 0),
-    (during("*/Transit", effects.seal_breaks(), nth=1), "*/Transit", ["dropped"], "SUCCESS", 0),
-    (during("*/Release", effects.tool_sticks(), nth=(2, 3, 4)), "*/Release", ["stuck"] * 3, "FAILURE", 5),
-    (during("*/Approach", effects.arm_collides("a hand"), nth=2), "*/Approach", ["blocked"], "SUCCESS", 0),
-    (during("tree/look/*/Detect", effects.detector_dead(), nth=1), "*/Detect", ["unavailable"], "SUCCESS", 0),
-    (during("*/Transit", effects.object_removed(), nth=2), "*/Transit", ["dropped"], "FAILURE", 0),
+    (during("*/Grasp", effects.seal_fails(), activations=2), "*/Grasp", ["missed"], "SUCCESS", 0),
+    (during("*/Transit", effects.seal_breaks(), activations=1), "*/Transit", ["dropped"], "SUCCESS", 0),
+    (
+        during("*/Release", effects.tool_sticks(), activations=(2, 3, 4)),
+        "*/Release",
+        ["stuck"] * 3,
+        "FAILURE",
+        5,
+    ),
+    (
+        during("*/Approach", effects.arm_collides("a hand"), activations=2),
+        "*/Approach",
+        ["blocked"],
+        "SUCCESS",
+        0,
+    ),
+    (
+        during("tree/look/*/Detect", effects.detector_dead(), activations=1),
+        "*/Detect",
+        ["unavailable"],
+        "SUCCESS",
+        0,
+    ),
+    (during("*/Transit", effects.object_removed(), activations=2), "*/Transit", ["dropped"], "FAILURE", 0),
 ]
 """A fault, a pattern of nodes, their failures, the status of sort_overhead, and what it rejects."""
 MORE: list[tuple[ScheduledFault, str, list[str], str, int]] = [
     (
-        during("*/Transit", effects.arm_collides(), nth=(1, 2, 3)),
+        during("*/Transit", effects.arm_collides(), activations=(1, 2, 3)),
         "*/Transit",
         ["blocked"] * 3,
         "INCOMPLETE",
         1,
     ),
-    (during("*/Approach", effects.no_path(), nth=2), "*/Approach", ["unreachable"], "INCOMPLETE", 1),
-    (during("tree/look/*/Detect", effects.detector_unsure(), nth=1), "*/Detect", ["unsure"], "SUCCESS", 0),
-    (during("tree/look/*/Detect", effects.workspace_occluded(), nth=1), "*/Detect", ["hidden"], "SUCCESS", 0),
-    (during("*/watch/*/Localize", effects.no_depth(), nth=1), "*/Localize", ["no_depth"], "SUCCESS", 0),
-    (during("*/watch/*/Localize", effects.table_bumped(), nth=1), "*/Localize", ["stale"], "SUCCESS", 0),
+    (during("*/Approach", effects.no_path(), activations=2), "*/Approach", ["unreachable"], "INCOMPLETE", 1),
+    (
+        during("tree/look/*/Detect", effects.detector_unsure(), activations=1),
+        "*/Detect",
+        ["unsure"],
+        "SUCCESS",
+        0,
+    ),
+    (
+        during("tree/look/*/Detect", effects.workspace_occluded(), activations=1),
+        "*/Detect",
+        ["hidden"],
+        "SUCCESS",
+        0,
+    ),
+    (
+        during("*/watch/*/Localize", effects.no_depth(), activations=1),
+        "*/Localize",
+        ["no_depth"],
+        "SUCCESS",
+        0,
+    ),
+    (
+        during("*/watch/*/Localize", effects.table_bumped(), activations=1),
+        "*/Localize",
+        ["stale"],
+        "SUCCESS",
+        0,
+    ),
 ]
 
 
@@ -101,8 +143,8 @@ def test_a_mission_deals_with_it_and_its_books_are_right(
 
 def test_an_operator_wants_something_else_first() -> None:
     script = [
-        during("*/AwaitRequest", effects.operator_asks_rescan(), nth=1),
-        during("*/AwaitRequest", effects.operator_quits(), nth=3),
+        during("*/AwaitRequest", effects.operator_asks_rescan(), activations=1),
+        during("*/AwaitRequest", effects.operator_quits(), activations=3),
     ]
     result = run_mission("pick_on_request", requests=["cube", "cube"], faults=script)
     assert result.list_failure_reasons("*/AwaitRequest") == ["rescan", "quit"]

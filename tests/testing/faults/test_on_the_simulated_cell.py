@@ -58,7 +58,7 @@ def holding(cell: SimCell) -> bool:
 
 @pytest.mark.slow
 def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again(watched: Watched) -> None:
-    result = watched.run(during("*/Transit", effects.seal_breaks(), nth=3), places)
+    result = watched.run(during("*/Transit", effects.seal_breaks(), activations=3), places)
     (fault,) = result.list_injected_faults()
     hung = watched.seen["FaultInjected"]
     fallen = watched.seen["SelectTarget.unseen"]
@@ -72,19 +72,19 @@ def test_when_a_seal_breaks_in_mid_carry_the_object_falls_and_is_picked_up_again
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["seal_breaks", "arm_collides", "no_path"])
 def test_what_falls_or_is_put_down_is_not_taken_for_something_else(name: str) -> None:
-    script = [during("*/Transit", getattr(effects, name)(), nth=2)]
+    script = [during("*/Transit", getattr(effects, name)(), activations=2)]
     assert run_mission("sort_overhead", make_oracle_kind(), faults=script).agrees
 
 
 def test_what_is_taken_out_of_the_tool_is_parted_from_it_first(watched: Watched) -> None:
-    result = watched.run(during("*/Transit", effects.object_removed(), nth=2), holding)
+    result = watched.run(during("*/Transit", effects.object_removed(), activations=2), holding)
     assert (watched.seen["FaultInjected"], watched.seen["dropped"]) == (True, False)
     assert (result.reason, result.items["lost"], result.agrees) == ("lost", 1, True)
 
 
 @pytest.mark.slow
 def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
-    result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), nth=2), places)
+    result = watched.run(during("*/Approach", effects.object_moved((0.0, 0.06)), activations=2), places)
     (fault,) = result.list_injected_faults()
     before, felt = watched.seen["FaultInjected"], watched.seen["no_contact"]
     assert isinstance(before, dict) and isinstance(felt, dict)
@@ -95,7 +95,7 @@ def test_what_is_moved_is_found_where_it_is_now(watched: Watched) -> None:
 
 @pytest.mark.slow
 def test_an_arm_that_runs_into_something_brakes(watched: Watched) -> None:
-    hand = during("*/Approach", effects.arm_collides("a hand"), nth=2)
+    hand = during("*/Approach", effects.arm_collides("a hand"), activations=2)
     result = watched.run(hand, lambda cell: cell.cell.arm.at_rest)
     assert (watched.seen["FaultInjected"], watched.seen["blocked"]) == (False, True)
     failed = next(one for one in result.events if getattr(one.event, "reason", "") == "blocked")

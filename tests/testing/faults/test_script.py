@@ -47,7 +47,7 @@ def slipped(result: MissionResult) -> list[int]:
 
 @pytest.mark.parametrize(("nth", "missed"), [((1, 3), [1, 3]), ((), [1, 2, 3])])
 def test_it_happens_in_the_activations_it_is_meant_for(nth: int | Sequence[int], missed: list[int]) -> None:
-    result = sorted_with(during("*/Grasp", SLIPS, nth=nth))
+    result = sorted_with(during("*/Grasp", SLIPS, activations=nth))
     assert slipped(result)[: len(missed)] == missed
     assert len(slipped(result)) == len(missed) or nth == ()
     assert len(result.list_injected_faults()) == len(slipped(result))
@@ -84,7 +84,7 @@ def test_a_chance_is_met_as_often_as_it_says(probability: float, seed: int) -> N
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: during("*", SLIPS, nth=0), "the number of an activation must be at least 1, not 0"),
+        (lambda: during("*", SLIPS, activations=0), "the number of an activation must be at least 1, not 0"),
         (lambda: between(5, 5, SLIPS), "0 <= start < end, not 5 s and 5 s"),
         (lambda: after(-1, SLIPS), "not -1 s and inf s"),
         (lambda: with_probability(1.5, "*", SLIPS, seed=0), "a probability must be 0 to 1, not 1.5"),
@@ -103,7 +103,7 @@ def test_a_script_that_makes_no_sense_is_refused(make, sentence: str) -> None:
 
 def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again() -> None:
     script = [
-        during("*/Grasp", SLIPS, nth=2),
+        during("*/Grasp", SLIPS, activations=2),
         between(4.0, 9.0, effects.detector_hangs()),
         after(1.0, effects.object_moved((0.1, 0))),
     ]
@@ -111,7 +111,9 @@ def test_a_script_is_a_value_that_can_be_sent_to_another_process_and_used_again(
 
 
 def test_a_fault_of_a_node_is_recorded_with_node_item_and_object() -> None:
-    result = sorted_with(during("*/Transit", effects.seal_breaks(), nth=1), between(500.0, 600.0, SLIPS))
+    result = sorted_with(
+        during("*/Transit", effects.seal_breaks(), activations=1), between(500.0, 600.0, SLIPS)
+    )
     (fault,) = result.list_injected_faults()
     assert (fault.name, fault.node.rpartition("/")[2]) == ("seal_breaks", "Transit")
     assert fault.item.startswith(f"{fault.object}-") and len(fault.position) == 3
