@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -69,8 +68,7 @@ def no_path(*, is_blocked: bool = False) -> Effect:
 
 def workspace_occluded() -> Effect:
     """Return an effect: the arm occludes the table, and `Detect` fails with `hidden`, or detects nothing."""
-    hide_table = partial(_return_constant, answer=False)
-    return Effect("workspace_occluded", interceptors={"sees_table": hide_table, "capture": _occlude_frame})
+    return Effect("workspace_occluded", interceptors={"sees_table": _hide_table, "capture": _occlude_frame})
 
 
 def no_depth() -> Effect:
@@ -140,6 +138,10 @@ def _bump_table(occurrence: Occurrence) -> bool:
     occurrence.emit_event()
     occurrence.context.cell.ledger.invalidate_positions()
     return True
+
+
+def _hide_table(proceed: Callable[[], object], occurrence: Occurrence) -> object:
+    return _return_constant(proceed, occurrence, False)
 
 
 def _occlude_frame(proceed: Callable[[], Frame], occurrence: Occurrence) -> Frame:
