@@ -19,7 +19,7 @@ from executive.cli.skills import Declaration, collect_declarations
 from executive.mission.findings import MEANING_BY_CODE
 from executive.mission.model import grammar
 from executive.mission.parse.control import find_inner_keys
-from executive.mission.schema.types import Json, make_type_schema
+from executive.mission.schema.types import Schema, make_type_schema
 from executive.mission.text.file_search import list_shipped_missions
 from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.detectors.rfdetr import RfdetrOptions
@@ -176,7 +176,7 @@ def _model(model: type[Section]) -> Iterator[str]:
     schema = make_type_schema(model)
     paths: dict[str, list[str]] = {}
 
-    def visit(part: Json, prefix: str) -> None:
+    def visit(part: Schema, prefix: str) -> None:
         for name, key in part["properties"].items():
             for one in key.get("anyOf", [key]):
                 named = one.get("additionalProperties")
@@ -196,7 +196,7 @@ def _model(model: type[Section]) -> Iterator[str]:
         yield f"{heading}{section['description']}\n\n{_table(KEYS, rows)}"
 
 
-def _value(schema: Json, plural: str = "") -> str:
+def _value(schema: Schema, plural: str = "") -> str:
     """Return a JSON schema in words."""
     if "anyOf" in schema:
         return ", or ".join(_value(one, plural) for one in schema["anyOf"] if one.get("type") != "null")

@@ -15,7 +15,7 @@ from executive.cell.protocols import Localizer
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
-from executive.mission.findings import list_choices
+from executive.mission.findings import suggest_choice
 from executive.perception.detectors.detector_registry import find_detector_problems
 from executive.perception.envelope.fingerprint import compute_fingerprint
 from executive.perception.envelope.measurement import (
@@ -117,7 +117,7 @@ def list_detectors(
     for cell_file, cell in cells.items():
         configs = model_configs or dict(cell.detectors)
         if name and name not in configs:
-            hint = list_choices(name, configs, "Its detectors")
+            hint = suggest_choice(name, configs, "Its detectors")
             raise InputError(f'the cell {cell.cell} has no detector "{name}". {hint}')
         yield DetectorUnderTest(cell, configs, name or next(iter(configs)), cell_file.parent)
 

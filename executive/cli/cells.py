@@ -37,7 +37,7 @@ def find_cell(name: str) -> Path:
         InputError: Neither a file nor a shipped cell has this name.
     """
     from executive.errors import InputError
-    from executive.mission.findings import list_choices
+    from executive.mission.findings import suggest_choice
     from executive.mission.text.file_search import get_shipped_folder
 
     path = Path(name)
@@ -47,5 +47,5 @@ def find_cell(name: str) -> Path:
     shipped = {file.stem: file for file in sorted(folder.glob("*.yaml"))}
     if name in shipped:
         return shipped[name]
-    hint = list_choices(name, shipped, "Shipped cells")
+    hint = suggest_choice(name, shipped, "Shipped cells")
     raise InputError(f'there is neither a cell file nor a shipped cell "{name}". {hint}')

@@ -41,12 +41,12 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
     """
     with keep_stdout_clean():
         from executive.errors import InputError
-        from executive.mission.findings import list_choices
+        from executive.mission.findings import suggest_choice
         from executive.plugins import load_skills
 
         skills = load_skills()
         if name is not None and name not in skills:
-            raise InputError(f'there is no skill "{name}". {list_choices(name, skills, "There are")}')
+            raise InputError(f'there is no skill "{name}". {suggest_choice(name, skills, "There are")}')
         if name is not None:
             skills = {name: skills[name]}
     if conform:

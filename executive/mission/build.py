@@ -50,7 +50,12 @@ def build_tree(
 
 @dataclass(frozen=True)
 class TreeBuilder:
-    """Builder of one tree; `matched_patterns` collects the keys of `substitutes` that match a skill node."""
+    """Builder of one tree.
+
+    Attributes:
+        substitutes: Skills that run in place of the mission's skills, by pattern of node paths.
+        matched_patterns: Patterns that have matched a skill node so far.
+    """
 
     skills: Mapping[str, type[Skill]]
     cell: Cell
@@ -68,9 +73,9 @@ class TreeBuilder:
                 return self._build_skill_leaf(context, node)
             case InnerNode():
                 return make_instance(node, context, self.build_node)
-            case UseNode(body=Node() as expanded):
-                body = self.build_node(expanded)
-                # A labelled use needs a node of its own, which has the label.
+            case UseNode(body=Node() as subtree_root):
+                body = self.build_node(subtree_root)
+                # The root of the subtree has its own label, so a sequence gets the label of the `use`.
                 root = self.node_classes[SEQUENCE_KEYWORD](context, do=(body,)) if node.label else body
                 root.subtrees = (node.name, *root.subtrees)
                 return root
@@ -78,16 +83,14 @@ class TreeBuilder:
 
     def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
         skill = self.skills[node.skill]
-        declared: dict[str, Param | Port] = {**skill.params, **skill.ports}
+        declarations: dict[str, Param | Port] = {**skill.params, **skill.ports}
+        types = {name: declaration.type for name, declaration in declarations.items()}
         wiring = Wiring(
-            constants={
-                name: convert_value(value.value, declared[name].type) for name, value in find_literals(node)
-            },
+            constants={name: convert_value(value.value, types[name]) for name, value in find_literals(node)},
             inputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.IN)},
             outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},
         )
-        executed_skill = self._find_substitute(node.path) or skill
-        return SkillLeaf(context, node.skill, executed_skill, wiring, self.cell)
+        return SkillLeaf(context, node.skill, self._find_substitute(node.path) or skill, wiring, self.cell)
 
     def _find_substitute(self, path: str) -> type[Skill] | None:
         matching = [pattern for pattern in self.substitutes if fnmatchcase(path, pattern)]

@@ -10,26 +10,26 @@ from functools import lru_cache
 from pathlib import Path
 
 from executive.errors import InputError, shorten_quotations
-from executive.mission.source import Mark
+from executive.mission.source import Span
 
 _MAX_EXCERPT_LENGTH = 140
 """Maximum number of characters of a source line in the text of a finding."""
 _MAX_ALTERNATIVES = 24
-"""Maximum number of allowed words that a hint lists."""
+"""Maximum number of allowed words in a hint."""
 MAX_PRINTED_FINDINGS = 50
-"""Maximum number of findings in a message; the message states the number of the others."""
+"""Maximum number of findings in a message, which states the number of omitted findings."""
 MAX_LISTED_FINDINGS = 1000
 """Maximum number of findings in the output of `--json`."""
 _SECRET_PATTERN = re.compile(
     r"(?i)(\b\w*(?:api_?key|token|secret|password|authorization)\w*[\"']?\s*[:=]\s*|://(?=\S+@)).*"
 )
-"""Name of a secret, such as `api_key:`, or `://` before a user name and `@`; with the rest of the line."""
+"""Matches `api_key:` and similar names, or `://` before a user name and `@`, up to the end of the line."""
 _CODES_FILE = Path(__file__).parent / "finding_codes.txt"
 MEANING_BY_CODE: Mapping[str, str] = dict(
     line.split(": ", 1) for line in _CODES_FILE.read_text(encoding="utf-8").splitlines()
 )
 """Meaning of each code of a finding, and the action to take."""
-RENAMED_KEYS = {
+NEW_KEY_BY_FORMER_KEY = {
     "aim": "max_position_std",
     "confused": "confusion_rate",
     "invented": "false_detections",
@@ -40,12 +40,12 @@ RENAMED_KEYS = {
     "overlooked": "max_miss_probability",
     "planning": "planning_time",
 }
-"""New names by the former names of keys in mission and cell files."""
+"""Renamed keys of mission and cell files."""
 _VALUE_CODES = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",
 })  # fmt: skip
-"""Codes of findings about a value: only the first finding of such a code is kept at each position."""
+"""Codes of findings about a value; `sort_findings` keeps one finding with these codes per position."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,7 @@ class Finding:
 
     @property
     def _excerpt_start(self) -> int:
+        """Index of the first character of `excerpt` in `shown_excerpt`."""
         return max(0, self.col - _MAX_EXCERPT_LENGTH // 2) if len(self.excerpt) > _MAX_EXCERPT_LENGTH else 0
 
     def __str__(self) -> str:
@@ -90,7 +91,7 @@ class Finding:
             number = f"{self.line:4d}"
             excerpt, caret_start = self.shown_excerpt, self.col - 1 - self._excerpt_start
             # Tabs are kept, so that the carets are aligned at any tab width.
-            indentation = "".join(c if c == "\t" else " " for c in excerpt[:caret_start])
+            indentation = re.sub(r"[^\t]", " ", excerpt[:caret_start])
             caret_count = max(1, min(self.length, len(excerpt) - caret_start))
             lines.append(f"{number} | {excerpt}")
             lines.append(f"{' ' * len(number)} | {indentation}{'^' * caret_count}")
@@ -113,45 +114,43 @@ class MissionError(InputError):
 
 
 def describe_findings(findings: Sequence[Finding]) -> list[str]:
-    """Return the texts of the first `MAX_PRINTED_FINDINGS` findings, and a line that counts the others."""
+    """Return the texts of the first `MAX_PRINTED_FINDINGS` findings, and the number of omitted findings."""
     texts = [str(finding) for finding in findings[:MAX_PRINTED_FINDINGS]]
-    others = len(findings) - len(texts)
-    return (
-        [*texts, f"and {others} more findings; `executive check --json` lists up to {MAX_LISTED_FINDINGS}"]
-        if others
-        else texts
-    )
+    if omitted_count := len(findings) - len(texts):
+        advice = f"`executive check --json` lists up to {MAX_LISTED_FINDINGS}"
+        texts.append(f"and {omitted_count} more findings; {advice}")
+    return texts
 
 
-def make_error(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
-    """Return an error at `mark`."""
-    return _make_finding("error", mark, code, message, hint)
+def make_error(span: Span, code: str, message: str, hint: str = "") -> Finding:
+    """Return an error at `span`."""
+    return _make_finding("error", span, code, message, hint)
 
 
-def make_warning(mark: Mark, code: str, message: str, hint: str = "") -> Finding:
-    """Return a warning at `mark`; a mission with warnings can run."""
-    return _make_finding("warning", mark, code, message, hint)
+def make_warning(span: Span, code: str, message: str, hint: str = "") -> Finding:
+    """Return a warning at `span`; a mission with warnings can run."""
+    return _make_finding("warning", span, code, message, hint)
 
 
-def _make_finding(severity: str, mark: Mark, code: str, message: str, hint: str) -> Finding:
+def _make_finding(severity: str, span: Span, code: str, message: str, hint: str) -> Finding:
     assert code in MEANING_BY_CODE, code
-    source = mark.source
-    excerpt = _mask_secrets(source.get_line(mark.line))
+    source = span.source
+    excerpt = _mask_secrets(source.get_line(span.line))
     message, hint = shorten_quotations(message), shorten_quotations(hint)
-    return Finding(source.path, mark.line, mark.col, severity, code, message, mark.length, hint, excerpt)
+    return Finding(source.path, span.line, span.col, severity, code, message, span.length, hint, excerpt)
 
 
 @lru_cache(maxsize=64)
 def _mask_secrets(line: str) -> str:
-    """Return a line of a file in which `***` replaces secrets."""
+    """Return a line with `***` in place of secrets; cached, because a long line may have many findings."""
     return _SECRET_PATTERN.sub(r"\1***", line)
 
 
 def sort_findings(findings: Iterable[Finding], first_path: str) -> tuple[Finding, ...]:
     """Return the findings sorted by file, line and column, without duplicates.
 
-    The findings of the file `first_path` come first. Two findings with the same position are duplicates if
-    their texts are equal, or if both have the same code of `_VALUE_CODES`.
+    The findings of the file `first_path` come first. Findings with the same position are duplicates if they
+    have the same text, or the same code of `_VALUE_CODES`.
     """
     unique: dict[tuple[str, int, int, str], Finding] = {}
     for finding in findings:
@@ -167,13 +166,19 @@ def find_similar_word(word: str, known_words: Iterable[str]) -> str | None:
     return words_by_lower_case[matches[0]] if matches else None
 
 
-def list_choices(word: str, known_words: Iterable[str], heading: str) -> str:
-    """Return a hint for a wrong `word`: its new name, or the most similar known word and the known words."""
-    known_words = list(known_words)
-    if (renamed := RENAMED_KEYS.get(word)) in known_words:
-        return f'The key is now called "{renamed}".'
-    similar = find_similar_word(word, known_words)
-    omitted_count = len(known_words) - _MAX_ALTERNATIVES
-    more = f" and {omitted_count} more" if omitted_count > 0 else ""
-    listed = f"{heading}: {', '.join(known_words[:_MAX_ALTERNATIVES]) or 'none'}{more}."
-    return f'Did you mean "{similar}"? {listed}' if similar else listed
+def suggest_word(value: object, allowed_words: Iterable[str]) -> str:
+    """Return a question with the allowed word that is most similar to `value`, in brackets, or ""."""
+    similar = find_similar_word(value, allowed_words) if isinstance(value, str) else None
+    return f' (did you mean "{similar}"?)' if similar else ""
+
+
+def suggest_choice(word: str, allowed_words: Iterable[str], heading: str) -> str:
+    """Return a hint for a wrong word: the new name of a renamed key, or the allowed words after `heading`."""
+    allowed_words = list(allowed_words)
+    if (new_key := NEW_KEY_BY_FORMER_KEY.get(word)) in allowed_words:
+        return f'The key is now called "{new_key}".'
+    similar = find_similar_word(word, allowed_words)
+    omitted_count = len(allowed_words) - _MAX_ALTERNATIVES
+    ending = f" and {omitted_count} more" if omitted_count > 0 else ""
+    choices = f"{heading}: {', '.join(allowed_words[:_MAX_ALTERNATIVES]) or 'none'}{ending}."
+    return f'Did you mean "{similar}"? {choices}' if similar else choices

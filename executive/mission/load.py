@@ -21,14 +21,14 @@ from executive.mission.model.node_paths import assign_paths
 from executive.mission.model.nodes import Node, UnknownNode
 from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import MissionFiles, RecordedCell, read_mission
-from executive.mission.parse.validate import find_mark
+from executive.mission.parse.validate import find_span
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
 from executive.skill import Skill
 from executive.tree.node_registry import load_control_nodes
 
-FindCellKind = Callable[[str], CellKind]
-"""Function from the name of a kind of cell to its class; raises InputError if it is not installed."""
+CellKindFinder = Callable[[str], CellKind]
+"""Function that returns the kind of cell with a name; raises InputError if the kind is not installed."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,8 @@ def load_mission(
     path: str | Path,
     skills: Mapping[str, type[Skill]],
     overrides: Mapping[str, str] | None = None,
-    find_cell_kind: FindCellKind | None = None,
-    cell: RecordedCell | None = None,
+    find_cell_kind: CellKindFinder | None = None,
+    recorded_cell: RecordedCell | None = None,
 ) -> LoadedMission:
     """Return a mission that has passed all checks.
 
@@ -83,58 +83,57 @@ def load_mission(
         path: A mission file, or the name of a shipped mission.
         skills: Installed skills by name.
         overrides: Values as text, by name of a param or by `cell.<key>.<key>` for a key of the cell.
-        find_cell_kind: Finds the kind of the cell, whose own checks are then included; None: no such checks.
-        cell: Cell that replaces the mission's cell, or None.
+        find_cell_kind: Returns the kind of the cell, which checks the cell; None omits these checks.
+        recorded_cell: Cell that replaces the cell file, or None.
 
     Raises:
-        MissionError: Mission or cell have errors; the exception contains every finding.
+        MissionError: The mission or the cell has errors; the exception contains every finding.
         InputError: The mission does not exist.
     """
-    file, node_classes = find_mission(path), load_control_nodes()
-    files = read_mission(file, overrides or {}, skills, node_classes, cell)
+    mission_path, node_classes = find_mission(path), load_control_nodes()
+    files = read_mission(mission_path, overrides or {}, skills, node_classes, recorded_cell)
     mission, config = files.mission, files.cell.config if files.cell else None
     findings = list(files.findings)
-    kind = _find_kind(files, find_cell_kind, findings)
+    kind = _find_cell_kind(files, find_cell_kind, findings)
     classes_by_detector, min_times = {}, None
     if kind is not None and files.cell is not None and files.cell_path is not None:
         folder = files.cell_path.parent
-        problems = kind.check(config, folder)
-        cell_findings = [files.cell.make_error(keys, "robot", text) for keys, text in problems]
+        errors = kind.check(config, folder)
+        cell_findings = [files.cell.make_error(keys, "robot", message) for keys, message in errors]
         findings += cell_findings
         classes_by_detector = dict(kind.labels(config, folder))
         min_times = None if cell_findings else kind.min_times(config)
     expanded = expand(mission, skills)
-    tree = assign_paths(expanded.tree or UnknownNode(files.source.make_mark(), ""))
+    tree = assign_paths(expanded.tree or UnknownNode(files.source.make_span(), label=""))
     context = CheckContext(
         mission, tree, expanded.unused_subtrees, skills, node_classes, config, classes_by_detector, min_times
     )
     findings += (*expanded.findings, *run_checks(context))
-    ordered = sort_findings(findings, files.source.path)
-    is_valid = expanded.tree is not None and all(finding.severity != "error" for finding in findings)
-    if config is None or files.cell_path is None or not is_valid:
-        raise MissionError(ordered)
+    has_errors = expanded.tree is None or any(finding.severity == "error" for finding in findings)
+    if config is None or files.cell_path is None or has_errors:
+        raise MissionError(sort_findings(findings, files.source.path))
     if kind is not None and files.cell is not None:
-        warnings = _find_unmeasured(files.cell, files.cell_path.parent)
-        ordered = sort_findings((*ordered, *warnings), files.source.path)
+        findings += _warn_about_unmeasured_detectors(files.cell, files.cell_path.parent)
     return LoadedMission(
-        mission, tree, config, files.source.text, file, files.cell_path, files.libraries,
-        find_unhandled_failures(context.flow_analysis), ordered, dict(overrides or {}),
+        mission, tree, config, files.source.text, mission_path, files.cell_path, files.libraries,
+        find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
+        dict(overrides or {}),
     )  # fmt: skip
 
 
-def _find_unmeasured(cell: CellFile, folder: Path) -> Iterator[Finding]:
+def _warn_about_unmeasured_detectors(cell: CellFile, folder: Path) -> Iterator[Finding]:
     """Yield a warning for each detector of the cell file in `folder` whose error rates were not measured."""
     assert cell.config is not None
     measurement_folders = (folder, get_shipped_folder() / "cells")
-    for keys, text in find_unmeasured_detectors(cell.config, folder, measurement_folders):
-        mark = find_mark(cell.root, keys, of_key=True) if cell.root else cell.source.make_mark()
-        yield make_warning(mark, "not-measured", text)
+    for keys, message in find_unmeasured_detectors(cell.config, folder, measurement_folders):
+        span = find_span(cell.root, keys, at_key=True) if cell.root else cell.source.make_span()
+        yield make_warning(span, "not-measured", message)
 
 
-def _find_kind(
-    files: MissionFiles, find_cell_kind: FindCellKind | None, findings: list[Finding]
+def _find_cell_kind(
+    files: MissionFiles, find_cell_kind: CellKindFinder | None, findings: list[Finding]
 ) -> CellKind | None:
-    """Return the kind of the mission's cell; None without `find_cell_kind`, or if it is not installed."""
+    """Return the kind of the mission's cell, or None if the kind is not installed or should not be found."""
     if files.cell is None or files.cell.config is None or find_cell_kind is None:
         return None
     try:

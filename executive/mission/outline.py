@@ -13,16 +13,17 @@ from executive.tree.node import ControlNode
 from executive.tree.skill_leaf import SkillLeaf
 
 _INDEX_PATTERN = re.compile(r"[0-9]+:")
-"""Index that precedes the name of a list element in a path, as in `2:try`."""
+"""Index before the name of a list element in a path: `2:` in `2:try`."""
 SKILL_KIND = "skill"
 """Value of `OutlineNode.kind` for leaves that run a skill."""
 
 
 @dataclass(frozen=True)
 class Connection:
-    """A port of a skill and the variable it is connected to.
+    """A port of a skill and the variable to which the port is connected.
 
     Attributes:
+        port, variable: Name of the port, and name of the variable.
         required: False for an input that has a default, which applies while the variable is unwritten.
     """
 
@@ -46,8 +47,8 @@ class OutlineNode:
         slot: Key of the parent under which the node is written: `do`, `recover`, `catch 1`; "" in a list.
         when: Failures after which a catch runs: `on Grasp.missed`; "" for other nodes.
         subtrees: Names of the subtrees with this node as root, the outermost first.
-        skill: Name of the skill; "" for a control node.
-        doc: Description of the skill, one sentence; like the fields below, empty for a control node.
+        skill: Name of the skill; for a control node, this field and all fields below are empty.
+        doc: Description of the skill, one sentence.
         params: Values of the skill's params.
         reads, writes: Connections of the skill's inputs and outputs.
         reasons: Reasons for which the skill may fail.
@@ -112,8 +113,9 @@ def _iterate_outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) 
     name = _format_name(relative_path)
     outline_node = OutlineNode(path, name, depth, detail, kind, title, slot, when, subtrees)
     if isinstance(node, SkillLeaf):
-        yield _add_skill(outline_node, node)
+        yield _describe_skill(outline_node, node)
     else:
+        # Other py_trees behaviours are drawn in the default style.
         style = node if isinstance(node, ControlNode) else ControlNode
         yield replace(outline_node, symbol=style.symbol, shape=style.shape)
     for child in node.children:
@@ -121,6 +123,7 @@ def _iterate_outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) 
 
 
 def _get_path(node: Behaviour) -> str:
+    """Return the path of a node; for a py_trees behaviour without path, its name."""
     return str(getattr(node, "path", node.name))
 
 
@@ -133,11 +136,11 @@ def _get_kind(node: Behaviour) -> str:
 
 def _format_name(relative_path: str) -> str:
     """Return the name of a node below its parent, from its path relative to the parent."""
-    slot, _, last = relative_path.rpartition("/")
-    last = _INDEX_PATTERN.sub("", last)
+    slot, _, name = relative_path.rpartition("/")
+    name = _INDEX_PATTERN.sub("", name)
     slot = slot.replace("/", " ")
-    # The path of a bare list in the second catch ends with "catch/2".
-    return f"{slot} {last}" if last.isdigit() else f"{slot}: {last}" if slot else last
+    # The path of a list without label in the second catch ends with "catch/2".
+    return f"{slot} {name}" if name.isdigit() else f"{slot}: {name}" if slot else name
 
 
 def _find_slot(
@@ -145,8 +148,8 @@ def _find_slot(
 ) -> str:
     """Return the key of the parent under which a node is written, or "".
 
-    The key is the relative path without the names of the node and its subtrees. The path of a bare list has
-    no such name. A key that paths omit is searched among the keys of the parent.
+    The key is the relative path without the names of the node and of its subtrees. Some keys are missing in
+    paths; a missing key is found by the children that the parent has under the key.
     """
     parts = [_INDEX_PATTERN.sub("", part) for part in relative_path.split("/")]
     if parts[-1] == title:
@@ -161,14 +164,13 @@ def _find_slot(
     return " ".join(parts)
 
 
-def _add_skill(node: OutlineNode, leaf: SkillLeaf) -> OutlineNode:
-    """Return `node` with the declarations of the skill of `leaf`, and with the variables of its ports."""
-    skill, wiring = leaf.skill_type, leaf.wiring
-    ports = skill.ports
+def _describe_skill(node: OutlineNode, leaf: SkillLeaf) -> OutlineNode:
+    """Return `node` with the declarations and connections of the skill of `leaf`."""
+    skill, wiring, ports = leaf.skill_type, leaf.wiring, leaf.skill_type.ports
 
     def make_connections(variables_by_port: Mapping[str, str]) -> tuple[Connection, ...]:
-        connected = variables_by_port.items()
-        return tuple(Connection(port, variable, ports[port].default is ...) for port, variable in connected)
+        pairs = variables_by_port.items()
+        return tuple(Connection(port, variable, ports[port].default is ...) for port, variable in pairs)
 
     return replace(
         node,

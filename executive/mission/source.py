@@ -1,4 +1,4 @@
-"""Source texts, and positions in them: file, line, column and length."""
+"""Source texts, and the spans of characters in a source text that findings underline."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ class Source:
     def _lines(self) -> list[str]:
         return self.text.splitlines()
 
-    def make_mark(self, line: int = 0, col: int = 0, length: int = 0) -> Mark:
-        """Return the position at `line` and `col`, counted from 1; line 0 denotes the whole text."""
-        return Mark(self, line, col, length)
+    def make_span(self, line: int = 0, col: int = 0, length: int = 0) -> Span:
+        """Return a span in this text; line 0 denotes the whole text."""
+        return Span(self, line, col, length)
 
 
 @dataclass(frozen=True)
-class Mark:
-    """Position in a source text, and the number of characters there that a finding underlines.
+class Span:
+    """Position of a part of a source text.
 
     Attributes:
         source: The text.
-        line: Line, counted from 1; 0 denotes the whole text.
-        col: Column, counted from 1, in characters.
-        length: Number of underlined characters.
+        line: First line, counted from 1; 0 denotes the whole text.
+        col: Column of the first character, counted from 1.
+        length: Number of characters; at most the first line is underlined.
     """
 
     source: Source

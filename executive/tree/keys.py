@@ -15,7 +15,7 @@ from pydantic import Field, TypeAdapter
 from executive.tree.failure import Reason
 
 Child: TypeAlias = Behaviour
-"""Child of a control node; in the checker and the diagnosis, a `StandIn` that represents the child."""
+"""Child of a control node; in the checker and the diagnosis, a `ChildPlaceholder` that represents it."""
 
 
 class VariableName(str):

@@ -20,7 +20,7 @@ from click.testing import CliRunner
 from executive.cli.main import main
 from executive.cli.streams import keep_stdout_clean
 from executive.mission.findings import MEANING_BY_CODE, Finding, MissionError
-from executive.mission.load import FindCellKind, load_mission
+from executive.mission.load import CellKindFinder, load_mission
 from executive.plugins import load_cell_kind, load_skills
 from executive.skill import Skill
 
@@ -65,7 +65,7 @@ def look(shared_cells: None) -> Look:
 
 
 def findings_of(
-    path: Path, skills: dict[str, type[Skill]], kind: FindCellKind = load_cell_kind
+    path: Path, skills: dict[str, type[Skill]], kind: CellKindFinder = load_cell_kind
 ) -> tuple[Finding, ...]:
     """Return the findings of a mission."""
     try:

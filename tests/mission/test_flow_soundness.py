@@ -20,6 +20,7 @@ from executive.mission.expand.expand import expand
 from executive.mission.flow.unhandled_failures import find_unhandled_failures
 from executive.mission.model.node_paths import assign_paths
 from executive.mission.parse.mission_file import parse_mission
+from executive.mission.parse.node_parser import NodeParser
 from executive.mission.source import Source
 from executive.mission.text.yaml_text import parse_yaml
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Skill, port
@@ -196,7 +197,8 @@ def sound(tree: Tree) -> CheckContext | None:
     source = Source("m.yaml", json.dumps({"mission": "m", "cell": "none", "tree": tree}))
     root, wrong = parse_yaml(source)
     assert root is not None
-    mission, malformed = parse_mission(root, {}, SKILLS, load_control_nodes())
+    parser = NodeParser([], SKILLS, load_control_nodes())
+    mission, malformed = parse_mission(root, {}, parser), parser.findings
     expanded = expand(mission, SKILLS)
     assert expanded.tree is not None
     case = CheckContext(
@@ -242,11 +244,11 @@ def hold_against_runs(tree: Tree, seed: int) -> None:
             assert halt(root) == []
             continue
         if root.status is Status.SUCCESS:
-            state = flow.result.success
+            state = flow.root_flow.success
             assert state is not None, "the checker says that this cannot succeed"
         else:
             failure = root.failure
-            ends = {(f.source, f.reason, f.origin): after for f, after in flow.result.failures.items()}
+            ends = {(f.source, f.reason, f.origin): after for f, after in flow.root_flow.failures.items()}
             key = failure.source, failure.reason, failure.path
             assert key in ends, f"the checker has not foreseen {key}"
             assert str(failure) in [

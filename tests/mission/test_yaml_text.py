@@ -51,8 +51,8 @@ def test_every_key_and_value_knows_its_place() -> None:
     assert isinstance(inner, YamlMapping)
     (entry,) = inner.entries
     assert isinstance(entry.value, YamlScalar)
-    assert (entry.key.mark.line, entry.key.mark.col, entry.key.mark.length) == (2, 3, 3)
-    assert (entry.value.mark.line, entry.value.mark.col, entry.value.mark.length) == (2, 8, 5)
+    assert (entry.key.span.line, entry.key.span.col, entry.key.span.length) == (2, 3, 3)
+    assert (entry.value.span.line, entry.value.span.col, entry.value.span.length) == (2, 8, 5)
 
 
 def test_a_billion_laughs_are_refused() -> None:

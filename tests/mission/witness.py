@@ -60,7 +60,7 @@ class Witness:
     def problems(self, run: Run, outcome: RunEnded) -> list[str]:
         """Return everything in the run and its outcome that must not be."""
         assert self.cell is not None
-        success, found = self._flow.result.success, list(dict.fromkeys(self._broken))
+        success, found = self._flow.root_flow.success, list(dict.fromkeys(self._broken))
         status, reason, node = outcome.status, outcome.reason, outcome.node
         if status == "FAULT":
             found.append(f"fault in {node}: {outcome.message}")

@@ -17,7 +17,7 @@ from executive.campaign.pool import run_jobs
 from executive.errors import InputError
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, UseNode
-from executive.mission.source import Mark
+from executive.mission.source import Span
 from executive.view.results.fault_results import Branch, FaultCampaignResults, Trial
 
 MAX_FAULTS_PER_RUN = 4
@@ -173,8 +173,8 @@ def find_branches(tree: Node, trials: Sequence[Trial]) -> tuple[Branch, ...]:
     A branch in a subtree that is used twice has two paths.
     """
     paths_by_key: dict[tuple[str, int, int, str], list[str]] = {}
-    for mark, name, node in _walk_branches(tree):
-        paths_by_key.setdefault((mark.source.path, mark.line, mark.col, name), []).append(_find_path(node))
+    for span, name, node in _walk_branches(tree):
+        paths_by_key.setdefault((span.source.path, span.line, span.col, name), []).append(_find_path(node))
     branches = []
     for (file, line, _, name), paths in paths_by_key.items():
         trial_count = sum(not trial.entered_paths.isdisjoint(paths) for trial in trials)
@@ -182,12 +182,12 @@ def find_branches(tree: Node, trials: Sequence[Trial]) -> tuple[Branch, ...]:
     return tuple(branches)
 
 
-def _walk_branches(tree: Node) -> Iterator[tuple[Mark, str, Node]]:
+def _walk_branches(tree: Node) -> Iterator[tuple[Span, str, Node]]:
     """Yield the position in the file, the name and the node of each branch."""
     for node in tree.walk():
         if isinstance(node, InnerNode):
             for name, child in make_inspection_instance(node).list_contingencies():
-                yield get_mission_node(child).mark, name, get_mission_node(child)
+                yield get_mission_node(child).span, name, get_mission_node(child)
 
 
 def _find_path(node: Node) -> str:

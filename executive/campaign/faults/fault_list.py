@@ -203,7 +203,7 @@ class _FaultLister:
         self, node: SkillNode, kind: str, occasion: Occasion, cause: str, fault: ScheduledFault | SkillFault
     ) -> PlannedFault:
         """Return a planned fault of a node that consists of one fault of the cell or of the skill."""
-        name, mission_line = node.label or node.skill, f"{node.mark.source.path}:{node.mark.line}"
+        name, mission_line = node.label or node.skill, f"{node.span.source.path}:{node.span.line}"
         planned_fault = PlannedFault(node.path, name, mission_line, kind, occasion, cause)
         planned_fault = replace(planned_fault, is_conditional=not self._has_run(node))
         if isinstance(fault, SkillFault):

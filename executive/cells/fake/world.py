@@ -11,7 +11,7 @@ from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.objects import ObjectClass
 from executive.errors import InputError
 from executive.geometry import Array
-from executive.mission.findings import list_choices
+from executive.mission.findings import suggest_choice
 
 MAX_SEAL_OFFSET = 0.012
 """Maximum horizontal distance between the cup and the sealing ring of an object for a seal [m]."""
@@ -71,7 +71,7 @@ class FakeWorld:
         if label not in self.classes:
             raise InputError(
                 f'no object of the class "{label}" can be put on the fake table. '
-                f"{list_choices(label, self.classes, 'The cell file has the classes')}"
+                f"{suggest_choice(label, self.classes, 'The cell file has the classes')}"
             )
         position = np.array([x, y, self.classes[label].height / 2])
         fake_object = FakeObject(label, position, [position.copy()])

@@ -14,8 +14,8 @@ from executive.cells.sim.arrangements import DAMAGED_MODEL, UNKNOWN_MODEL_COUNT
 from executive.cells.sim.camera import Light
 from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
 from executive.errors import InputError
-from executive.mission.findings import Finding, MissionError, list_choices, make_error, sort_findings
-from executive.mission.parse.validate import find_mark, validate
+from executive.mission.findings import Finding, MissionError, make_error, sort_findings, suggest_choice
+from executive.mission.parse.validate import find_span, validate
 from executive.mission.text.file_search import read_source
 from executive.mission.text.yaml_text import YamlNode, parse_yaml
 from executive.perception.camera_model import compute_calibration, compute_field_of_view
@@ -191,13 +191,13 @@ def _find_mismatches(scene: SceneConfig, root: YamlNode, config: CellConfig) -> 
     """Yield a finding for every value of a scene that the cell does not allow."""
     for label in scene.objects:
         if label not in (ANY_CLASS, *config.objects):
-            mark = find_mark(root, ("objects", label), of_key=True)
-            hint = list_choices(label, (*config.objects, ANY_CLASS), "Valid keys")
-            yield make_error(mark, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
+            span = find_span(root, ("objects", label), at_key=True)
+            hint = suggest_choice(label, (*config.objects, ANY_CLASS), "Valid keys")
+            yield make_error(span, "unknown-class", f'the cell {config.cell} has no class "{label}"', hint)
     name, camera = next(iter(config.cameras.items()))
     if any(scene.camera.orbit_deg) and camera.mount != "fixed":
         yield make_error(
-            find_mark(root, ("camera", "orbit_deg")), "wrong-value",
+            find_span(root, ("camera", "orbit_deg")), "wrong-value",
             f"camera.orbit_deg moves a fixed camera, and the camera {name} of the cell {config.cell} is "
             "mounted on the wrist; use shift and turn_deg",
         )  # fmt: skip
@@ -209,7 +209,7 @@ def _check_field_of_view(scene: SceneConfig, root: YamlNode, camera: CameraConfi
     declared = compute_field_of_view(compute_calibration(camera)[0], camera.height)
     if declared * scene.camera.fov_factor > MAX_FOV_DEG:
         yield make_error(
-            find_mark(root, ("camera", "fov_factor")), "out-of-range",
+            find_span(root, ("camera", "fov_factor")), "out-of-range",
             f"camera.fov_factor must be at most {MAX_FOV_DEG / declared:.2f}, because the declared field of "
             f"view is {declared:.1f} degrees, and no lens has more than {MAX_FOV_DEG:g}",
         )  # fmt: skip

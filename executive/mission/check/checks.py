@@ -9,7 +9,7 @@ from executive.mission.check import (
     connection_types,
     inner_nodes,
     parallel_branches,
-    reach,
+    reachability,
     reasons,
     skill_settings,
     variables,
@@ -34,13 +34,13 @@ CHECKS: tuple[Check, ...] = (
     variables.find_unread_variables,
     variables.find_unwritten_returns,
     connection_types.check_port_types,
-    reach.check_tool_states,
-    reach.check_tool_at_end,
-    reach.find_unreachable,
+    reachability.check_tool_states,
+    reachability.check_tool_at_end,
+    reachability.find_unreachable,
     inner_nodes.check_class_rules,
     parallel_branches.find_shared_resources,
     parallel_branches.find_shared_variables,
-    parallel_branches.find_racing_reads,
+    parallel_branches.find_read_races,
 )
 """All checks. Each tolerates the errors that other checks report, and reports no consequence of them."""
 

@@ -8,14 +8,14 @@ from typing import Any
 
 from executive.mission.check.context import CheckContext
 from executive.mission.descriptions import describe_value
-from executive.mission.findings import Finding, list_choices, make_error
+from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model.conversion import find_input_problem
 from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node
 from executive.mission.model.port_types import describe_type, find_element_type, is_assignable
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import Wire, find_control_node_outputs
-from executive.mission.source import Mark
+from executive.mission.source import Span
 from executive.skill import Direction, Port
 
 
@@ -25,21 +25,21 @@ class Writer:
 
     Attributes:
         name: Name in messages: `Localize.targets`, or the keyword of a control node.
-        mark: Position of the node.
+        span: Position of the node.
         type: Type of the written values.
         refers: What the written texts name, as `bin` or `item`; "" if they are no names.
         values: Written values with their positions, if they are constants in the file; otherwise None.
     """
 
     name: str
-    mark: Mark
+    span: Span
     type: object
     refers: str
-    values: tuple[tuple[object, Mark], ...] | None = None
+    values: tuple[tuple[object, Span], ...] | None = None
 
-    def describe_for(self, mark: Mark) -> str:
-        """Return name and position of the writer, for a message at `mark`."""
-        return f"{self.name} in {self.mark.describe_place(mark.source)}"
+    def describe_for(self, span: Span) -> str:
+        """Return name and position of the writer, for a message at `span`."""
+        return f"{self.name} in {self.span.describe_place(span.source)}"
 
 
 WritersByVariable = Mapping[str, Sequence[Writer]]
@@ -50,7 +50,7 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
     skill_writers: dict[str, list[Writer]] = {}
     for node in context.tree.walk():
         for wire in context.find_wires(node, Direction.OUT):
-            writer = Writer(str(wire), node.mark, wire.port.type, wire.port.refers)
+            writer = Writer(str(wire), node.span, wire.port.type, wire.port.refers)
             skill_writers.setdefault(wire.variable, []).append(writer)
 
     def walk(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
@@ -74,14 +74,14 @@ class ElementLoop:
 
     Attributes:
         keyword: Keyword of the control node.
-        mark: Position of the control node.
+        span: Position of the control node.
         variable: Name of the variable.
         key: Key that gives the list.
         source: The list, or the variable that contains the list.
     """
 
     keyword: str
-    mark: Mark
+    span: Span
     variable: str
     key: str
     source: Literal | Reference
@@ -89,60 +89,60 @@ class ElementLoop:
     def find_list_writers(self, writers: WritersByVariable) -> Sequence[Writer]:
         """Return the writers of the list; a list in the file has the control node itself as writer."""
         if isinstance(self.source, Literal):
-            located_list = self.source.value, self.source.mark
-            return [Writer(self.keyword, self.mark, list[Any], "", (located_list,))]
+            located_list = self.source.value, self.source.span
+            return [Writer(self.keyword, self.span, list[Any], "", (located_list,))]
         return writers.get(self.source.name, ())
 
     def check_lists(self, list_writers: Iterable[Writer]) -> Iterator[Finding]:
         """Yield an error for each writer that does not write a list to the variable `source`."""
         if not isinstance(self.source, Reference):
             return
-        variable, mark, key = self.source.name, self.source.mark, f"{self.keyword}.{self.key}"
+        variable, span, key = self.source.name, self.source.span, f"{self.keyword}.{self.key}"
         for writer in list_writers:
-            for value, value_mark in writer.values or ():
+            for value, value_span in writer.values or ():
                 if not isinstance(value, list):
                     message = f"{key} takes a list, but ${variable} gets {describe_value(value)} here"
-                    hint = f"{key} reads ${variable} in {mark.describe_place(value_mark.source)}."
-                    yield make_error(value_mark, "port-type", message, hint)
+                    hint = f"{key} reads ${variable} in {span.describe_place(value_span.source)}."
+                    yield make_error(value_span, "port-type", message, hint)
             if writer.values is None and find_element_type(writer.type) is None:
                 message = f"{key} takes a list, but ${variable} holds {describe_type(writer.type)}"
-                yield make_error(mark, "port-type", message, f"It is written by {writer.describe_for(mark)}.")
+                yield make_error(span, "port-type", message, f"It is written by {writer.describe_for(span)}.")
 
     def make_element_writers(self, list_writer: Writer) -> Iterator[Writer]:
         """Yield the loop as the writer of the elements of a list."""
         if list_writer.values is not None:
             literal = self.source if isinstance(self.source, Literal) else None
             values = [
-                (element, literal.get_element_mark(index) if literal else mark)
-                for value, mark in list_writer.values
+                (element, literal.get_element_span(index) if literal else span)
+                for value, span in list_writer.values
                 if isinstance(value, list)
                 for index, element in enumerate(value)
             ]
-            yield Writer(self.keyword, self.mark, Any, "", tuple(values))
+            yield Writer(self.keyword, self.span, Any, "", tuple(values))
         elif (element_type := find_element_type(list_writer.type)) is not None:
-            yield Writer(self.keyword, self.mark, element_type, list_writer.refers)
+            yield Writer(self.keyword, self.span, element_type, list_writer.refers)
 
 
 def _find_element_loops(node: Node) -> Iterator[ElementLoop]:
     for key, variable in find_control_node_outputs(node):
         source = node.values.get(key.list_key) if isinstance(node, InnerNode) else None
         if isinstance(source, Literal | Reference):
-            yield ElementLoop(get_type_name(node), node.mark, variable.name, key.list_key, source)
+            yield ElementLoop(get_type_name(node), node.span, variable.name, key.list_key, source)
 
 
 def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iterator[Finding]:
     """Yield an error for each value or type of a writer that does not fit the input `wire`."""
     port, accepted = wire.port, f"{wire} takes {_describe_accepted_type(wire.port)}"
-    for value, mark in writer.values or ():
+    for value, span in writer.values or ():
         names = context.cell_names_by_kind.get(port.refers)
         if find_input_problem(value, port):
             message = f"{accepted}, but ${wire.variable} gets {describe_value(value)} here"
-            hint = f"{wire} reads ${wire.variable} in {wire.mark.describe_place(mark.source)}."
-            yield make_error(mark, "port-type", message, hint)
+            hint = f"{wire} reads ${wire.variable} in {wire.span.describe_place(span.source)}."
+            yield make_error(span, "port-type", message, hint)
         elif names is not None and isinstance(value, str) and value not in names:
             message = f'the cell has no {port.refers} "{value}" for {wire}'
-            hint = list_choices(value, names, "Allowed names")
-            yield make_error(mark, f"unknown-{port.refers}", message, hint)
+            hint = suggest_choice(value, names, "Allowed names")
+            yield make_error(span, f"unknown-{port.refers}", message, hint)
     if writer.values is not None:
         return
     actual = ""
@@ -152,8 +152,8 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
         actual = f"the name of {_add_article(writer.refers)}" if writer.refers else "any text"
     if actual:
         message = f"{accepted}, but ${wire.variable} holds {actual}"
-        hint = f"It is written by {writer.describe_for(wire.mark)}."
-        yield make_error(wire.mark, "port-type", message, hint)
+        hint = f"It is written by {writer.describe_for(wire.span)}."
+        yield make_error(wire.span, "port-type", message, hint)
 
 
 def _describe_accepted_type(port: Port) -> str:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from executive.cell.config import CellConfig
 from executive.cell.protocols import MinTimes
-from executive.mission.findings import list_choices
+from executive.mission.findings import suggest_choice
 from executive.mission.flow.analysis import FlowAnalysis
 from executive.mission.model.mission import Mission
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
@@ -85,14 +85,14 @@ class CheckContext:
         uses: dict[str, UseNode] = {}
 
         def walk(node: Node, use: UseNode | None) -> None:
-            if node.mark.source is mission_source:
+            if node.span.source is mission_source:
                 use = node if isinstance(node, UseNode) else None
             elif use is not None:
                 uses[node.path] = use
             for child in node.children:
                 walk(child, use)
 
-        mission_source = self.tree.mark.source
+        mission_source = self.tree.span.source
         walk(self.tree, None)
         return uses
 
@@ -105,7 +105,7 @@ class CheckContext:
                 "and give its value with `with`."
             )
         names = [f"${name}" for name in params]
-        return list_choices(f"${reference.name}", names, "Params of the mission")
+        return suggest_choice(f"${reference.name}", names, "Params of the mission")
 
     def make_variable_hint(self, value: object) -> str:
         """Return the hint for a constant that is the name of a variable without `$`; "" for other values."""

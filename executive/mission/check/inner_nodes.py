@@ -45,7 +45,7 @@ def _check_keys(context: CheckContext, owner: InnerNode | SectionNode, name: str
             message = f"{name}.{key.name} must be a list or a variable, not {description}"
             is_written_text = isinstance(value.value, str) and not value.origin
             hint = f"Write a list: [{value.value}]." if is_written_text else ""
-            yield make_error(value.mark, "wrong-type", message, hint)
+            yield make_error(value.span, "wrong-type", message, hint)
 
 
 def _check_constant(
@@ -53,14 +53,14 @@ def _check_constant(
 ) -> Iterator[Finding]:
     if isinstance(value, Reference):
         message = f"{name} must be a constant, but ${value.name} is neither a param nor an argument"
-        yield make_error(value.mark, "unknown-param", message, context.make_constant_hint(value))
+        yield make_error(value.span, "unknown-param", message, context.make_constant_hint(value))
     elif isinstance(value, Literal):
         try:
             convert_constant(key, value.value, max_value)
         except WrongType as problem:
             is_param = problem.code == "wrong-type" and value.value in [*context.mission.params]
             hint = f"For the param, write ${value.value}." if is_param else ""
-            yield make_error(value.mark, problem.code, f"{name} {problem}{value.origin_note}", hint)
+            yield make_error(value.span, problem.code, f"{name} {problem}{value.origin_note}", hint)
 
 
 def check_class_rules(context: CheckContext) -> Iterator[Finding]:
@@ -81,13 +81,13 @@ def _find_halted_nodes(context: CheckContext) -> Iterator[Node]:
 
 def _locate_finding(node: InnerNode, finding: NodeFinding) -> Finding:
     """Return the finding of a control node at the position of the key or failure name that it denotes."""
-    mark, note = node.mark, ""
+    span, note = node.span, ""
     if isinstance(finding.place, FailureName):
-        mark = finding.place.mark
+        span = finding.place.span
     elif isinstance(value := node.values.get(str(finding.place)), Literal):
-        mark, note = value.mark, value.origin_note
+        span, note = value.span, value.origin_note
     make_finding = make_warning if finding.is_warning else make_error
-    return make_finding(mark, finding.code, finding.message + note, finding.hint)
+    return make_finding(span, finding.code, finding.message + note, finding.hint)
 
 
 class CheckerFacts:
@@ -107,7 +107,7 @@ class CheckerFacts:
 
     def describe_place(self, reason: Reason, reported: Reason) -> str:
         """Return the position of `reason`, for a finding at the position of `reported`: `line 12`."""
-        return cast("FailureName", reason).mark.describe_place(cast("FailureName", reported).mark.source)
+        return cast("FailureName", reason).span.describe_place(cast("FailureName", reported).span.source)
 
     def is_literal(self, key: str) -> bool:
         """Return True if the value of a key is given at the node, not through a param or an argument."""

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
-from executive.mission.findings import Finding, list_choices, make_error
+from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.flow.analysis import FlowAnalysis
 from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, Node, SectionNode, SkillNode, iterate_keys, list_nodes
 from executive.mission.model.values import FailureName
-from executive.mission.source import Mark
+from executive.mission.source import Span
 from executive.tree.flow import UNKNOWN_NAME, PossibleFailure
 from executive.tree.keys import Key, KeyKind
 
 
 def check_labels(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every label that two nodes have, or that is a keyword or key of a control node."""
-    first_marks: dict[str, Mark] = {}
+    first_spans: dict[str, Span] = {}
     # Paths contain keywords and keys, so a label must differ from all of them.
     reserved_words = {grammar.USE_KEYWORD, *context.node_classes}
     for node_class in context.node_classes.values():
@@ -26,16 +26,16 @@ def check_labels(context: CheckContext) -> Iterator[Finding]:
     for node in context.iterate_nodes():
         if not node.label:
             continue
-        mark = node.label_mark or node.mark
+        span = node.label_span or node.span
         if node.label in reserved_words:
             message = f'"{node.label}" is a word of the mission language and cannot be a label'
-            yield make_error(mark, "bad-label", message)
+            yield make_error(span, "bad-label", message)
         # Nodes with the same position are one node of a subtree that is used more than once.
-        other_mark = first_marks.setdefault(node.label, mark)
-        if other_mark != mark:
-            place = other_mark.describe_place(mark.source)
+        other_span = first_spans.setdefault(node.label, span)
+        if other_span != span:
+            place = other_span.describe_place(span.source)
             message = f'two nodes have the label "{node.label}"; the other node is in {place}'
-            yield make_error(mark, "duplicate-label", message)
+            yield make_error(span, "duplicate-label", message)
 
 
 def check_failure_names(context: CheckContext) -> Iterator[Finding]:
@@ -53,11 +53,11 @@ def check_failure_names(context: CheckContext) -> Iterator[Finding]:
                 yield _make_impossible_error(context, name, keyword, body)
             elif len(sources := _find_denoted_nodes(analysis, name, matching)) > 1:
                 places = " and ".join(
-                    f"{source.mark.describe_place(name.mark.source)}:{source.mark.col}" for source in sources
+                    f"{source.span.describe_place(name.span.source)}:{source.span.col}" for source in sources
                 )
                 message = f"{name} is ambiguous: more than one node in the body can fail so, in {places}"
                 hint = f"Give each node, or its use, a label with as:, and write label.{name.reason}."
-                yield make_error(name.mark, "ambiguous", message, hint)
+                yield make_error(name.span, "ambiguous", message, hint)
 
 
 def _find_names_with_bodies(node: Node) -> Iterator[tuple[FailureName, str, Node]]:
@@ -87,15 +87,15 @@ def _make_impossible_error(context: CheckContext, name: FailureName, keyword: st
         names = ", ".join(sorted({str(failure) for failure in failures})) or "none"
         message = f"{name} never leaves the body of this {keyword}"
         hint = f"Failures that leave it: {names}. A loop fails like its body, a fallback like its last child."
-        return make_error(name.mark, "impossible-reason", message, hint)
+        return make_error(name.span, "impossible-reason", message, hint)
     labels = {node.label for node in context.iterate_nodes() if node.label}
     keywords = {word for word, node_class in context.node_classes.items() if node_class.reasons}
     if name.source in (*context.skills, *labels, *keywords):
         message = f"{name.source} is not in the body of this {keyword}, so the body cannot fail with {name}"
         hint = f"The body contains: {', '.join(reasons) or 'none'}."
-        return make_error(name.mark, "impossible-reason", message, hint)
-    hint = list_choices(name.source, reasons, "The body contains")
-    return make_error(name.mark, "unknown-skill", f'there is no skill or label "{name.source}"', hint)
+        return make_error(name.span, "impossible-reason", message, hint)
+    hint = suggest_choice(name.source, reasons, "The body contains")
+    return make_error(name.span, "unknown-skill", f'there is no skill or label "{name.source}"', hint)
 
 
 def _find_unknown_reason(context: CheckContext, name: FailureName, body: Node) -> Finding | None:
@@ -104,8 +104,8 @@ def _find_unknown_reason(context: CheckContext, name: FailureName, body: Node) -
     reasons = skill.reasons if skill else _find_reasons(context.flow_analysis, body).get(name.source)
     if reasons is None or name.reason in reasons or UNKNOWN_NAME in reasons:
         return None
-    hint = list_choices(name.reason, reasons, f"{name.source} may fail with")
-    return make_error(name.mark, "unknown-reason", f'{name.source} never fails with "{name.reason}"', hint)
+    hint = suggest_choice(name.reason, reasons, f"{name.source} may fail with")
+    return make_error(name.span, "unknown-reason", f'{name.source} never fails with "{name.reason}"', hint)
 
 
 def _find_reasons(flow: FlowAnalysis, body: Node) -> dict[str, list[str]]:
@@ -129,5 +129,5 @@ def _find_denoted_nodes(flow: FlowAnalysis, name: FailureName, matching: list[Po
         return []
     # Nodes with the same position are one node of a subtree that is used more than once.
     denoted = [flow.nodes[failure.origin] for failure in matching if failure.must_match([name])]
-    nodes_by_mark = {node.mark: node for node in denoted}
-    return sorted(nodes_by_mark.values(), key=lambda node: (node.mark.line, node.mark.col))
+    nodes_by_span = {node.span: node for node in denoted}
+    return sorted(nodes_by_span.values(), key=lambda node: (node.span.line, node.span.col))

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
 from executive.mission.descriptions import describe_value
-from executive.mission.findings import Finding, find_similar_word, list_choices, make_error
+from executive.mission.findings import Finding, find_similar_word, make_error, suggest_choice
 from executive.mission.model.conversion import WrongType, convert_value, find_input_problem
 from executive.mission.model.nodes import SkillNode
 from executive.mission.model.values import Literal
 from executive.mission.model.wiring import find_literals
-from executive.mission.source import Mark
+from executive.mission.source import Span
 from executive.skill import Direction, Param, Port
 
 
@@ -19,8 +19,8 @@ def find_unknown_skills(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every skill that is not installed."""
     for node in context.iterate_nodes():
         if isinstance(node, SkillNode) and node.skill not in context.skills:
-            hint = list_choices(node.skill, context.skills, "Installed skills")
-            yield make_error(node.mark, "unknown-skill", f'there is no skill "{node.skill}"', hint)
+            hint = suggest_choice(node.skill, context.skills, "Installed skills")
+            yield make_error(node.span, "unknown-skill", f'there is no skill "{node.skill}"', hint)
 
 
 def check_settings(context: CheckContext) -> Iterator[Finding]:
@@ -29,9 +29,9 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
         declarations: dict[str, Param | Port] = {**skill.params, **skill.ports}
         for name, setting in node.settings.items():
             if name not in declarations:
-                hint = list_choices(name, declarations, f"Params and ports of {node.skill}")
+                hint = suggest_choice(name, declarations, f"Params and ports of {node.skill}")
                 message = f'{node.skill} has no param or port "{name}"'
-                yield make_error(setting.name_mark, "unknown-param", message, hint)
+                yield make_error(setting.name_span, "unknown-param", message, hint)
             elif isinstance(setting.value, Literal):
                 yield from _check_value(context, node, declarations[name], setting.value)
                 yield from _find_unknown_names(context, node, declarations[name], setting.value)
@@ -39,12 +39,12 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
                 rule, variable = f"{node.skill}.{name} must be a constant", f"${setting.value.name}"
                 message = f"{rule}, but {variable} is neither a param nor an argument"
                 hint = context.make_constant_hint(setting.value)
-                yield make_error(setting.value.mark, "unknown-param", message, hint)
+                yield make_error(setting.value.span, "unknown-param", message, hint)
         for param in skill.params.values():
             if param.is_required and param.name not in node.settings:
                 message = f'{node.skill} needs the param "{param.name}"'
                 hint = param.doc and f"{param.name}: {param.doc}."
-                yield make_error(node.mark, "missing-param", message, hint)
+                yield make_error(node.span, "missing-param", message, hint)
 
 
 def _check_value(
@@ -60,10 +60,10 @@ def _check_value(
         message = f"{name} is an output: give it a variable, for example ${declared.name}"
         if value.origin:
             message = f"{name} is an output and cannot write to the constant {value.origin.split()[0]}"
-        yield make_error(value.reference_mark or value.mark, code, message)
+        yield make_error(value.reference_span or value.span, code, message)
         return
     if problem:
-        yield make_error(value.mark, code, f"{name} {problem}{value.origin_note}", hint)
+        yield make_error(value.span, code, f"{name} {problem}{value.origin_note}", hint)
 
 
 def _find_unknown_names(
@@ -78,10 +78,10 @@ def _find_unknown_names(
     for index, name in enumerate(value.value if isinstance(value.value, list) else [value.value]):
         if isinstance(name, str) and name not in allowed_names:
             message = f'the cell has no {declared.refers} "{name}" for {node.skill}.{declared.name}'
-            choices_hint = list_choices(name, allowed_names, "Allowed names")
+            choices_hint = suggest_choice(name, allowed_names, "Allowed names")
             hint = context.make_variable_hint(name) or choices_hint
-            mark = value.get_element_mark(index) if is_list else value.mark
-            yield make_error(mark, f"unknown-{declared.refers}", message, hint)
+            span = value.get_element_span(index) if is_list else value.span
+            yield make_error(span, f"unknown-{declared.refers}", message, hint)
 
 
 def find_param_problem(param: Param, value: object) -> tuple[str, str]:
@@ -113,13 +113,13 @@ def check_routes(context: CheckContext) -> Iterator[Finding]:
         return
     for route in context.mission.routes:
         if route.label not in context.cell.objects:
-            hint = list_choices(route.label, context.cell.objects, "Classes of the cell")
+            hint = suggest_choice(route.label, context.cell.objects, "Classes of the cell")
             message = f'the cell has no class "{route.label}"'
-            yield make_error(route.label_mark, "unknown-class", message, hint)
+            yield make_error(route.label_span, "unknown-class", message, hint)
         for bin in route.bins:
             if bin.name not in context.cell.bins:
-                hint = list_choices(bin.name, context.cell.bins, "Bins of the cell")
-                yield make_error(bin.mark, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
+                hint = suggest_choice(bin.name, context.cell.bins, "Bins of the cell")
+                yield make_error(bin.span, "unknown-bin", f'the cell has no bin "{bin.name}"', hint)
 
 
 def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
@@ -128,19 +128,19 @@ def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
     if len(known) < len(context.classes_by_detector) or not known or context.cell is None:
         # A detector with unknown classes may detect every class.
         return
-    for label, mark in _find_named_classes(context):
+    for label, span in _find_named_classes(context):
         if label in context.cell.objects and not any(label in classes for classes in known.values()):
             listed = "; ".join(f"{name}: {', '.join(classes)}" for name, classes in known.items())
             message = f'no detector of the cell can detect the class "{label}"'
             hint = f"Classes by detector: {listed}. Train another detector with `executive train`."
-            yield make_error(mark, "unseen-class", message, hint)
+            yield make_error(span, "unseen-class", message, hint)
 
 
-def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Mark]]:
+def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
     """Yield every class in the routes and in the settings of skills, with its position."""
-    yield from ((route.label, route.label_mark) for route in context.mission.routes)
+    yield from ((route.label, route.label_span) for route in context.mission.routes)
     for node, skill in context.iterate_installed_skills():
         for name, value in find_literals(node):
             declared = skill.params.get(name) or skill.ports.get(name)
             if declared is not None and declared.refers == "class" and isinstance(value.value, str):
-                yield value.value, value.mark
+                yield value.value, value.span

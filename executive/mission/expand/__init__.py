@@ -1,1 +1,1 @@
-"""Subtrees, params and arguments put in the places where they are used."""
+"""Expansion of the subtrees, params and arguments of a mission."""

@@ -1,7 +1,7 @@
 """Expansion of a mission: subtrees replace each `use`, and values of params and arguments replace `$name`.
 
-After expansion, each remaining reference is a variable. Checks and builder get only the expanded tree, so
-each argument is checked with its value at every use.
+After expansion, every reference is a variable. Checks and builder get only the expanded tree, so the checks
+see the values of the arguments at every use.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import TypeVar, cast
 
-from executive.mission.findings import Finding, find_similar_word, list_choices, make_error, make_warning
+from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import Node, SectionNode, SkillNode, UnknownNode, UseNode
 from executive.mission.model.values import LocatedName, Reference, Setting, Value
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
-from executive.mission.source import Mark
+from executive.mission.source import Span
 from executive.skill import Direction, Skill
 
 _MAX_DEPTH = 40
@@ -25,21 +25,21 @@ _MAX_DEPTH = 40
 _MAX_NODE_COUNT = 5000
 """Maximum number of expanded nodes."""
 _CALLER_PREFIX = "^"
-"""Temporary prefix that protects variables of the caller while local variables of the subtree are renamed."""
+"""Temporary prefix of the caller's variables, which distinguishes them from variables of the subtree."""
 
 ValuesByName = Mapping[str, Value]
 """Values of params and arguments by name."""
 
-P = TypeVar("P")
+PartT = TypeVar("PartT")
 
 
 @dataclass(frozen=True)
 class ExpandedMission:
-    """A mission in which the bodies of subtrees are part of the tree.
+    """A mission after expansion.
 
     Attributes:
         tree: Expanded tree, or None if it could not be expanded.
-        unused_subtrees: Expanded subtrees that the tree does not use and whose arguments all have defaults.
+        unused_subtrees: Expanded bodies of unused subtrees; without subtrees that require arguments.
         findings: Errors and warnings about subtrees, params and arguments.
     """
 
@@ -53,19 +53,18 @@ def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> ExpandedMissi
     expander = _Expander(mission, skills)
     tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)
     unused_subtrees = []
-    used_in_trees = {
-        use.name for tree in mission.trees.values() for use in tree.do.walk() if isinstance(use, UseNode)
-    }
-    for subtree in mission.trees.values():
-        if subtree.name in expander.used_names or subtree.library or isinstance(subtree.do, UnknownNode):
+    subtree_nodes = [node for subtree in mission.subtrees.values() for node in subtree.body.walk()]
+    names_in_subtrees = {node.name for node in subtree_nodes if isinstance(node, UseNode)}
+    for subtree in mission.subtrees.values():
+        if subtree.name in expander.used_names or subtree.library or isinstance(subtree.body, UnknownNode):
             continue
-        if subtree.name not in used_in_trees:
+        if subtree.name not in names_in_subtrees:
             message = f'the subtree "{subtree.name}" is never used'
-            expander.findings.append(make_warning(subtree.mark, "unused-tree", message))
-        optional = {name: argument.default for name, argument in subtree.args.items()}
-        defaults = {name: default for name, default in optional.items() if default is not None}
-        if len(defaults) == len(optional):
-            body = expander.expand_tree(subtree.do, {**expander.params, **defaults})
+            expander.findings.append(make_warning(subtree.span, "unused-tree", message))
+        arguments = subtree.arguments.items()
+        defaults = {name: argument.default for name, argument in arguments if argument.default is not None}
+        if len(defaults) == len(arguments):
+            body = expander.expand_tree(subtree.body, {**expander.params, **defaults})
             unused_subtrees += [body] if body else []
     expander.findings += expander.find_unused_names()
     return ExpandedMission(tree, tuple(unused_subtrees), tuple(expander.findings))
@@ -76,17 +75,22 @@ class _TooLargeError(Exception):
 
 
 class _Expander:
-    """Expands the trees of one mission; `used_names` are names of used subtrees, also misspelt ones."""
+    """Expander of the trees of one mission.
+
+    Attributes:
+        used_names: Names of used subtrees; for a misspelt name, also the most similar name.
+    """
 
     def __init__(self, mission: Mission, skills: Mapping[str, type[Skill]]) -> None:
         self.mission, self.skills = mission, skills
         self.params: ValuesByName = {name: param.value for name, param in mission.params.items()}
         self.findings: list[Finding] = []
         self.used_names: set[str] = set()
-        # Referenced params and arguments as (subtree, name); the subtree is "" for a param of the mission.
-        self._referenced: set[tuple[str, str]] = set()
+        # Params and arguments with references, as (subtree, name); for a param, the subtree is "".
+        self._used_values: set[tuple[str, str]] = set()
         self._node_count = 0
-        self._outermost_mark: Mark | None = None
+        # Span of the `use` in the tree whose subtree is being expanded.
+        self._outermost_span: Span | None = None
         self._use_counts: Counter[str] = Counter()
 
     def expand_tree(self, tree: Node, values: ValuesByName) -> Node | None:
@@ -97,117 +101,118 @@ class _Expander:
             return None
 
     def find_unused_names(self) -> Iterator[Finding]:
-        """Yield a finding for every param, and every argument of an expanded subtree, without a reference."""
+        """Yield a finding for every param, and every argument of a used subtree, that has no reference."""
         for name, param in self.mission.params.items() if self.mission.tree else ():
-            if ("", name) not in self._referenced and f"${name}" not in param.mark.source.text:
-                yield make_warning(param.mark, "unused-param", f'the param "{name}" is never used')
-        for subtree in self.mission.trees.values():
-            if isinstance(subtree.do, UnknownNode) or not self._use_counts[subtree.name]:
+            if ("", name) not in self._used_values and f"${name}" not in param.span.source.text:
+                yield make_warning(param.span, "unused-param", f'the param "{name}" is never used')
+        for subtree in self.mission.subtrees.values():
+            if isinstance(subtree.body, UnknownNode) or not self._use_counts[subtree.name]:
                 continue
-            for name, argument in subtree.args.items():
-                if (subtree.name, name) not in self._referenced:
+            for name, argument in subtree.arguments.items():
+                if (subtree.name, name) not in self._used_values:
                     message = f'the subtree "{subtree.name}" never uses its argument "{name}"'
-                    yield make_error(argument.mark, "unused-argument", message)
+                    yield make_error(argument.span, "unused-argument", message)
 
     def _expand_node(self, node: Node, values: ValuesByName, callers: tuple[str, ...], depth: int) -> Node:
         """Return the expanded node; `callers` are the subtrees that contain the node, the outermost first."""
         self._node_count += 1
         if depth > _MAX_DEPTH or self._node_count > _MAX_NODE_COUNT:
-            deep, large = f"is more than {_MAX_DEPTH} levels deep", f"has more than {_MAX_NODE_COUNT} nodes"
-            message = f"after the expansion of subtrees, the tree {deep if depth > _MAX_DEPTH else large}"
-            self.findings.append(make_error(self._outermost_mark or node.mark, "too-large", message))
+            problem = f"has more than {_MAX_NODE_COUNT} nodes"
+            if depth > _MAX_DEPTH:
+                problem = f"is more than {_MAX_DEPTH} levels deep"
+            message = f"after the expansion of subtrees, the tree {problem}"
+            self.findings.append(make_error(self._outermost_span or node.span, "too-large", message))
             raise _TooLargeError
 
         def expand_part(part: object) -> object:
-            """Return a part of the node in which all nodes and references are expanded."""
+            """Return a part of the node after the expansion of its nodes and references."""
             if isinstance(part, Node):
                 return self._expand_node(part, values, callers, depth + 1)
             if isinstance(part, Reference):
-                return self._resolve(part, values, callers)
+                return self._resolve_name(part, values, callers)
             return _map_parts(part, expand_part)
 
-        self.findings += self._find_shadowed(node, values)
+        self.findings += self._find_shadowed_names(node, values)
         expanded = _map_parts(node, expand_part)
         return self._expand_use(expanded, callers, depth) if isinstance(expanded, UseNode) else expanded
 
-    def _find_shadowed(self, node: Node, values: ValuesByName) -> Iterator[Finding]:
+    def _find_shadowed_names(self, node: Node, values: ValuesByName) -> Iterator[Finding]:
         """Yield an error for every output variable of a node that has the name of a param or argument."""
+
+        def explain(writer: str, name: str) -> str:
+            kind = "a param of the mission" if name in self.params else "an argument of the subtree"
+            return f"{writer} writes ${name}, but {name} is {kind}"
+
         for _, variable in find_control_node_outputs(node):
-            name = variable.name
-            if name in values:
-                message = f"{get_type_name(node)} writes ${name}, but {name} is {self._describe_kind(name)}"
-                yield make_error(variable.mark, "shadowed-param", message, "Rename one of them.")
+            if variable.name in values:
+                message = explain(get_type_name(node), variable.name)
+                yield make_error(variable.span, "shadowed-param", message, "Rename one of them.")
         if not isinstance(node, SkillNode) or node.skill not in self.skills:
             return
         for name, port in self.skills[node.skill].ports.items():
             if port.direction is Direction.OUT and name in values and name not in node.settings:
-                message = f"{node.skill}.{name} writes ${name}, but {name} is {self._describe_kind(name)}"
                 hint = f"Let {node.skill} write another variable: {name}: $other."
-                yield make_error(node.mark, "shadowed-param", message, hint)
+                yield make_error(node.span, "shadowed-param", explain(f"{node.skill}.{name}", name), hint)
 
-    def _describe_kind(self, name: str) -> str:
-        return "a param of the mission" if name in self.params else "an argument of the subtree"
-
-    def _resolve(self, reference: Reference, values: ValuesByName, callers: tuple[str, ...]) -> Value:
+    def _resolve_name(self, reference: Reference, values: ValuesByName, callers: tuple[str, ...]) -> Value:
         """Return the value of a param or argument, or the reference itself if it is a variable."""
         value = values.get(reference.name)
-        # A param or argument with a misspelt reference counts as used.
+        # A misspelt reference counts as a reference to the param or argument with the most similar name.
         name = reference.name if value is not None else find_similar_word(reference.name, values)
-        is_argument = bool(callers) and name in self.mission.trees[callers[-1]].args
-        self._referenced.add((callers[-1] if is_argument else "", name or ""))
+        is_argument = bool(callers) and name in self.mission.subtrees[callers[-1]].arguments
+        self._used_values.add((callers[-1] if is_argument else "", name or ""))
         if value is None:
             return reference
         if isinstance(value, Reference):
             return value
-        # Findings have the position of the value; their messages state the position of the reference.
-        origin = f"${reference.name} in {reference.mark.describe_place(value.mark.source)}"
-        return replace(value, origin=origin, reference_mark=reference.mark)
+        # A finding about the value has the position of the value; its message contains the `origin`.
+        origin = f"${reference.name} in {reference.span.describe_place(value.span.source)}"
+        return replace(value, origin=origin, reference_span=reference.span)
 
     def _expand_use(self, use: UseNode, callers: tuple[str, ...], depth: int) -> Node:
-        """Return the use with its expanded body, or without body if it has errors."""
+        """Return the use with its expanded body; without body if the use has errors."""
         self.used_names.add(use.name)
-        subtree = self.mission.trees.get(use.name)
-        if subtree is None and not self.mission.is_complete:
-            return use
+        subtree = self.mission.subtrees.get(use.name)
         if subtree is None:
-            self.used_names.add(find_similar_word(use.name, self.mission.trees) or "")
-            message = f'there is no subtree "{use.name}"'
-            hint = list_choices(use.name, self.mission.trees, "Subtrees of the mission")
-            self.findings.append(make_error(use.mark, "unknown-tree", message, hint))
+            if self.mission.is_complete:
+                self.used_names.add(find_similar_word(use.name, self.mission.subtrees) or "")
+                message = f'there is no subtree "{use.name}"'
+                hint = suggest_choice(use.name, self.mission.subtrees, "Subtrees of the mission")
+                self.findings.append(make_error(use.span, "unknown-tree", message, hint))
             return use
         if use.name in callers:
             cycle = " -> ".join((*callers[callers.index(use.name) :], use.name))
             message = f"a subtree cannot use itself: {cycle}"
-            self.findings.append(make_error(use.mark, "recursive-use", message))
+            self.findings.append(make_error(use.span, "recursive-use", message))
             return use
-        arguments = self._find_arguments(use, subtree)
-        returns = self._map_returns(use, subtree)
+        arguments = self._collect_arguments(use, subtree)
+        returns = self._map_returned_variables(use, subtree)
         if arguments is None:
             return use
         self._use_counts[use.name] += 1
-        self._outermost_mark = self._outermost_mark if callers else use.mark
-        # A library has no access to params, so that it has the same meaning in every mission.
+        self._outermost_span = self._outermost_span if callers else use.span
+        # A library has no access to params, so that a library has one meaning in all missions.
         params: ValuesByName = {} if subtree.library else self.params
+        if subtree.returns is not None:
+            arguments = {name: _add_caller_prefix(value) for name, value in arguments.items()}
+        body = self._expand_node(subtree.body, {**params, **arguments}, (*callers, use.name), depth + 1)
         if subtree.returns is None:
-            body = self._expand_node(subtree.do, {**params, **arguments}, (*callers, use.name), depth + 1)
             return replace(use, body=body)
-        arguments = {name: _add_caller_prefix(value) for name, value in arguments.items()}
-        body = self._expand_node(subtree.do, {**params, **arguments}, (*callers, use.name), depth + 1)
         body = self._rename_variables(use, body, returns)
         return replace(use, body=body, returned_variables=tuple(returns.values()))
 
     def _rename_variables(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
-        """Return the body: local variables get unique names, returned variables the names of the caller."""
-        number = self._use_counts[use.name]
-        prefix = f"{use.name}." if number == 1 else f"{use.name}-{number}."
-        written = find_written_variables(body, self.skills)
+        """Return the body with unique local variables, and with the caller's names of returned variables."""
+        use_number = self._use_counts[use.name]
+        prefix = f"{use.name}." if use_number == 1 else f"{use.name}-{use_number}."
+        written_variables = find_written_variables(body, self.skills)
 
         def rename(name: str) -> str:
             if name.startswith(_CALLER_PREFIX):
                 return name.removeprefix(_CALLER_PREFIX)
             if name in returns:
                 return returns[name]
-            return prefix + name if name in written else name
+            return prefix + name if name in written_variables else name
 
         def rename_part(part: object) -> object:
             if isinstance(part, Reference | LocatedName):
@@ -223,31 +228,31 @@ class _Expander:
 
         return cast("Node", rename_part(body))
 
-    def _map_returns(self, use: UseNode, subtree: Subtree) -> dict[str, str]:
+    def _map_returned_variables(self, use: UseNode, subtree: Subtree) -> dict[str, str]:
         """Return the caller's variable for each variable that the subtree returns."""
-        known = subtree.returns or {}
-        names = {name: name for name in known}
+        returned_names = subtree.returns or {}
+        names = {name: name for name in returned_names}
         for name, setting in use.returns.items():
-            if name not in known:
-                hint = list_choices(name, known, "Returned variables")
+            if name not in returned_names:
+                hint = suggest_choice(name, returned_names, "Returned variables")
                 message = f'the subtree "{subtree.name}" does not return "{name}"'
-                self.findings.append(make_error(setting.name_mark, "unknown-return", message, hint))
+                self.findings.append(make_error(setting.name_span, "unknown-return", message, hint))
             elif isinstance(setting.value, Reference):
                 names[name] = setting.value.name
             else:
                 message = f"returns.{name} must be a variable, for example $mine"
-                self.findings.append(make_error(setting.value.mark, "wrong-type", message))
+                self.findings.append(make_error(setting.value.span, "wrong-type", message))
         return names
 
-    def _find_arguments(self, use: UseNode, subtree: Subtree) -> dict[str, Value] | None:
-        """Return the value of every argument of the subtree, or None if one is missing."""
+    def _collect_arguments(self, use: UseNode, subtree: Subtree) -> dict[str, Value] | None:
+        """Return the value of every argument of the subtree, or None if a value is missing."""
         for name, setting in use.arguments.items():
-            if name not in subtree.args:
-                hint = list_choices(name, subtree.args, "Arguments of the subtree")
+            if name not in subtree.arguments:
+                hint = suggest_choice(name, subtree.arguments, "Arguments of the subtree")
                 message = f'the subtree "{subtree.name}" has no argument "{name}"'
-                self.findings.append(make_error(setting.name_mark, "unknown-argument", message, hint))
+                self.findings.append(make_error(setting.name_span, "unknown-argument", message, hint))
         values: dict[str, Value] = {}
-        for name, argument in subtree.args.items():
+        for name, argument in subtree.arguments.items():
             if name in use.arguments:
                 values[name] = use.arguments[name].value
             elif argument.default is not None:
@@ -255,16 +260,17 @@ class _Expander:
             else:
                 message = f'the subtree "{subtree.name}" needs the argument "{name}"'
                 hint = f"Write with: {{{name}: ...}} at the level of use."
-                self.findings.append(make_error(use.mark, "missing-argument", message, hint))
-        return values if len(values) == len(subtree.args) else None
+                self.findings.append(make_error(use.span, "missing-argument", message, hint))
+        return values if len(values) == len(subtree.arguments) else None
 
 
 def _add_caller_prefix(value: Value) -> Value:
+    """Return a reference with the prefix of the caller's variables; a constant is unchanged."""
     return replace(value, name=_CALLER_PREFIX + value.name) if isinstance(value, Reference) else value
 
 
-def _map_parts(part: P, change: Callable[[object], object]) -> P:
-    """Return a node, or a part of a node, after the application of `change` to each of its direct parts."""
+def _map_parts(part: PartT, change: Callable[[object], object]) -> PartT:
+    """Return a copy of `part` in which `change(value)` replaces every value that `part` directly contains."""
     mapped: object = part
     if isinstance(part, tuple):
         mapped = tuple([change(item) for item in part])
@@ -273,4 +279,4 @@ def _map_parts(part: P, change: Callable[[object], object]) -> P:
     elif isinstance(part, Node | Setting | SectionNode):
         values = {field.name: change(getattr(part, field.name)) for field in fields(part)}
         mapped = replace(part, **values)  # type: ignore[arg-type] # `change` keeps the type of each field.
-    return cast("P", mapped)
+    return cast("PartT", mapped)

@@ -43,7 +43,7 @@ class FlowAnalysis:
         entry_states: Facts that hold at every start of a node, by its path; unreachable nodes are missing.
         flows: Possible ends of a node after the last analysed entry, by its path.
         body_end_states: Facts after each success of the body of a `use`, by the path of the use.
-        result: Possible ends of the whole tree.
+        root_flow: Possible ends of the whole tree.
     """
 
     def __init__(self, tree: Node, skills: Mapping[str, type[Skill]]) -> None:
@@ -54,12 +54,12 @@ class FlowAnalysis:
         self._skills = skills
         self._flows_by_entry: dict[tuple[str, FlowState], Flow] = {}
         self._instances: dict[str, ControlNode] = {}
-        self.result = self._analyse(tree, INITIAL_STATE)
+        self.root_flow = self._analyse(tree, INITIAL_STATE)
 
     def find_skill(self, name: str) -> type[Skill] | None:
         """Return the skill with a name, otherwise the skill with the most similar name, or None."""
-        known = name if name in self._skills else find_similar_word(name, self._skills)
-        return self._skills[known] if known else None
+        similar = name if name in self._skills else find_similar_word(name, self._skills)
+        return self._skills[similar] if similar else None
 
     def _analyse(self, node: Node, state: FlowState) -> Flow:
         """Return the possible ends of a node that is entered in a state; each such pair is computed once."""

@@ -26,12 +26,12 @@ class UnhandledFailure:
     line: int
 
 
-def find_unhandled_failures(flow: FlowAnalysis) -> tuple[UnhandledFailure, ...]:
+def find_unhandled_failures(analysis: FlowAnalysis) -> tuple[UnhandledFailure, ...]:
     """Return the failures that can end the mission, in the order of the tree."""
-    indices = {path: index for index, path in enumerate(flow.nodes)}
-    failures = sorted(flow.result.failures, key=lambda failure: (indices[failure.origin], failure.reason))
-    marks = {failure: flow.nodes[failure.origin].mark for failure in failures}
+    order = {path: index for index, path in enumerate(analysis.nodes)}
+    failures = sorted(analysis.root_flow.failures, key=lambda each: (order[each.origin], each.reason))
+    spans = {failure: analysis.nodes[failure.origin].span for failure in failures}
     return tuple(
-        UnhandledFailure(failure.source, failure.reason, failure.origin, mark.source.path, mark.line)
-        for failure, mark in marks.items()
+        UnhandledFailure(failure.source, failure.reason, failure.origin, span.source.path, span.line)
+        for failure, span in spans.items()
     )

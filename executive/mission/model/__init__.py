@@ -1,1 +1,1 @@
-"""What a mission says, as typed values: the grammar, the nodes, what they are wired to."""
+"""Typed content of missions: grammar, nodes, values and connections."""

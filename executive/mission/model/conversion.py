@@ -11,50 +11,49 @@ from typing import Any, Union, cast, get_args, get_origin
 
 from pydantic import TypeAdapter, ValidationError
 
-from executive.mission.descriptions import describe_value, describe_violation
+from executive.mission.descriptions import describe_validation_error, describe_value
 from executive.mission.model.port_types import is_assignable
 from executive.skill import Port
 from executive.tree.keys import Key
 
-_SCALARS = (str, int, float, bool, type(None), Any)
-_CONTAINERS = (tuple, list, dict, frozenset, set)
+_SIMPLE_TYPES = (str, int, float, bool, type(None), Any, Ellipsis)
+"""Types without type arguments; Ellipsis occurs as an argument of `tuple`."""
+_CONTAINER_TYPES = (tuple, list, dict, frozenset, set)
+"""Types that may have type arguments."""
 
 
 class WrongType(Exception):
-    """A value does not have the declared type; the message follows the name of the value in a sentence.
+    """A value does not have the declared type; the message continues a sentence that starts with its name.
 
     Attributes:
         code: Code of the finding.
     """
 
-    def __init__(self, text: str, code: str = "wrong-type") -> None:
-        super().__init__(text)
+    def __init__(self, message: str, code: str = "wrong-type") -> None:
+        super().__init__(message)
         self.code = code
 
 
 def is_plain_type(declared: object) -> bool:
     """Return True if values of this type can be written in a mission file."""
-    if declared in _SCALARS or declared in _CONTAINERS or declared is Ellipsis:
-        return True
     origin = get_origin(declared)
-    if origin is typing.Literal:
+    if declared in _SIMPLE_TYPES or declared in _CONTAINER_TYPES or origin is typing.Literal:
         return True
-    if origin in (Union, types.UnionType) or origin in _CONTAINERS:
-        return all(is_plain_type(part) for part in get_args(declared))
-    return False
+    is_compound = origin in (Union, types.UnionType, *_CONTAINER_TYPES)
+    return is_compound and all(is_plain_type(part) for part in get_args(declared))
 
 
 def find_input_problem(value: object, port: Port) -> str:
-    """Return why a constant does not fit an input, to follow the name of the input; "" if it fits."""
+    """Return an error message without the name of the input; "" if the constant `value` is allowed."""
     if value is None and is_assignable(type(None), port.type):
         return ""
-    # Items exist only during a run, so a file cannot name an item.
+    # Items are created during a run, so a file cannot contain an item.
     if not is_plain_type(port.type) or port.refers == "item":
         return f"must be a variable, for example ${port.name}, not {describe_value(value)}"
     try:
         convert_value(value, port.type)
-    except WrongType as problem:
-        return str(problem)
+    except WrongType as error:
+        return str(error)
     return ""
 
 
@@ -70,7 +69,7 @@ def convert_value(value: object, declared: object) -> object:
 
 
 def convert_constant(key: Key, value: object, max_value: int | None = None) -> object:
-    """Return a plain value converted to the type of a key; `max_value` is the upper bound of numbers.
+    """Return a plain value converted to the type of a key; a number must not exceed `max_value`.
 
     Raises:
         WrongType: The value cannot be converted, or is out of bounds.
@@ -79,18 +78,18 @@ def convert_constant(key: Key, value: object, max_value: int | None = None) -> o
 
 
 def _validate(adapter: TypeAdapter[object], value: object) -> object:
+    """Return the converted value, or raise WrongType."""
     if isinstance(value, float) and not math.isfinite(value):
         raise WrongType(f"must be a finite number, not {value}")
     try:
         return adapter.validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
-        problems = error.errors(include_url=False)
-        # A union of types has one problem per type; a violated bound is the most helpful one.
-        main = next((problem for problem in problems if "than" in problem["type"]), problems[0])
-        code = "out-of-range" if "than" in main["type"] else "wrong-type"
-        other_types = {problem["type"] for problem in problems if problem is not main}
-        note = " (a whole number is allowed, too)" if other_types == {"int_type"} else ""
-        raise WrongType(describe_violation(main) + note, code) from None
+        # A union has one error per type. A violated bound helps most; its type is `less_than` or similar.
+        errors = sorted(error.errors(include_url=False), key=lambda each: "than" not in each["type"])
+        code = "out-of-range" if "than" in errors[0]["type"] else "wrong-type"
+        is_integer_allowed = {each["type"] for each in errors[1:]} == {"int_type"}
+        note = " (a whole number is allowed, too)" if is_integer_allowed else ""
+        raise WrongType(describe_validation_error(errors[0]) + note, code) from None
 
 
 @functools.lru_cache(maxsize=256)

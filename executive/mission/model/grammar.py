@@ -30,19 +30,19 @@ LABEL_PATTERN = "[a-z_][a-z0-9_]*"
 """Regular expression that every label matches."""
 
 LABEL_KEY = GrammarKey("label", "Label of the node, for references in `on`, `until` and `catch`.")
-"""The key `as` beside the keyword of any node."""
+"""The key `as`, which any node may have at the level of its keyword."""
 
 SEQUENCE_KEYWORD = "sequence"
-"""Keyword of the control node that a bare list stands for."""
+"""Keyword of the control node for a list without a keyword."""
 
 USE_KEYWORD = "use"
-"""Keyword before the name of a subtree."""
+"""Keyword of a node that uses a subtree."""
 
 USE_SIBLINGS: Mapping[str, GrammarKey] = {
     "with": GrammarKey("values", "Values of the subtree's arguments."),
     "returns": GrammarKey("variables", "Variables of the caller for returned variables: `returned: $mine`."),
 }
-"""Keys that stand beside `use`."""
+"""Keys at the level of `use`."""
 
 KEYWORD_HINTS: Mapping[str, str] = {
     "then": "Write nodes that run in sequence as a list.",
@@ -50,7 +50,7 @@ KEYWORD_HINTS: Mapping[str, str] = {
     "with": "Write with at the level of use, not below use.",
     "returns": "Write returns at the level of use, not below use.",
 }
-"""Hints for words that are used as keywords by mistake; control nodes declare further ones."""
+"""Hints for words that authors write as keywords by mistake; control nodes declare more hints."""
 
 MISSION_KEYS: Mapping[str, GrammarKey] = {
     "mission": GrammarKey("word", "Name of the mission.", is_required=True),
@@ -91,4 +91,4 @@ PARAM_KEYS: Mapping[str, GrammarKey] = {
     "choices": GrammarKey("list", "Allowed values."),
     "doc": GrammarKey("text", "Meaning of the param, one sentence."),
 }
-"""The keys of a param that is declared by a mapping."""
+"""The keys of a param whose declaration is a mapping."""

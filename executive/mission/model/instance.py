@@ -1,4 +1,4 @@
-"""Construction of control nodes from the nodes of a mission, for the built tree and for inspection."""
+"""Construction of control nodes from mission nodes, for runs, checks and the diagnosis."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from executive.tree.keys import Child, Key, KeyKind, VariableName
 from executive.tree.node import ControlNode, NodeContext
 
 BuildChild = Callable[[Node], Child]
-"""Function that returns the child of a control node for a node of the mission."""
+"""Function from a mission node to the child of a control node."""
 
 
-class StandIn(Behaviour):
-    """Child of an inspection instance: it represents a node of the mission and is never executed.
+class ChildPlaceholder(Behaviour):
+    """Child of an inspection instance: a behaviour that represents a mission node and is never executed.
 
     Attributes:
-        node: Node of the mission.
+        node: The mission node.
     """
 
     def __init__(self, node: Node) -> None:
@@ -34,50 +34,50 @@ class StandIn(Behaviour):
         self.node = node
 
     def update(self) -> Status:
-        """Return INVALID, because the child is never executed."""
+        """Return INVALID, because placeholders are never executed."""
         return Status.INVALID
 
 
 def get_mission_node(child: Child) -> Node:
-    """Return the node of the mission that a child of an inspection instance represents."""
-    assert isinstance(child, StandIn)
+    """Return the mission node that a child of an inspection instance represents."""
+    assert isinstance(child, ChildPlaceholder)
     return child.node
 
 
 def make_inspection_instance(node: InnerNode) -> ControlNode:
-    """Return the control node of a node of the mission for checks and diagnosis; its children are `StandIn`s.
+    """Return a control node that is never executed, for checks and the diagnosis.
 
-    An invalid constant, which the check of constants reports, is replaced by a placeholder.
+    Its children are instances of `ChildPlaceholder`. A constant is valid even if the mission gives an invalid
+    value, which `check_constants` reports.
     """
     context = NodeContext(node.path, cast("Clock", None), Blackboard(), node.label)
-    return make_instance(node, context, StandIn)
+    return make_instance(node, context, ChildPlaceholder)
 
 
 def make_instance(node: InnerNode, context: NodeContext, build_child: BuildChild) -> ControlNode:
-    """Return the control node of a node of the mission, with the children that `build_child` returns."""
+    """Return the control node for a mission node; `build_child` returns its children."""
     return node.declaring_class(context, **_make_attributes(node, build_child))
 
 
 def has_valid_constants(node: InnerNode) -> bool:
-    """Return True if the values of all constants of a node are valid."""
-    for key in node.declaring_class.keys.values():
-        given = node.values.get(key.name)
-        value = given.value if isinstance(given, Literal) else None
-        if key.kind is KeyKind.CONSTANT and (given is not None or key.is_required):
-            try:
-                convert_constant(key, value, find_upper_bound(node, key))
-            except WrongType:
-                return False
+    """Return True if the mission gives valid values for all constants of a node."""
+    keys = [key for key in node.declaring_class.keys.values() if key.kind is KeyKind.CONSTANT]
+    try:
+        for key in keys:
+            if key.is_required or key.name in node.values:
+                _convert_constant(node, key, node.values.get(key.name))
+    except WrongType:
+        return False
     return True
 
 
 def find_upper_bound(owner: InnerNode | SectionNode, key: Key) -> int | None:
-    """Return the upper bound of a constant: the number of nodes under `max_key`; None for no bound."""
+    """Return the upper bound of a constant, which is the number of nodes under `max_key`; None: no bound."""
     return len(list_nodes(owner.values[key.max_key])) if key.max_key in owner.values else None
 
 
 def _make_attributes(owner: InnerNode | SectionNode, build_child: BuildChild) -> Mapping[str, object]:
-    """Return the values of the attributes of a control node or section, by attribute."""
+    """Return the values of all attributes that the constructor of a control node or section needs."""
     keys = (key for key in owner.declaring_class.keys.values() if key.is_required or key.name in owner.values)
     return {
         key.attribute: _make_attribute(owner, key, owner.values.get(key.name), build_child) for key in keys
@@ -87,6 +87,7 @@ def _make_attributes(owner: InnerNode | SectionNode, build_child: BuildChild) ->
 def _make_attribute(
     owner: InnerNode | SectionNode, key: Key, value: KeyValue | None, build_child: BuildChild
 ) -> object:
+    """Return the value of an attribute; `value` is None if the mission lacks the required key."""
     if isinstance(value, Node):
         return build_child(value)
     if isinstance(value, SectionNode):
@@ -103,15 +104,20 @@ def _make_attribute(
         return tuple(elements) if isinstance(elements, list) else VariableName(getattr(value, "name", ""))
     if key.kind is not KeyKind.CONSTANT:
         return ()
-    constant = value.value if isinstance(value, Literal) else None
     try:
-        return convert_constant(key, constant, find_upper_bound(owner, key))
+        return _convert_constant(owner, key, value)
     except WrongType:
-        return _make_placeholder(key)
+        return _make_valid_constant(key)
 
 
-def _make_placeholder(key: Key) -> object:
-    """Return a value for an invalid constant: a very large number, the default, or the first valid value."""
+def _convert_constant(owner: InnerNode | SectionNode, key: Key, value: KeyValue | None) -> object:
+    """Return the converted value of a constant, or raise WrongType."""
+    constant = value.value if isinstance(value, Literal) else None
+    return convert_constant(key, constant, find_upper_bound(owner, key))
+
+
+def _make_valid_constant(key: Key) -> object:
+    """Return a valid value of a constant: a very large number, the default, or the first allowed value."""
     if key.value_type in (int, float):
         return sys.maxsize if key.value_type is int else math.inf
     if not key.is_required:

@@ -9,14 +9,14 @@ from pydantic import JsonValue
 
 from executive.mission.model.nodes import Node
 from executive.mission.model.values import Literal, LocatedName, Value
-from executive.mission.source import Mark
+from executive.mission.source import Span
 
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of a subtree and its position; without a default, every `use` must give the argument."""
+    """An argument of a subtree, and the span of its name; None as default makes the argument mandatory."""
 
-    mark: Mark
+    span: Span
     default: Value | None
 
 
@@ -25,27 +25,30 @@ class Subtree:
     """A named tree under `trees`.
 
     Attributes:
-        mark: Position of the name.
-        returns: Variables that the caller gets, with their positions; all other variables are then local.
+        span: Position of the name.
+        doc: Purpose of the subtree, or "".
+        arguments: Arguments by name.
+        returns: Positions of the variables that the caller gets, by name; all other variables are local.
             None if the subtree shares all variables with the caller.
+        body: Root node of the subtree.
         library: Name of the library that defines the subtree; "" if the mission file defines it.
     """
 
     name: str
-    mark: Mark
+    span: Span
     doc: str
-    args: Mapping[str, Argument]
-    returns: Mapping[str, Mark] | None
-    do: Node
+    arguments: Mapping[str, Argument]
+    returns: Mapping[str, Span] | None
+    body: Node
     library: str = ""
 
 
 @dataclass(frozen=True)
 class Library:
-    """Content of a library file: its subtrees by name."""
+    """Name of a library, and its subtrees by name."""
 
     name: str
-    trees: Mapping[str, Subtree]
+    subtrees: Mapping[str, Subtree]
 
 
 @dataclass(frozen=True)
@@ -53,14 +56,15 @@ class MissionParam:
     """A constant of the mission.
 
     Attributes:
-        mark: Position of the name.
+        span: Position of the name.
         value: Value in this run: the value of `--set`, otherwise the default.
         type: `text`, `integer`, `number`, `boolean` or `list`; "" if unknown.
         minimum, maximum: Inclusive bounds, or None.
         choices: Allowed values, or None if all values are allowed.
+        doc: Meaning of the param, or "".
     """
 
-    mark: Mark
+    span: Span
     value: Literal
     type: str = ""
     minimum: float | None = None
@@ -71,10 +75,10 @@ class MissionParam:
 
 @dataclass(frozen=True)
 class Route:
-    """Class of objects `label`, with its position, and the bins that may receive the objects."""
+    """Class of objects, the span of the class in the text, and the bins that may receive the objects."""
 
     label: str
-    label_mark: Mark
+    label_span: Span
     bins: tuple[LocatedName, ...]
 
 
@@ -83,13 +87,13 @@ class Mission:
     """Content of a mission file.
 
     Attributes:
-        name: Value of the key `mission`.
+        name, description: Values of the keys `mission` and `description`.
         cell: Path of the cell file, relative to the folder of the mission.
         libraries: Paths of the library files, relative to the folder of the mission.
         params: Constants by name, with the values of `--set`.
         tree: Root node of the tree; None if the key is missing.
-        trees: Subtrees of the mission and of its libraries, by name.
-        is_complete: False if a library could not be read, so that `trees` may lack subtrees.
+        subtrees: Subtrees of the mission and of its libraries, by name.
+        is_complete: False if a library could not be read, so that `subtrees` may lack subtrees.
     """
 
     name: str
@@ -99,5 +103,5 @@ class Mission:
     params: Mapping[str, MissionParam] = field(default_factory=dict)
     routes: tuple[Route, ...] = ()
     tree: Node | None = None
-    trees: Mapping[str, Subtree] = field(default_factory=dict)
+    subtrees: Mapping[str, Subtree] = field(default_factory=dict)
     is_complete: bool = True

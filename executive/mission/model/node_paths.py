@@ -47,8 +47,11 @@ def get_type_name(node: Node) -> str:
 def _assign_path(node: Node, parent: str, slot: str, name: str | None = None) -> Node:
     """Return the node with its path and the paths of its descendants.
 
-    `parent` is the path of the parent, and `slot` the key of the parent that contains the node, or "". By
-    default, `name` is the name of the node; a list without a keyword has no name.
+    Args:
+        node: Node without path.
+        parent: Path of the parent.
+        slot: Key of the parent that contains the node, or "".
+        name: Name of the node in its path; None: the name of the node, or no name for a list.
     """
     path = _join(parent, slot)
     if name is not None or not _is_list(node):
@@ -66,9 +69,12 @@ def _assign_path(node: Node, parent: str, slot: str, name: str | None = None) ->
 def _assign_value_paths(
     owner: InnerNode | SectionNode, path: str, section_slot: str = ""
 ) -> dict[str, KeyValue]:
-    """Return the values of the keys with paths; `path` is the path of the control node.
+    """Return the values of the keys, in which all nodes have paths.
 
-    `section_slot` is the key of the control node that contains the section `owner`, or "".
+    Args:
+        owner: Control node, or a section of a control node.
+        path: Path of the control node.
+        section_slot: Key of the control node that contains the section `owner`, or "".
     """
     values: dict[str, KeyValue] = {}
     for key, value in iterate_keys(owner):
@@ -91,19 +97,20 @@ def _assign_value_paths(
     return values
 
 
-def _assign_list_paths(items: tuple[Node, ...], parent: str) -> tuple[Node, ...]:
+def _assign_list_paths(nodes: tuple[Node, ...], parent: str) -> tuple[Node, ...]:
     """Return the nodes of a list with unique paths."""
-    names = [get_path_name(node) for node in items]
-    counts = Counter(names)
-    nodes = []
-    for index, (node, name) in enumerate(zip(items, names, strict=True), 1):
+    counts = Counter(map(get_path_name, nodes))
+
+    def get_unique_name(index: int, node: Node) -> str:
+        name = get_path_name(node)
         has_own_name = bool(node.label) or isinstance(node, SkillNode | UseNode)
-        unique_name = name if has_own_name and counts[name] == 1 else f"{index}:{name}"
-        nodes.append(_assign_path(node, parent, "", unique_name))
-    return tuple(nodes)
+        return name if has_own_name and counts[name] == 1 else f"{index}:{name}"
+
+    return tuple(_assign_path(node, parent, "", get_unique_name(i, node)) for i, node in enumerate(nodes, 1))
 
 
 def _is_list(node: Node) -> bool:
+    """Return True for a list without a keyword."""
     return isinstance(node, InnerNode) and node.is_list
 
 

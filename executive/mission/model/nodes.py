@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TypeAlias
 
 from executive.mission.model.values import FailureName, LocatedName, Setting, Value
-from executive.mission.source import Mark
+from executive.mission.source import Span
 from executive.tree.keys import Key, KeyOwner
 from executive.tree.node import ControlNode
 
@@ -18,15 +18,15 @@ class Node:
     """Base class of the nodes.
 
     Attributes:
-        mark: Position of the skill, keyword or subtree name of the node; for a plain list, of the list.
+        span: Position of the skill, keyword or name of the subtree; for a list without keyword, of the list.
         label: Value of `as:`, or "".
-        label_mark: Position of the label, or None.
+        label_span: Position of the label, or None.
         path: Unique path from the root of the expanded tree; "" before expansion.
     """
 
-    mark: Mark
+    span: Span
     label: str
-    label_mark: Mark | None = field(default=None, kw_only=True)
+    label_span: Span | None = field(default=None, kw_only=True)
     path: str = field(default="", kw_only=True)
 
     @property
@@ -48,7 +48,7 @@ class SkillNode(Node):
     Attributes:
         skill: Name of the skill.
         settings: Values of params and ports in the mission, by name.
-        variables_by_port: Variables of the ports that the mission does not set; by default the port's name.
+        variables_by_port: Variable of each port without a setting; a missing port has a variable of its name.
     """
 
     skill: str
@@ -58,10 +58,10 @@ class SkillNode(Node):
 
 @dataclass(frozen=True)
 class UnknownNode(Node):
-    """A node that could not be read; a finding states the reason.
+    """A node with an error that a finding reports.
 
     Attributes:
-        parts: Nodes below it that could be read.
+        parts: Nodes below this node that have no errors.
     """
 
     parts: tuple[Node, ...] = ()
@@ -78,12 +78,12 @@ class SectionNode:
 
     Attributes:
         declaring_class: Class that declares the keys.
-        mark: Position of the mapping.
+        span: Position of the mapping.
         values: Values of the given keys.
     """
 
     declaring_class: type[KeyOwner]
-    mark: Mark
+    span: Span
     values: Mapping[str, KeyValue]
 
 
@@ -94,7 +94,7 @@ class InnerNode(Node):
     Attributes:
         declaring_class: Class of the control node, which declares the keys.
         values: Values of the given keys.
-        is_list: True for a bare list, which is a sequence without keyword.
+        is_list: True for a sequence that is written as a list, without keyword.
     """
 
     declaring_class: type[ControlNode]
@@ -103,7 +103,7 @@ class InnerNode(Node):
 
     @cached_property
     def children(self) -> tuple[Node, ...]:
-        """The nodes in the values of the keys, also in sections."""
+        """The nodes in the values of the keys and in sections."""
         return tuple(node for _, value in iterate_keys(self) for node in list_nodes(value))
 
 
@@ -114,8 +114,8 @@ class UseNode(Node):
     Attributes:
         name: Name of the subtree.
         arguments: Values of the arguments, by name.
-        returns: Variables of the caller that receive returned variables, by their names in the subtree.
-        returned_variables: Variables of the caller that the subtree returns; () before expansion.
+        returns: Variables of the caller, by the name of the returned variable in the subtree.
+        returned_variables: Variables of the caller that the subtree writes; () before expansion.
         body: Expanded subtree; None before expansion.
     """
 
@@ -138,16 +138,16 @@ KeyValue: TypeAlias = (
 
 
 def iterate_keys(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, KeyValue]]:
-    """Yield the given keys with their values, in the order of the declarations."""
+    """Yield every key that has a value, and the value, in the order of the declarations."""
     for name, key in owner.declaring_class.keys.items():
         if name in owner.values:
             yield key, owner.values[name]
 
 
 def list_nodes(value: KeyValue) -> list[Node]:
-    """Return the nodes in the value of a key, without their descendants."""
+    """Return the nodes in the value of a key, without the descendants of these nodes."""
     if isinstance(value, SectionNode):
-        return [node for _, inner in iterate_keys(value) for node in list_nodes(inner)]
+        return [node for _, inner_value in iterate_keys(value) for node in list_nodes(inner_value)]
     if isinstance(value, tuple):
         return [node for item in value if not isinstance(item, FailureName) for node in list_nodes(item)]
     return [value] if isinstance(value, Node) else []

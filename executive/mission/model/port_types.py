@@ -6,17 +6,18 @@ import types
 from collections.abc import Sequence
 from typing import Any, NoReturn, Union, get_args, get_origin
 
-_PHRASES_BY_TYPE = {
+_DESCRIPTIONS = {
     str: "a text",
     int: "a whole number",
     float: "a number",
     bool: "true or false",
     type(None): "nothing",
 }
+"""Description of the values of a type, for messages."""
 
 
 def is_assignable(source: object, target: object) -> bool:
-    """Return True if a variable of the type `target` may get every value of the type `source`."""
+    """Return True if every value of the type `source` is also a value of the type `target`."""
     if source is Any or target is Any or source == target or source is NoReturn:
         return True
     if _is_union(source):
@@ -28,14 +29,14 @@ def is_assignable(source: object, target: object) -> bool:
     if not issubclass(_get_class(source), _get_class(target)):
         return False
     arguments = zip(get_args(source), get_args(target), strict=False)
-    return all(is_assignable(one, other) for one, other in arguments if ... not in (one, other))
+    return all(is_assignable(*pair) for pair in arguments if ... not in pair)
 
 
 def find_element_type(declared: object) -> object:
     """Return the type of the elements of a list or tuple type, or None for other types."""
     if declared is Any:
         return Any
-    if not issubclass(_get_class(declared), Sequence) or _get_class(declared) is str:
+    if declared is str or not issubclass(_get_class(declared), Sequence):
         return None
     arguments = [argument for argument in get_args(declared) if argument is not ...]
     return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - the number of types varies
@@ -43,8 +44,8 @@ def find_element_type(declared: object) -> object:
 
 def describe_type(declared: object) -> str:
     """Return a description of the values of a type, for a sentence: `a list of Target`."""
-    if declared in _PHRASES_BY_TYPE:
-        return _PHRASES_BY_TYPE[declared]
+    if declared in _DESCRIPTIONS:
+        return _DESCRIPTIONS[declared]
     if _is_union(declared):
         return " or ".join(describe_type(part) for part in get_args(declared))
     element_type = find_element_type(declared)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pydantic import JsonValue
 
-from executive.mission.source import Mark
+from executive.mission.source import Span
 from executive.tree.failure import Reason
 
 
@@ -16,34 +16,34 @@ class Literal:
 
     Attributes:
         value: Plain value: None, boolean, number, string, list or mapping.
-        mark: Position of the value.
-        origin: For the value of a param or an argument: its reference, `$attempts in line 12`; otherwise "".
-        reference_mark: For the value of a param or an argument: position of the reference; otherwise None.
-        element_marks: Positions of the elements, if the value is a list.
+        span: Position of the value.
+        origin: Reference that the value has replaced, as `$attempts in line 12`; "" without a reference.
+        reference_span: Position of the replaced reference, or None.
+        element_spans: Positions of the elements, if the value is a list.
     """
 
     value: JsonValue
-    mark: Mark
+    span: Span
     origin: str = ""
-    reference_mark: Mark | None = None
-    element_marks: tuple[Mark, ...] = ()
+    reference_span: Span | None = None
+    element_spans: tuple[Span, ...] = ()
 
     @property
     def origin_note(self) -> str:
-        """The origin in brackets, for the end of a sentence about the value, or ""."""
+        """The origin in brackets, for the end of a sentence about the value; "" without a reference."""
         return f" (value of {self.origin})" if self.origin else ""
 
-    def get_element_mark(self, index: int) -> Mark:
-        """Return the position of an element of the list, or of the list if it is unknown."""
-        return self.element_marks[index] if index < len(self.element_marks) else self.mark
+    def get_element_span(self, index: int) -> Span:
+        """Return the position of an element, or the position of the list if the element has no position."""
+        return self.element_spans[index] if index < len(self.element_spans) else self.span
 
 
 @dataclass(frozen=True)
 class Reference:
-    """`$name`: a param, an argument or a variable before expansion, and a variable after expansion."""
+    """`$name`: a param, an argument or a variable. After expansion, every reference is a variable."""
 
     name: str
-    mark: Mark
+    span: Span
 
 
 Value = Literal | Reference
@@ -54,14 +54,14 @@ class LocatedName:
     """A name and its position: a bin in a route, the path of a library, the variable of a loop."""
 
     name: str
-    mark: Mark
+    span: Span
 
 
 @dataclass(frozen=True)
 class Setting:
     """`name: value` below a skill, `with` or `returns`: the value, and the position of the name."""
 
-    name_mark: Mark
+    name_span: Span
     value: Value
 
 
@@ -69,4 +69,4 @@ class Setting:
 class FailureName(Reason):
     """`Skill.reason` or `label.reason` below `on` or `until`, with its position."""
 
-    mark: Mark
+    span: Span

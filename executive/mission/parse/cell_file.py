@@ -13,7 +13,7 @@ from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings
 from executive.mission.parse.cell_layout import find_overlaps
 from executive.mission.parse.overrides import CELL_PREFIX, make_override_source, override_cell
-from executive.mission.parse.validate import KeyPath, find_mark, validate
+from executive.mission.parse.validate import KeyPath, find_span, validate
 from executive.mission.source import Source
 from executive.mission.text.file_search import find_file_below, read_source
 from executive.mission.text.yaml_text import (
@@ -54,8 +54,8 @@ class CellFile:
 
     def make_error(self, path: KeyPath, code: str, message: str) -> Finding:
         """Return an error about the value at `path`."""
-        mark = find_mark(self.root, path) if self.root else self.source.make_mark()
-        return make_error(mark, code, message)
+        span = find_span(self.root, path) if self.root else self.source.make_span()
+        return make_error(span, code, message)
 
 
 def load_cell(path: Path, overrides: Mapping[str, str] | None = None) -> CellConfig:
@@ -145,7 +145,7 @@ class _CellFileReader:
             if root is not None and not isinstance(root, YamlMapping):
                 raise InputError(f"{source.path} must be a mapping, not {describe_node(root)}")
         except InputError as problem:
-            self.findings.append(make_error(reference.mark, "no-base", str(problem)))
+            self.findings.append(make_error(reference.span, "no-base", str(problem)))
             return None
         return root
 
@@ -190,8 +190,8 @@ def _find_overridden_base(overrides: Mapping[str, str]) -> Iterator[Finding]:
     """Yield an error if an override changes the base, because only the cell file may do this."""
     key = f"{CELL_PREFIX}{BASE_KEY}"
     if key in overrides:
-        mark = make_override_source(key, overrides[key]).make_mark(1, 1, len(key))
-        yield make_error(mark, "unknown-key", "--set cannot change the base of a cell; edit the cell file")
+        span = make_override_source(key, overrides[key]).make_span(1, 1, len(key))
+        yield make_error(span, "unknown-key", "--set cannot change the base of a cell; edit the cell file")
 
 
 def _find_unknown_poses(file: CellFile, config: CellConfig) -> Iterator[Finding]:
@@ -213,7 +213,7 @@ def _list_model_files(
         for key, model in (("urdf", kind.urdf), ("mesh", kind.mesh)):
             if model:
                 keys = ("objects", label, key)
-                yield keys, folders.get(find_mark(file.root, keys).source, folders[file.source]), model
+                yield keys, folders.get(find_span(file.root, keys).source, folders[file.source]), model
 
 
 def _resolve_model_files(config: CellConfig, model_files: Iterable[tuple[KeyPath, Path, str]]) -> CellConfig:

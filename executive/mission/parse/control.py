@@ -4,36 +4,49 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
-from executive.mission.model import nodes as model
-from executive.mission.model.nodes import KeyValue
+from executive.mission.model.nodes import InnerNode, KeyValue, Node, SectionNode, UnknownNode, list_nodes
 from executive.mission.model.values import LocatedName
-from executive.mission.parse.fields import NAME_PATTERN, Fields, read_value
-from executive.mission.source import Mark
-from executive.mission.text import yaml_text as yaml
-from executive.tree.keys import Key, KeyKind
-from executive.tree.keys import KeySection as DeclaredSection
+from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
+from executive.mission.source import Span
+from executive.mission.text.yaml_text import (
+    YamlEntry,
+    YamlMapping,
+    YamlNode,
+    YamlScalar,
+    YamlSequence,
+    describe_node,
+)
+from executive.tree.keys import Key, KeyKind, KeySection
 from executive.tree.node import ControlNode
 
 if TYPE_CHECKING:
     from executive.mission.parse.node_parser import NodeParser
 
-
-def make_unknown_node(mark: Mark) -> model.Node:
-    """Return a placeholder for a node that cannot be read; the caller adds a finding with the reason."""
-    return model.UnknownNode(mark, "")
+KeyClass: TypeAlias = type[ControlNode] | type[KeySection]
+"""Class that declares the keys of a control node or of a section."""
 
 
-def find_shorthand_key(owner: type[ControlNode] | type[DeclaredSection]) -> Key | None:
+def make_unknown_node(span: Span) -> UnknownNode:
+    """Return a placeholder for an invalid node; the caller adds a finding with the reason."""
+    return UnknownNode(span, "")
+
+
+def find_shorthand_key(owner: KeyClass) -> Key | None:
     """Return the key whose value may directly follow the keyword of a node or section, or None."""
     return next((key for key in owner.keys.values() if key.is_shorthand), None)
 
 
-def find_inner_keys(owner: type[ControlNode] | type[DeclaredSection]) -> Mapping[str, Key]:
+def find_inner_keys(owner: KeyClass) -> Mapping[str, Key]:
     """Return the keys of the mapping below a keyword; no keys if the value must not be a mapping."""
     inner_keys = {name: key for name, key in owner.keys.items() if not key.is_sibling}
     return {} if all(key.is_shorthand for key in inner_keys.values()) else inner_keys
+
+
+def find_sibling_keys(owner: KeyClass) -> Mapping[str, Key]:
+    """Return the keys at the level of the keyword."""
+    return {name: key for name, key in owner.keys.items() if key.is_sibling}
 
 
 @dataclass(frozen=True)
@@ -41,144 +54,145 @@ class ControlEntry:
     """A control node in the YAML tree.
 
     Attributes:
-        node: Mapping that contains the keyword and its sibling keys.
-        mark: Position of the keyword.
+        mapping: Mapping that contains the keyword and its sibling keys.
+        keyword: Keyword of the control node.
+        span: Position of the keyword.
         label: Value of `as`, or "".
+        value: Value of the keyword.
     """
 
-    node: yaml.YamlMapping
+    mapping: YamlMapping
     keyword: str
-    mark: Mark
+    span: Span
     label: str
-    value: yaml.YamlNode
+    value: YamlNode
 
 
-def read_control_node(parser: NodeParser, entry: ControlEntry, node_class: type[ControlNode]) -> model.Node:
-    """Return the control node of an entry; an unknown node if its children or a variable cannot be read."""
-    reader = _KeyReader(parser)
-    keyword, mark = entry.keyword, entry.mark
-    values = reader.read_inner_keys(keyword, mark, entry.value, node_class)
-    siblings = {name: key for name, key in node_class.keys.items() if key.is_sibling}
-    for name, key in siblings.items():
-        if (value := entry.node.get(name)) is not None:
-            fields = Fields(keyword, mark, entry.node, entry.node.keys, parser.findings)
-            reader.read_key(fields, key, value, value.mark, values)
+def read_control_node(parser: NodeParser, entry: ControlEntry, node_class: type[ControlNode]) -> Node:
+    """Return the control node of an entry, or an unknown node if the children or a variable are invalid."""
+    key_reader = _KeyReader(parser)
+    keyword, span, sibling_keys = entry.keyword, entry.span, find_sibling_keys(node_class)
+    values = key_reader.read_inner_keys(keyword, span, entry.value, node_class)
+    siblings = MappingReader(keyword, span, entry.mapping, entry.mapping.keys, parser.findings)
+    for name, key in sibling_keys.items():
+        if (value := siblings.get(name)) is not None:
+            key_reader.read_key(siblings, key, value, value.span, values)
     any_of = node_class.any_of
-    if reader.is_mapping_valid and any_of and not any(_is_given(entry, name) for name in any_of):
-        level = f" at the level of {keyword}" if set(any_of) <= set(siblings) else ""
-        listed = " or ".join(f'"{name}"' for name in any_of)
-        parser.add_error(mark, "missing-key", f"{keyword} needs {listed}{level}")
-    missing = [key.kind for name, key in node_class.keys.items() if key.is_required and name not in values]
+    if key_reader.is_mapping_valid and any_of and not any(_has_key(entry, name) for name in any_of):
+        level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
+        alternatives = " or ".join(f'"{name}"' for name in any_of)
+        parser.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
+    missing = {key.kind for name, key in node_class.keys.items() if key.is_required and name not in values}
     if KeyKind.NODES in missing:
-        return make_unknown_node(mark)
-    if KeyKind.VARIABLE in missing or KeyKind.ELEMENTS in missing:
-        children = [node for value in values.values() for node in model.list_nodes(value)]
-        return model.UnknownNode(mark, entry.label, tuple(children))
-    return model.InnerNode(mark, entry.label, node_class, values)
+        return make_unknown_node(span)
+    if missing & {KeyKind.VARIABLE, KeyKind.ELEMENTS}:
+        children = [node for value in values.values() for node in list_nodes(value)]
+        return UnknownNode(span, entry.label, tuple(children))
+    return InnerNode(span, entry.label, node_class, values)
 
 
-def _is_given(entry: ControlEntry, key: str) -> bool:
+def _has_key(entry: ControlEntry, key: str) -> bool:
     """Return True if a key is written below the keyword or at the level of the keyword."""
-    mappings = (entry.value, entry.node)
-    return any(isinstance(node, yaml.YamlMapping) and key in node.keys for node in mappings)
+    mappings = (entry.value, entry.mapping)
+    return any(isinstance(node, YamlMapping) and key in node.keys for node in mappings)
 
 
 class _KeyReader:
     """Reader of the keys of one control node.
 
     Attributes:
-        is_mapping_valid: False if the value of the node, or of a section, must be a mapping and is not one.
+        is_mapping_valid: False if the value of the node or of a section is no mapping, but must be a mapping.
     """
 
     def __init__(self, parser: NodeParser) -> None:
         self.parser = parser
         self.is_mapping_valid = True
 
-    def read_inner_keys(
-        self, name: str, mark: Mark, value: yaml.YamlNode, owner: type[ControlNode] | type[DeclaredSection]
-    ) -> dict[str, KeyValue]:
+    def read_inner_keys(self, name: str, span: Span, value: YamlNode, owner: KeyClass) -> dict[str, KeyValue]:
         """Return the values of the keys of `owner` in `value`, which is the value of the key `name`."""
         values: dict[str, KeyValue] = {}
         shorthand, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
-        is_list_expected = shorthand is not None and shorthand.kind is KeyKind.NODES
-        is_short = isinstance(value, yaml.YamlSequence) if is_list_expected else shorthand is not None
-        is_mapping = isinstance(value, yaml.YamlMapping)
-        if shorthand is not None and (not inner_keys or (is_short and not is_mapping)):
-            entry = yaml.YamlEntry(yaml.YamlScalar(mark, name, shorthand.name), value)
-            mapping = yaml.YamlMapping(mark, (entry,))
-            fields = Fields(name, mark, mapping, [shorthand.name], self.parser.findings)
-            self.read_key(fields, shorthand, value, mark, values)
+        is_list_required = shorthand is not None and shorthand.kind is KeyKind.NODES
+        # A mapping contains the inner keys, even if a node, which can be a mapping, may follow the keyword.
+        is_short = isinstance(value, YamlSequence) or not (is_list_required or isinstance(value, YamlMapping))
+        if shorthand is not None and (is_short or not inner_keys):
+            # The value is read like the value of the omitted key.
+            complete = YamlMapping(span, (YamlEntry(YamlScalar(span, name, shorthand.name), value),))
+            reader = MappingReader(name, span, complete, [shorthand.name], self.parser.findings)
+            self.read_key(reader, shorthand, value, span, values)
             return values
-        fields = Fields(name, mark, value, inner_keys, self.parser.findings)
-        self.is_mapping_valid = self.is_mapping_valid and fields.is_mapping
+        reader = MappingReader(name, span, value, inner_keys, self.parser.findings)
+        self.is_mapping_valid = self.is_mapping_valid and reader.is_mapping
         for key in inner_keys.values():
-            given = fields.require(key.name) if key.is_required else fields.get(key.name)
-            if given is not None:
-                self.read_key(fields, key, given, fields.get_key_mark(key.name), values)
+            key_value = reader.require(key.name) if key.is_required else reader.get(key.name)
+            if key_value is not None:
+                self.read_key(reader, key, key_value, reader.get_key_span(key.name), values)
             elif key.kind is KeyKind.NODE and key.is_required:
-                values[key.name] = make_unknown_node(mark)
+                values[key.name] = make_unknown_node(span)
         return values
 
     def read_key(
-        self, fields: Fields, key: Key, node: yaml.YamlNode, mark: Mark, values: dict[str, KeyValue]
+        self, reader: MappingReader, key: Key, node: YamlNode, span: Span, values: dict[str, KeyValue]
     ) -> None:
-        """Add the value of a key to `values` if it is valid; `mark` is the position for a missing node."""
-        value = self._read_value(fields, key, node, mark)
+        """Add the value of a key to `values` if it is valid; `span` is the position for a missing node."""
+        value = self._read_value(reader, key, node, span)
         if value is not None:
             values[key.name] = value
 
-    def _read_value(self, fields: Fields, key: Key, node: yaml.YamlNode, mark: Mark) -> KeyValue | None:
+    def _read_value(self, reader: MappingReader, key: Key, node: YamlNode, span: Span) -> KeyValue | None:
+        """Return the value of a key, or None after an error and for an omitted optional child."""
         match key.kind:
             case KeyKind.NODE:
-                is_empty = isinstance(node, yaml.YamlScalar) and node.value is None
-                is_omitted = is_empty and key.is_shorthand and not key.is_required
-                return None if is_omitted else self.parser.read_node(node, mark)
+                is_omitted = is_empty(node) and key.is_shorthand and not key.is_required
+                return None if is_omitted else self.parser.read_node(node, span)
             case KeyKind.NODES:
-                return self._read_nodes(fields, key, node)
+                return self._read_nodes(reader, key, node)
             case KeyKind.REASONS:
-                return fields.read_failure_names(key.name)
+                return reader.read_failure_names(key.name)
             case KeyKind.VARIABLE:
-                return self._read_variable(fields, key.name)
+                return self._read_variable(reader, key.name)
             case KeyKind.SECTION:
-                return self._read_section(key, node, mark)
+                return self._read_section(key, node, span)
             case KeyKind.SECTIONS:
                 return tuple(self._read_sections(key, node))
         return read_value(node, self.parser.findings)
 
-    def _read_nodes(self, fields: Fields, key: Key, value: yaml.YamlNode) -> tuple[model.Node, ...] | None:
-        nodes = self.parser.read_nodes(value, fields.owner)
+    def _read_nodes(self, reader: MappingReader, key: Key, value: YamlNode) -> tuple[Node, ...] | None:
+        nodes = self.parser.read_nodes(value, reader.owner)
         if key.max_count is not None and len(nodes) > key.max_count:
-            message = f"{fields.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
-            self.parser.add_error(fields.mark, "too-large", message)
+            message = f"{reader.owner} has {len(nodes)} branches, but may have at most {key.max_count}"
+            self.parser.add_error(reader.span, "too-large", message)
             return None
         return nodes or None
 
-    def _read_variable(self, fields: Fields, key: str) -> LocatedName | None:
-        variable = LocatedName(fields.read_text(key), fields.get_value_mark(key))
+    def _read_variable(self, reader: MappingReader, key: str) -> LocatedName | None:
+        """Return the variable that a key names; a wrong `$` before the name is an error, but is ignored."""
+        variable = LocatedName(reader.read_text(key), reader.get_value_span(key))
         if NAME_PATTERN.fullmatch(variable.name):
             return variable
         hint = f"Write the name without $, for example {key}: target; $target is then the value."
         message = f'"{variable.name}" is no valid name of a variable'
-        self.parser.add_error(variable.mark, "bad-name", message, hint)
+        self.parser.add_error(variable.span, "bad-name", message, hint)
         name = variable.name.removeprefix("$")
-        return LocatedName(name, variable.mark) if NAME_PATTERN.fullmatch(name) else None
+        return LocatedName(name, variable.span) if NAME_PATTERN.fullmatch(name) else None
 
-    def _read_section(self, key: Key, value: yaml.YamlNode, mark: Mark) -> model.SectionNode | None:
-        """Return the section below a key, or None if it lacks a required constant."""
-        values = self.read_inner_keys(key.name, mark, value, key.section)
-        required_keys = [inner for inner in key.section.keys.values() if inner.is_required]
-        has_constants = all(inner.name in values for inner in required_keys if inner.kind is KeyKind.CONSTANT)
-        return model.SectionNode(key.section, mark, values) if has_constants else None
+    def _read_section(self, key: Key, value: YamlNode, span: Span) -> SectionNode | None:
+        """Return the section below a key, or None if the section lacks a required constant."""
+        values = self.read_inner_keys(key.name, span, value, key.section)
+        for name, inner_key in key.section.keys.items():
+            if inner_key.is_required and inner_key.kind is KeyKind.CONSTANT and name not in values:
+                return None
+        return SectionNode(key.section, span, values)
 
-    def _read_sections(self, key: Key, value: yaml.YamlNode) -> Iterable[model.SectionNode]:
+    def _read_sections(self, key: Key, value: YamlNode) -> Iterable[SectionNode]:
         """Yield the sections of a list, or a single section."""
-        expected = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
-        if not isinstance(value, yaml.YamlSequence | yaml.YamlMapping):
-            message = f"{key.name} must be a {expected}, or a list of those, not {yaml.describe_node(value)}"
-            self.parser.add_error(value.mark, "wrong-type", message)
+        section_kind = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
+        if not isinstance(value, YamlSequence | YamlMapping):
+            message = f"{key.name} must be a {section_kind}, or a list of those, not {describe_node(value)}"
+            self.parser.add_error(value.span, "wrong-type", message)
             return
-        if isinstance(value, yaml.YamlSequence) and not value.items:
-            self.parser.add_error(value.mark, "empty-list", f"{key.name} needs at least one {expected}")
-        for item in value.items if isinstance(value, yaml.YamlSequence) else (value,):
-            if (section := self._read_section(key, item, item.mark)) is not None:
+        if isinstance(value, YamlSequence) and not value.items:
+            self.parser.add_error(value.span, "empty-list", f"{key.name} needs at least one {section_kind}")
+        for item in value.items if isinstance(value, YamlSequence) else (value,):
+            if (section := self._read_section(key, item, item.span)) is not None:
                 yield section

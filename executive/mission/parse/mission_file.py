@@ -6,164 +6,171 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from executive.mission.findings import Finding, make_error
 from executive.mission.model import grammar
+from executive.mission.model.grammar import GrammarKey
 from executive.mission.model.mission import Argument, Library, Mission, Route, Subtree
 from executive.mission.model.values import LocatedName
-from executive.mission.parse.fields import NAME_PATTERN, Fields, read_value
-from executive.mission.parse.node_parser import NodeParser, Skills
+from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
+from executive.mission.parse.node_parser import NodeParser
 from executive.mission.parse.params import parse_params
-from executive.mission.source import Mark
+from executive.mission.source import Span
 from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, describe_node
-from executive.tree.node_registry import ControlNodes
 
 _MISSION_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
+"""Names of missions, which are also parts of the names of run directories."""
 
 
-def parse_mission(
-    root: YamlNode, overrides: Mapping[str, str], skills: Skills, node_classes: ControlNodes
-) -> tuple[Mission, list[Finding]]:
-    """Return the content of a mission file, without unreadable parts, and the findings."""
-    findings: list[Finding] = []
-    start = replace(root.mark, length=1)
-    fields = Fields("the mission", start, root, grammar.MISSION_KEYS, findings)
-    for key in ("mission", "cell", "tree"):
-        fields.require(key)
-    parser = NodeParser(findings, skills, node_classes)
-    tree = fields.get("tree")
-    mission = Mission(
-        name=_read_name(fields),
-        description=fields.read_text("description"),
-        cell=_read_cell(fields),
+def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodeParser) -> Mission:
+    """Return the content of a mission file without invalid parts; add errors to the findings of `parser`."""
+    reader = _make_file_reader("the mission", root, grammar.MISSION_KEYS, parser)
+    tree = reader.get("tree")
+    return Mission(
+        name=_read_name(reader),
+        description=reader.read_text("description"),
+        cell=_read_cell(reader),
         libraries=_read_names(
-            fields.list_items("library"), "library must be the path of a file or a list of paths", findings
+            reader, reader.list_items("library"), "library must be the path of a file or a list of paths"
         ),
-        params=parse_params(fields, overrides),
-        routes=_read_routes(fields),
-        tree=None if tree is None else parser.read_node(tree, fields.get_key_mark("tree")),
-        trees=_read_trees(fields, parser),
+        params=parse_params(reader, overrides),
+        routes=_read_routes(reader),
+        tree=None if tree is None else parser.read_node(tree, reader.get_key_span("tree")),
+        subtrees=_read_subtrees(reader, parser),
     )
-    return mission, findings
 
 
-def _read_name(fields: Fields) -> str:
-    name = fields.read_text("mission")
-    if isinstance(fields.get("mission"), YamlScalar) and not _MISSION_NAME_PATTERN.fullmatch(name):
+def _make_file_reader(
+    owner: str, root: YamlNode, keys: Mapping[str, GrammarKey], parser: NodeParser
+) -> MappingReader:
+    """Return the reader of the mapping `root` of a file, after errors about missing keys."""
+    reader = MappingReader(owner, replace(root.span, length=1), root, keys, parser.findings)
+    for name, key in keys.items():
+        if key.is_required:
+            reader.require(name)
+    return reader
+
+
+def _read_name(reader: MappingReader) -> str:
+    name = reader.read_text("mission")
+    if isinstance(reader.get("mission"), YamlScalar) and not _MISSION_NAME_PATTERN.fullmatch(name):
         message = f'"{name}" is no valid name of a mission'
         hint = 'Use at most 64 letters, digits, "_" and "-", and begin with a letter.'
-        fields.findings.append(make_error(fields.get_value_mark("mission"), "bad-name", message, hint))
+        reader.add_error(reader.get_value_span("mission"), "bad-name", message, hint)
     return name
 
 
-def _read_cell(fields: Fields) -> LocatedName:
-    cell = LocatedName(fields.read_text("cell"), fields.get_value_mark("cell"))
-    if isinstance(fields.get("cell"), YamlScalar) and not cell.name:
-        fields.findings.append(make_error(cell.mark, "bad-name", "cell must be the path of a cell file"))
+def _read_cell(reader: MappingReader) -> LocatedName:
+    cell = LocatedName(reader.read_text("cell"), reader.get_value_span("cell"))
+    if isinstance(reader.get("cell"), YamlScalar) and not cell.name:
+        reader.add_error(cell.span, "bad-name", "cell must be the path of a cell file")
     return cell
 
 
-def _read_routes(fields: Fields) -> tuple[Route, ...]:
+def _read_routes(reader: MappingReader) -> tuple[Route, ...]:
     routes: list[Route] = []
 
-    def read_route(label: str, mark: Mark, node: YamlNode) -> None:
+    def read_route(label: str, span: Span, node: YamlNode) -> None:
         items = node.items if isinstance(node, YamlSequence) else (node,)
         if not items:
-            fields.findings.append(make_error(node.mark, "empty-list", "a route needs at least one bin"))
-        bins = _read_names(items, "a route must be a bin or a list of bins", fields.findings)
-        routes.append(Route(label, mark, bins))
+            reader.add_error(node.span, "empty-list", "a route needs at least one bin")
+        bins = _read_names(reader, items, "a route must be a bin or a list of bins")
+        routes.append(Route(label, span, bins))
 
-    fields.read_entries("routes", read_route)
+    reader.read_entries("routes", read_route)
     return tuple(routes)
 
 
-def _read_names(items: Iterable[YamlNode], rule: str, findings: list[Finding]) -> tuple[LocatedName, ...]:
+def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> tuple[LocatedName, ...]:
     """Return the texts in a list; for each other item, add an error whose message begins with `rule`."""
     names = []
     for item in items:
         if isinstance(item, YamlScalar) and isinstance(item.value, str):
-            names.append(LocatedName(item.text, item.mark))
+            names.append(LocatedName(item.text, item.span))
         else:
-            findings.append(make_error(item.mark, "wrong-type", f"{rule}, not {describe_node(item)}"))
+            reader.add_error(item.span, "wrong-type", f"{rule}, not {describe_node(item)}")
     return tuple(names)
 
 
-def parse_library(
-    root: YamlNode, skills: Skills, node_classes: ControlNodes
-) -> tuple[Library, list[Finding]]:
-    """Return the content of a library file, without unreadable parts, and the findings."""
-    findings: list[Finding] = []
-    start = replace(root.mark, length=1)
-    fields = Fields("the library", start, root, grammar.LIBRARY_KEYS, findings)
-    for key in ("library", "trees"):
-        fields.require(key)
-    name = fields.read_text("library")
-    parser = NodeParser(findings, skills, node_classes)
-    return Library(name, _read_trees(fields, parser, name or "library")), findings
+def parse_library(root: YamlNode, parser: NodeParser) -> Library:
+    """Return the content of a library file without invalid parts; add errors to the findings of `parser`."""
+    reader = _make_file_reader("the library", root, grammar.LIBRARY_KEYS, parser)
+    name = reader.read_text("library")
+    return Library(name, _read_subtrees(reader, parser, name or "library"))
 
 
-def _read_trees(fields: Fields, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
+def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
     """Return the subtrees below `trees`; `library` is the name of their library, "" for the mission file."""
-    trees: dict[str, Subtree] = {}
+    subtrees: dict[str, Subtree] = {}
 
-    def read_tree(name: str, mark: Mark, node: YamlNode) -> None:
+    def read_subtree(name: str, span: Span, node: YamlNode) -> None:
         if not NAME_PATTERN.fullmatch(name):
             message = f'"{name}" is no valid name of a subtree'
             hint = 'Use letters, digits and "_", and begin with no digit.'
-            parser.add_error(mark, "bad-name", message, hint)
+            parser.add_error(span, "bad-name", message, hint)
         if isinstance(node, YamlMapping) and set(grammar.SUBTREE_KEYS) & set(node.keys):
             has_body = node.get("do") is not None
             if not has_body:
-                parser.add_error(mark, "missing-key", f'the subtree "{name}" needs the key "do"')
+                parser.add_error(span, "missing-key", f'the subtree "{name}" needs the key "do"')
             subtree_parser = parser if has_body else parser.make_silent_parser()
-            trees[name] = _read_subtree(name, mark, node, subtree_parser, library)
+            subtrees[name] = _parse_subtree(name, span, node, subtree_parser, library)
         else:
-            trees[name] = Subtree(name, mark, "", {}, None, parser.read_node(node, mark), library)
+            subtrees[name] = Subtree(name, span, "", {}, None, parser.read_node(node, span), library)
 
-    fields.read_entries("trees", read_tree)
-    return trees
+    reader.read_entries("trees", read_subtree)
+    return subtrees
 
 
-def _read_subtree(name: str, mark: Mark, node: YamlMapping, parser: NodeParser, library: str) -> Subtree:
-    fields = Fields(f'the subtree "{name}"', mark, node, grammar.SUBTREE_KEYS, parser.findings)
-    args: dict[str, Argument] = {}
+def _parse_subtree(name: str, span: Span, node: YamlMapping, parser: NodeParser, library: str) -> Subtree:
+    """Return the subtree of a mapping with subtree keys; `span` is the position of the name."""
+    reader = MappingReader(f'the subtree "{name}"', span, node, grammar.SUBTREE_KEYS, parser.findings)
+    return Subtree(
+        name,
+        span,
+        doc=reader.read_text("doc"),
+        arguments=_read_arguments(reader),
+        returns=_read_returns(reader),
+        body=parser.read_node(reader.get("do"), reader.get_key_span("do")),
+        library=library,
+    )
 
-    def read_argument(argument: str, argument_mark: Mark, value: YamlNode) -> None:
-        if not NAME_PATTERN.fullmatch(argument):
+
+def _read_arguments(reader: MappingReader) -> dict[str, Argument]:
+    """Return the arguments below `args`, which is a list of names, or a mapping of names to defaults."""
+    arguments: dict[str, Argument] = {}
+
+    def read_argument(name: str, span: Span, value: YamlNode) -> None:
+        if not NAME_PATTERN.fullmatch(name):
             hint = "Write the name without $; in the subtree, $name is the value."
-            message = f'"{argument}" is no valid name of an argument'
-            parser.add_error(argument_mark, "bad-name", message, hint)
-            argument = argument.removeprefix("$")
-        if argument in args:
-            first_line = args[argument].mark.line
-            message = f'the argument "{argument}" occurs twice; the first is in line {first_line}'
-            parser.add_error(argument_mark, "duplicate-key", message)
-        is_required = isinstance(value, YamlScalar) and value.value is None
-        default = None if is_required else read_value(value, parser.findings)
-        args[argument] = Argument(argument_mark, default)
+            reader.add_error(span, "bad-name", f'"{name}" is no valid name of an argument', hint)
+            name = name.removeprefix("$")
+        if name in arguments:
+            first_line = arguments[name].span.line
+            message = f'the argument "{name}" occurs twice; the first is in line {first_line}'
+            reader.add_error(span, "duplicate-key", message)
+        default = None if is_empty(value) else read_value(value, reader.findings)
+        arguments[name] = Argument(span, default)
 
-    if isinstance(fields.get("args"), YamlSequence):
-        for item in fields.list_items("args"):
-            if isinstance(item, YamlScalar):
-                read_argument(item.text, item.mark, YamlScalar(item.mark, None, ""))
-            else:
-                message = "a list of arguments contains names only; for defaults, write a mapping"
-                parser.add_error(item.mark, "wrong-type", message)
-    else:
-        fields.read_entries("args", read_argument)
-    body = parser.read_node(fields.get("do"), fields.get_key_mark("do"))
-    return Subtree(name, mark, fields.read_text("doc"), args, _read_returns(fields, parser), body, library)
+    if not isinstance(reader.get("args"), YamlSequence):
+        reader.read_entries("args", read_argument)
+        return arguments
+    for item in reader.list_items("args"):
+        if isinstance(item, YamlScalar):
+            read_argument(item.text, item.span, YamlScalar(item.span, None, ""))
+        else:
+            message = "a list of arguments contains names only; for defaults, write a mapping"
+            reader.add_error(item.span, "wrong-type", message)
+    return arguments
 
 
-def _read_returns(fields: Fields, parser: NodeParser) -> dict[str, Mark] | None:
+def _read_returns(reader: MappingReader) -> dict[str, Span] | None:
     """Return the names below `returns` with their positions, or None if the key is missing."""
-    if fields.get("returns") is None:
+    if reader.get("returns") is None:
         return None
-    names: dict[str, Mark] = {}
-    for item in fields.list_items("returns"):
+    spans: dict[str, Span] = {}
+    for item in reader.list_items("returns"):
         name = item.text.removeprefix("$") if isinstance(item, YamlScalar) else ""
         if NAME_PATTERN.fullmatch(name):
-            names[name] = item.mark
+            spans[name] = item.span
         else:
             message = "returns must be a list of names of variables, for example [targets]"
-            parser.add_error(item.mark, "bad-name", message)
-    return names
+            reader.add_error(item.span, "bad-name", message)
+    return spans

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from executive.cell.config import CellConfig
-from executive.mission.findings import Finding, list_choices, make_error
-from executive.mission.source import Mark, Source
+from executive.mission.findings import Finding, make_error, suggest_choice
+from executive.mission.source import Source, Span
 from executive.mission.text.yaml_text import YamlEntry, YamlMapping, YamlNode, YamlScalar, parse_yaml
 
 CELL_PREFIX = "cell."
@@ -20,22 +20,24 @@ def make_override_source(key: str, value: str) -> Source:
 
 
 def parse_override(key: str, value: str, is_text: bool = False) -> tuple[YamlNode | None, list[Finding]]:
-    """Return the YAML node of an override, or None if it is invalid, and the findings; `is_text`: no YAML."""
+    """Return the YAML node of an override, or None after an error, and the findings.
+
+    If `is_text` is True, the value is a text, not YAML.
+    """
     source = make_override_source(key, value)
-    mark = source.make_mark(1, len(key) + 2, max(1, len(value)))
+    span = source.make_span(1, len(key) + 2, max(1, len(value)))
     if is_text:
-        return YamlScalar(mark, value, value), []
+        return YamlScalar(span, value, value), []
     if not value.strip():
-        return YamlScalar(mark, None, value), []
+        return YamlScalar(span, None, value), []
     # Blanks replace `key=`, so that the columns of findings are correct.
-    padded = Source("--set", " " * (len(key) + 1) + value)
-    root, yaml_findings = parse_yaml(padded)
+    root, yaml_findings = parse_yaml(Source("--set", " " * (len(key) + 1) + value))
     findings = [replace(finding, excerpt=source.text) for finding in yaml_findings]
-    return (_move(root, mark) if root else None), findings
+    return (_set_spans(root, span) if root else None), findings
 
 
 def override_cell(root: YamlNode, overrides: Mapping[str, str]) -> tuple[YamlNode, list[Finding]]:
-    """Return the YAML tree of a cell file after all overrides `cell.<key>.<key>=value`, and the findings."""
+    """Return the YAML tree of a cell file after all overrides `cell.<key>.<key>`, and the findings."""
     findings: list[Finding] = []
     for key, value in overrides.items():
         if not key.startswith(CELL_PREFIX):
@@ -49,40 +51,40 @@ def override_cell(root: YamlNode, overrides: Mapping[str, str]) -> tuple[YamlNod
 
 
 def _has_section(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> bool:
-    """Return True if `path` has one key or starts with a section of cell files; otherwise add an error."""
+    """Return True if `path` is one key or starts with a section of cell files; otherwise add an error."""
     keys = root.keys if isinstance(root, YamlMapping) else ()
     if len(path) == 1 or path[0] in (*keys, *CellConfig.model_fields):
         return True
-    hint = list_choices(path[0], CellConfig.model_fields, "Keys of the cell")
-    findings.append(make_error(value.mark, "unknown-key", f'the cell has no key "{path[0]}"', hint))
+    hint = suggest_choice(path[0], CellConfig.model_fields, "Keys of the cell")
+    findings.append(make_error(value.span, "unknown-key", f'the cell has no key "{path[0]}"', hint))
     return False
 
 
 def _set_value(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> YamlNode:
-    """Return the tree with `value` at `path`; unchanged, with an error, if `path` leads into a value."""
-    first, *rest = path
+    """Return the tree with `value` at `path`; if `path` continues below a value, add an error instead."""
+    key, *inner_path = path
     if not isinstance(root, YamlMapping):
-        message = f'there is no key "{first}", because the value of the section above is no mapping'
-        findings.append(make_error(value.mark, "unknown-key", message))
+        message = f'there is no key "{key}", because the value of the section above is no mapping'
+        findings.append(make_error(value.span, "unknown-key", message))
         return root
-    entry = root.get_entry(first)
+    entry = root.get_entry(key)
     if entry is None:
-        # The file omits the key, so that its default applies; validation reports an unknown key.
-        for key in reversed(rest):
-            value = YamlMapping(value.mark, (YamlEntry(YamlScalar(value.mark, key, key), value),))
-        return replace(root, entries=(*root.entries, YamlEntry(YamlScalar(value.mark, first, first), value)))
-    if rest:
-        changed = YamlEntry(entry.key, _set_value(entry.value, rest, value, findings))
+        # The file omits the key and uses the default; validation reports an unknown key.
+        entry = YamlEntry(YamlScalar(value.span, key, key), YamlMapping(value.span, ()))
+        root = replace(root, entries=(*root.entries, entry))
+    if inner_path:
+        new_entry = YamlEntry(entry.key, _set_value(entry.value, inner_path, value, findings))
     else:
-        changed = YamlEntry(replace(entry.key, mark=value.mark), value)
-    return replace(root, entries=tuple(changed if e is entry else e for e in root.entries))
+        new_entry = YamlEntry(replace(entry.key, span=value.span), value)
+    return replace(root, entries=tuple(new_entry if each is entry else each for each in root.entries))
 
 
-def _move(node: YamlNode, mark: Mark) -> YamlNode:
-    """Return the node with `mark` as the position of all its parts."""
+def _set_spans(node: YamlNode, span: Span) -> YamlNode:
+    """Return the node with `span` as the position of the node and of all nodes below."""
     if isinstance(node, YamlScalar):
-        return replace(node, mark=mark)
+        return replace(node, span=span)
     if isinstance(node, YamlMapping):
-        moved = tuple(YamlEntry(replace(e.key, mark=mark), _move(e.value, mark)) for e in node.entries)
-        return replace(node, mark=mark, entries=moved)
-    return replace(node, mark=mark, items=tuple(_move(item, mark) for item in node.items))
+        pairs = [(entry.key, entry.value) for entry in node.entries]
+        entries = tuple(YamlEntry(replace(key, span=span), _set_spans(each, span)) for key, each in pairs)
+        return replace(node, span=span, entries=entries)
+    return replace(node, span=span, items=tuple(_set_spans(item, span) for item in node.items))

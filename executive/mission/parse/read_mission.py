@@ -8,12 +8,12 @@ from pathlib import Path
 
 from executive.cell.config import CellConfig
 from executive.errors import InputError
-from executive.mission.findings import Finding, MissionError, make_error, sort_findings
+from executive.mission.findings import Finding, MissionError, sort_findings
 from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.values import LocatedName
 from executive.mission.parse.cell_file import CellFile, read_cell
 from executive.mission.parse.mission_file import parse_library, parse_mission
-from executive.mission.parse.node_parser import Skills
+from executive.mission.parse.node_parser import NodeParser, Skills
 from executive.mission.source import Source
 from executive.mission.text.file_search import find_file_below, read_source
 from executive.mission.text.yaml_text import parse_yaml
@@ -55,7 +55,7 @@ class RecordedCell:
 
 
 def read_mission(
-    file: Path,
+    path: Path,
     overrides: Mapping[str, str],
     skills: Skills,
     node_classes: ControlNodes,
@@ -67,73 +67,52 @@ def read_mission(
         MissionError: The mission file is not valid YAML.
         InputError: The mission file does not exist.
     """
-    source = read_source(file)
+    source = read_source(path)
     root, findings = parse_yaml(source)
     if root is None:
         raise MissionError(sort_findings(findings, source.path))
-    mission, mission_findings = parse_mission(root, overrides, skills, node_classes)
-    findings += mission_findings
-    trees: dict[str, Subtree] = dict(mission.trees)
-    texts = {
-        reference.name: _add_library(reference, file.parent, skills, node_classes, trees, findings)
-        for reference in mission.libraries
-    }
+    parser = NodeParser(findings, skills, node_classes)
+    mission = parse_mission(root, overrides, parser)
+    subtrees = dict(mission.subtrees)
+    texts = {name.name: _add_library(name, path.parent, parser, subtrees) for name in mission.libraries}
     libraries = {name: text for name, text in texts.items() if text is not None}
-    mission = replace(mission, trees=trees, is_complete=len(libraries) == len(texts))
-    cell_path: Path | None
-    cell: CellFile | None
-    if recorded_cell is None:
-        cell_path, cell = _read_cell_file(mission.cell, file.parent, overrides, findings)
-    else:
+    mission = replace(mission, subtrees=subtrees, is_complete=len(libraries) == len(texts))
+    cell_path: Path | None = None
+    cell: CellFile | None = None
+    if recorded_cell is not None:
         cell_path = recorded_cell.path
         cell = CellFile(recorded_cell.config, Source(str(cell_path), ""), None, ())
+    elif mission.cell.name:
+        try:
+            cell_path = find_file_below(path.parent, mission.cell.name)
+            cell = read_cell(cell_path, overrides)
+            findings += cell.findings
+        except InputError as error:
+            cell_path = None
+            parser.add_error(mission.cell.span, "no-cell", str(error))
     return MissionFiles(source, mission, libraries, cell, cell_path, tuple(findings))
 
 
 def _add_library(
-    reference: LocatedName,
-    folder: Path,
-    skills: Skills,
-    node_classes: ControlNodes,
-    trees: dict[str, Subtree],
-    findings: list[Finding],
+    reference: LocatedName, folder: Path, parser: NodeParser, subtrees: dict[str, Subtree]
 ) -> str | None:
-    """Add the subtrees of the library file `reference` in `folder` to `trees`; return its text, or None."""
+    """Add the subtrees of a library to `subtrees`; return the text of the library, or None after an error."""
     try:
         source = read_source(find_file_below(folder, reference.name))
-    except InputError as problem:
-        findings.append(make_error(reference.mark, "no-library", str(problem)))
+    except InputError as error:
+        parser.add_error(reference.span, "no-library", str(error))
         return None
     root, yaml_findings = parse_yaml(source)
-    findings += yaml_findings
+    parser.findings += yaml_findings
     if root is None:
         return None
-    library, library_findings = parse_library(root, skills, node_classes)
-    findings += library_findings
-    for name, subtree in library.trees.items():
-        if name not in trees:
-            trees[name] = subtree
+    for name, subtree in parse_library(root, parser).subtrees.items():
+        first = subtrees.setdefault(name, subtree)
+        if first is subtree:
             continue
-        # The position of the error is in the mission file: its subtree, or the path of the library.
-        first, is_in_mission = trees[name], not trees[name].library
-        mark, other_mark = (first.mark, subtree.mark) if is_in_mission else (reference.mark, first.mark)
-        message = f'there are two subtrees "{name}"; the other is in {other_mark.describe_place(mark.source)}'
-        hint = "Rename one of them." if is_in_mission else "Delete one of the libraries from the list."
-        findings.append(make_error(mark, "duplicate-tree", message, hint))
+        # The error is in the mission file: at the subtree with the same name, or at the path of the library.
+        span, other_span = (reference.span, first.span) if first.library else (first.span, subtree.span)
+        message = f'there are two subtrees "{name}"; the other is in {other_span.describe_place(span.source)}'
+        hint = "Delete one of the libraries from the list." if first.library else "Rename one of them."
+        parser.add_error(span, "duplicate-tree", message, hint)
     return source.text
-
-
-def _read_cell_file(
-    reference: LocatedName, folder: Path, overrides: Mapping[str, str], findings: list[Finding]
-) -> tuple[Path | None, CellFile | None]:
-    """Return path and content of a cell file, or None for both; add its errors to `findings`."""
-    if not reference.name:
-        return None, None
-    try:
-        path = find_file_below(folder, reference.name)
-        cell = read_cell(path, overrides)
-    except InputError as problem:
-        findings.append(make_error(reference.mark, "no-cell", str(problem)))
-        return None, None
-    findings += cell.findings
-    return path, cell

@@ -12,9 +12,9 @@ from typing import Generic, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from executive.mission.descriptions import describe_violation
-from executive.mission.findings import Finding, list_choices, make_error
-from executive.mission.source import Mark
+from executive.mission.descriptions import describe_validation_error
+from executive.mission.findings import Finding, make_error, suggest_choice
+from executive.mission.source import Span
 from executive.mission.text.yaml_text import (
     YamlMapping,
     YamlNode,
@@ -24,7 +24,7 @@ from executive.mission.text.yaml_text import (
     to_python_value,
 )
 
-M = TypeVar("M", bound=BaseModel)
+ModelT = TypeVar("ModelT", bound=BaseModel)
 
 _CODES_BY_ERROR_TYPE = {
     "value_error": "wrong-value",
@@ -32,22 +32,22 @@ _CODES_BY_ERROR_TYPE = {
     "too_long": "wrong-length",
     "too_short": "wrong-length",
 }
-"""Codes of findings by the types of pydantic's errors; other types have the code `wrong-type`."""
+"""Codes of findings by the type of pydantic's error; for other types, the code is `wrong-type`."""
 
 KeyPath = tuple[str | int, ...]
 """Keys and list indices from the root of a file to a value."""
 
 
 @dataclass(frozen=True)
-class ValidationResult(Generic[M]):
-    """Validated content of a file; None if there are errors."""
+class ValidationResult(Generic[ModelT]):
+    """Validated content of a file, or None if the findings contain errors."""
 
-    model: M | None
+    model: ModelT | None
     findings: tuple[Finding, ...]
 
 
-def validate(root: YamlNode, model: type[M]) -> ValidationResult[M]:
-    """Return the content of a file as an instance of `model`; of other types, only integers become floats."""
+def validate(root: YamlNode, model: type[ModelT]) -> ValidationResult[ModelT]:
+    """Return the content of a file as an instance of `model`, without conversions except integer to float."""
     findings = list(_find_infinite_numbers(root))
     if findings:
         return ValidationResult(None, tuple(findings))
@@ -55,24 +55,27 @@ def validate(root: YamlNode, model: type[M]) -> ValidationResult[M]:
         # In strict mode, pydantic converts lists to tuples and integers to floats only from JSON.
         content = model.model_validate_json(json.dumps(to_python_value(root)), strict=True)
     except ValidationError as error:
-        problems = error.errors(include_url=False)
-        return ValidationResult(None, tuple(_locate_problem(root, model, problem) for problem in problems))
+        errors = error.errors(include_url=False)
+        return ValidationResult(None, tuple(_make_finding(root, model, each) for each in errors))
     return ValidationResult(content, ())
 
 
-def find_mark(root: YamlNode, path: KeyPath, of_key: bool = False) -> Mark:
-    """Return the position of the value or key at `path`, or of the longest part of `path` that exists."""
-    node, mark = root, root.mark
+def find_span(root: YamlNode, path: KeyPath, at_key: bool = False) -> Span:
+    """Return the position of the value at `path`, or at the longest existing part of `path`.
+
+    For a list or mapping, and if `at_key` is True, the position is that of the key.
+    """
+    node, span = root, root.span
     for step in path:
         if isinstance(node, YamlMapping) and (entry := node.get_entry(str(step))):
             node = entry.value
-            mark = node.mark if isinstance(node, YamlScalar) and not of_key else entry.key.mark
+            span = node.span if isinstance(node, YamlScalar) and not at_key else entry.key.span
         elif isinstance(node, YamlSequence) and isinstance(step, int) and step < len(node.items):
             node = node.items[step]
-            mark = node.mark
+            span = node.span
         else:
             break
-    return mark
+    return span
 
 
 def join_keys(path: KeyPath) -> str:
@@ -81,29 +84,28 @@ def join_keys(path: KeyPath) -> str:
     return text.removeprefix(".")
 
 
-def _locate_problem(root: YamlNode, model: type[BaseModel], problem: ErrorDetails) -> Finding:
-    """Return an error of pydantic as a finding with the position of the wrong key or value."""
-    path: KeyPath = problem["loc"]
-    error_type = problem["type"]
-    parent, last = path[:-1], path[-1] if path else ""
+def _make_finding(root: YamlNode, model: type[BaseModel], error: ErrorDetails) -> Finding:
+    """Return the finding for an error of pydantic, at the position of the wrong key or value."""
+    path: KeyPath = error["loc"]
+    error_type = error["type"]
+    parent, key = path[:-1], path[-1] if path else ""
     owner = join_keys(parent) or "the file"
     if error_type == "extra_forbidden":
-        section = _find_section(model, parent)
-        known = list(section.model_fields) if section else []
-        hint = list_choices(str(last), known, f"Keys of {owner}")
-        mark = find_mark(root, path, of_key=True)
-        return make_error(mark, "unknown-key", f'{owner} has no key "{last}"', hint)
-    if error_type == "missing" and isinstance(last, int):
-        message = f"{owner} needs {_find_tuple_length(model, parent)} values, not {len(problem['input'])}"
-        return make_error(find_mark(root, parent), "wrong-length", message)
+        hint = suggest_choice(str(key), _list_keys(model, parent), f"Keys of {owner}")
+        span = find_span(root, path, at_key=True)
+        return make_error(span, "unknown-key", f'{owner} has no key "{key}"', hint)
+    if error_type == "missing" and isinstance(key, int):
+        message = f"{owner} needs {_find_tuple_length(model, parent)} values, not {len(error['input'])}"
+        return make_error(find_span(root, parent), "wrong-length", message)
     if error_type == "missing":
-        return make_error(find_mark(root, parent), "missing-key", f'{owner} needs the key "{last}"')
-    if last == "[key]":
-        mark = find_mark(root, parent, of_key=True)
-        return make_error(mark, "bad-name", f"{owner} {describe_violation(problem)}")
+        return make_error(find_span(root, parent), "missing-key", f'{owner} needs the key "{key}"')
+    if key == "[key]":
+        span = find_span(root, parent, at_key=True)
+        return make_error(span, "bad-name", f"{owner} {describe_validation_error(error)}")
+    # The types of violated bounds are `less_than`, `greater_than_equal` and similar words.
     code = "out-of-range" if "than" in error_type else _CODES_BY_ERROR_TYPE.get(error_type, "wrong-type")
     name = join_keys(path) or "the file"
-    return make_error(find_mark(root, path), code, f"{name} {describe_violation(problem)}")
+    return make_error(find_span(root, path), code, f"{name} {describe_validation_error(error)}")
 
 
 def _find_type(model: object, path: KeyPath) -> object:
@@ -128,14 +130,16 @@ def _remove_none(annotation: object) -> object:
     return members[0] if NoneType in get_args(annotation) and len(members) == 1 else annotation
 
 
-def _find_section(model: type[BaseModel], path: KeyPath) -> type[BaseModel] | None:
-    """Return the model of the section at `path`, or None if the value there is no section."""
+def _list_keys(model: type[BaseModel], path: KeyPath) -> list[str]:
+    """Return the keys of the section at `path`; none if the value at `path` is no section."""
     declared = _find_type(model, path)
-    return declared if isinstance(declared, type) and issubclass(declared, BaseModel) else None
+    if isinstance(declared, type) and issubclass(declared, BaseModel):
+        return list(declared.model_fields)
+    return []
 
 
 def _find_tuple_length(model: type[BaseModel], path: KeyPath) -> int:
-    """Return the number of values of the tuple at `path`; 0 if the value there is no tuple."""
+    """Return the number of values of the tuple at `path`; 0 if the value at `path` is no tuple."""
     declared = _find_type(model, path)
     return len(get_args(declared)) if get_origin(declared) is tuple else 0
 
@@ -143,4 +147,4 @@ def _find_tuple_length(model: type[BaseModel], path: KeyPath) -> int:
 def _find_infinite_numbers(node: YamlNode) -> Iterator[Finding]:
     for scalar in iterate_scalars(node):
         if isinstance(scalar.value, float) and not math.isfinite(scalar.value):
-            yield make_error(scalar.mark, "not-finite", f'"{scalar.text}" is not a finite number')
+            yield make_error(scalar.span, "not-finite", f'"{scalar.text}" is not a finite number')

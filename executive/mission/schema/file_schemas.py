@@ -9,13 +9,13 @@ from typing import TypeAlias
 from executive.mission.model import grammar
 from executive.mission.model.grammar import GrammarKey
 from executive.mission.parse.control import find_inner_keys, find_shorthand_key
-from executive.mission.parse.fields import NAME_PATTERN
-from executive.mission.parse.params import TYPES
+from executive.mission.parse.mapping_reader import NAME_PATTERN
+from executive.mission.parse.params import PARAM_TYPES
 from executive.mission.schema.types import (
     DIALECT,
     NO_ARRAY_ITEM,
     REFERENCE,
-    Json,
+    Schema,
     allow_reference,
     list_failures,
     make_name_schemas,
@@ -31,7 +31,7 @@ Skills: TypeAlias = Mapping[str, type[Skill]]
 _NAME = NAME_PATTERN.pattern
 
 
-def make_mission_schema(skills: Skills, node_classes: ControlNodes) -> Json:
+def make_mission_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     """Return the schema of a mission file that may use these skills and control nodes.
 
     Its definition `library` is the schema of a library file.
@@ -39,14 +39,14 @@ def make_mission_schema(skills: Skills, node_classes: ControlNodes) -> Json:
     return _make_file_schema("A mission", grammar.MISSION_KEYS, skills, node_classes)
 
 
-def make_library_schema(skills: Skills, node_classes: ControlNodes) -> Json:
+def make_library_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     """Return the schema of a library file whose subtrees may use these skills and control nodes."""
     return _make_file_schema("A library", grammar.LIBRARY_KEYS, skills, node_classes)
 
 
 def _make_file_schema(
     title: str, keys: Mapping[str, GrammarKey], skills: Skills, node_classes: ControlNodes
-) -> Json:
+) -> Schema:
     control_nodes = {word: _make_control_node_schema(node_class) for word, node_class in node_classes.items()}
     use = {"title": grammar.USE_KEYWORD, "description": "A subtree by its name.", **_SCHEMAS_BY_KIND["word"]}
     subtree = {"title": "A subtree", **_make_mapping_schema(grammar.SUBTREE_KEYS)}
@@ -69,21 +69,21 @@ def _make_file_schema(
     }
 
 
-def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Json:
+def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     """Return the schema of a node: a word, a list, or a mapping with one head and its sibling keys.
 
     The head is the skill or keyword. It selects the schema of the mapping by `dependencies`: unlike with
     alternatives, an editor can then mark each invalid key and complete the valid keys.
     """
-    label: Json = {**_make_reference("label"), "description": grammar.LABEL_KEY.doc}
+    label: Schema = {**_make_reference("label"), "description": grammar.LABEL_KEY.doc}
     heads = [*skills, *node_classes, grammar.USE_KEYWORD]
     nodes_without_body = [
         {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ARRAY_ITEM}
         for word, node_class in node_classes.items()
         if (shorthand := find_shorthand_key(node_class)) is not None and not shorthand.is_required
     ]
-    siblings: dict[str, Json] = {grammar.USE_KEYWORD: _make_properties(grammar.USE_SIBLINGS)}
-    requirements: dict[str, Json] = {}
+    siblings: dict[str, Schema] = {grammar.USE_KEYWORD: _make_properties(grammar.USE_SIBLINGS)}
+    requirements: dict[str, Schema] = {}
     for word, node_class in node_classes.items():
         keys = {name: key for name, key in node_class.keys.items() if key.is_sibling}
         siblings[word] = {name: _make_key_schema(key) for name, key in keys.items()}
@@ -116,7 +116,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Json:
     }
 
 
-def _make_control_node_schema(node_class: type[ControlNode]) -> Json:
+def _make_control_node_schema(node_class: type[ControlNode]) -> Schema:
     """Return the schema of the value of the keyword of a control node."""
     shorthand, inner_keys = find_shorthand_key(node_class), find_inner_keys(node_class)
     alternatives = [_make_value_schema(shorthand)] if shorthand else []
@@ -133,7 +133,7 @@ def _get_first_line(node_class: type[ControlNode]) -> str:
     return (inspect.getdoc(node_class) or "").partition("\n")[0]
 
 
-def _make_section_schema(keys: Mapping[str, Key]) -> Json:
+def _make_section_schema(keys: Mapping[str, Key]) -> Schema:
     return {
         "type": "object",
         "properties": {name: _make_key_schema(key) for name, key in keys.items()},
@@ -142,11 +142,11 @@ def _make_section_schema(keys: Mapping[str, Key]) -> Json:
     }
 
 
-def _make_key_schema(key: Key) -> Json:
+def _make_key_schema(key: Key) -> Schema:
     return {"description": key.doc, **_make_value_schema(key)}
 
 
-def _make_value_schema(key: Key) -> Json:
+def _make_value_schema(key: Key) -> Schema:
     """Return the schema of the value of a key of a control node."""
     match key.kind:
         case KeyKind.NODE:
@@ -174,12 +174,12 @@ def _make_value_schema(key: Key) -> Json:
     return allow_reference(*constant.get("anyOf", [constant]))
 
 
-def _require_any_of(keys: Sequence[str]) -> Json:
+def _require_any_of(keys: Sequence[str]) -> Schema:
     """Return the schema that requires at least one of these keys."""
     return {"anyOf": [{"required": [key]} for key in keys]} if keys else {}
 
 
-def _make_reasons_schema(skills: Skills) -> Json:
+def _make_reasons_schema(skills: Skills) -> Schema:
     """Return the schema of one reason, or of a list of reasons."""
     reason = [
         {"title": "Skill.reason", "enum": list_failures(skills)},
@@ -189,13 +189,13 @@ def _make_reasons_schema(skills: Skills) -> Json:
     return {"anyOf": [*reason, reasons]}
 
 
-def _make_param_schema() -> Json:
+def _make_param_schema() -> Schema:
     declaration = _make_mapping_schema(grammar.PARAM_KEYS)
-    declaration["properties"]["type"]["enum"] = list(TYPES)
+    declaration["properties"]["type"]["enum"] = list(PARAM_TYPES)
     return {**declaration, "type": ["object", "array", "string", "number", "boolean", "null"]}
 
 
-def _make_mapping_schema(keys: Mapping[str, GrammarKey]) -> Json:
+def _make_mapping_schema(keys: Mapping[str, GrammarKey]) -> Schema:
     return {
         "type": "object",
         "properties": _make_properties(keys),
@@ -204,16 +204,16 @@ def _make_mapping_schema(keys: Mapping[str, GrammarKey]) -> Json:
     }
 
 
-def _make_properties(keys: Mapping[str, GrammarKey]) -> Json:
+def _make_properties(keys: Mapping[str, GrammarKey]) -> Schema:
     return {name: {"description": key.doc, **_SCHEMAS_BY_KIND[key.kind]} for name, key in keys.items()}
 
 
-def _make_reference(name: str) -> Json:
+def _make_reference(name: str) -> Schema:
     """Return the schema that refers to the definition with a name."""
     return {"$ref": f"#/definitions/{name}"}
 
 
-def _map_names_to(value: Json) -> Json:
+def _map_names_to(value: Schema) -> Schema:
     """Return the schema of a mapping from names to values."""
     return {
         "type": ["object", "null"],
@@ -222,14 +222,14 @@ def _map_names_to(value: Json) -> Json:
     }
 
 
-def _allow_list(text: Json) -> Json:
+def _allow_list(text: Schema) -> Schema:
     """Return the schema of a text with the schema `text`, or of a list of such texts."""
     return {**text, "type": ["string", "array"], "items": {"type": "string", **text}, "minItems": 1}
 
 
-_WORD: Json = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
+_WORD: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
 
-_SCHEMAS_BY_KIND: Mapping[str, Json] = {
+_SCHEMAS_BY_KIND: Mapping[str, Schema] = {
     "node": _make_reference("node"),
     "nodes": {"type": "array", "items": _make_reference("node"), "minItems": 1},
     "number": {"type": "number"},

@@ -14,13 +14,13 @@ from executive.cell.config import CellConfig
 from executive.mission.model.conversion import is_plain_type
 from executive.skill import Direction, Param, Port, Skill
 
-Json: TypeAlias = JsonSchemaValue
+Schema: TypeAlias = JsonSchemaValue
 """A JSON Schema, or a part of one."""
 
-NO_ARRAY_ITEM: Json = {"allOf": [True]}
+NO_ARRAY_ITEM: Schema = {"allOf": [True]}
 """Allows every value; prevents that yaml-language-server offers "- (array item)" for an alternative."""
 
-REFERENCE: Json = {"$ref": "#/definitions/reference"}
+REFERENCE: Schema = {"$ref": "#/definitions/reference"}
 """Schema of a reference `$name`."""
 
 DIALECT = "http://json-schema.org/draft-07/schema#"
@@ -30,7 +30,7 @@ DIALECT = "http://json-schema.org/draft-07/schema#"
 class Draft07(GenerateJsonSchema):
     """Pydantic's JSON Schema as draft-07, without titles from names in the code."""
 
-    def tuple_schema(self, schema: core_schema.TupleSchema) -> Json:
+    def tuple_schema(self, schema: core_schema.TupleSchema) -> Schema:
         """Return the schema of a tuple; draft-07 has the schemas of the elements under `items`."""
         tuple_schema = super().tuple_schema(schema)
         elements = tuple_schema.pop("prefixItems", None)
@@ -39,7 +39,7 @@ class Draft07(GenerateJsonSchema):
         are_equal = all(element == elements[0] for element in elements)
         return {**tuple_schema, "items": elements[0] if are_equal else elements}
 
-    def model_schema(self, schema: core_schema.ModelSchema) -> Json:
+    def model_schema(self, schema: core_schema.ModelSchema) -> Schema:
         """Return the schema of a section of the cell file, without title."""
         section_schema = super().model_schema(schema)
         del section_schema["title"]
@@ -51,12 +51,12 @@ class Draft07(GenerateJsonSchema):
         return False
 
 
-def make_type_schema(declared: object) -> Json:
+def make_type_schema(declared: object) -> Schema:
     """Return the schema of the plain values of a Python type."""
     return TypeAdapter(cast("type[object]", declared)).json_schema(schema_generator=Draft07)
 
 
-def make_cell_schema() -> Json:
+def make_cell_schema() -> Schema:
     """Return the schema of a cell file.
 
     With a `base`, no other key is required, and a detector may be empty or lack its `kind`.
@@ -77,12 +77,12 @@ def make_cell_schema() -> Json:
     }
 
 
-def allow_reference(*alternatives: Json) -> Json:
+def allow_reference(*alternatives: Schema) -> Schema:
     """Return the schema of a value with one of these schemas, or of a reference `$name`."""
     return {"anyOf": [*alternatives, REFERENCE]}
 
 
-def make_settings_schema(name: str, skill: type[Skill]) -> Json:
+def make_settings_schema(name: str, skill: type[Skill]) -> Schema:
     """Return the schema of the mapping of params and ports under the name of a skill."""
     required = [param.name for param in skill.params.values() if param.is_required]
     params = {key: _make_param_schema(param) for key, param in skill.params.items()}
@@ -97,7 +97,7 @@ def make_settings_schema(name: str, skill: type[Skill]) -> Json:
     return {"title": name, **_document_skill(skill), "allOf": [mapping]}
 
 
-def make_name_schemas(skills: Mapping[str, type[Skill]]) -> list[Json]:
+def make_name_schemas(skills: Mapping[str, type[Skill]]) -> list[Schema]:
     """Return the schemas of the names of skills without required params, which need no mapping."""
     return [
         {"const": name, "title": name, **_document_skill(skill), **NO_ARRAY_ITEM}
@@ -111,7 +111,7 @@ def list_failures(skills: Mapping[str, type[Skill]]) -> list[str]:
     return [f"{name}.{reason}" for name, skill in skills.items() for reason in skill.reasons]
 
 
-def _document_skill(skill: type[Skill]) -> Json:
+def _document_skill(skill: type[Skill]) -> Schema:
     """Return the descriptions of a skill that an editor shows: its docstring, ports and reasons."""
     docstring = inspect.getdoc(skill) or ""
     names_by_verb = {
@@ -127,7 +127,7 @@ def _document_skill(skill: type[Skill]) -> Json:
     return {"description": docstring.partition("\n")[0], "markdownDescription": markdown}
 
 
-def _make_param_schema(param: Param) -> Json:
+def _make_param_schema(param: Param) -> Schema:
     schema = make_type_schema(param.type)
     bounds = {"minimum": param.ge, "maximum": param.le}
     schema |= {key: bound for key, bound in bounds.items() if bound is not None}
@@ -148,7 +148,7 @@ def _describe_param(param: Param) -> str:
     return " ".join(part for part in parts if part)
 
 
-def _make_port_schema(port: Port) -> Json:
+def _make_port_schema(port: Port) -> Schema:
     is_output = port.direction is Direction.OUT
     description = f"{'output' if is_output else 'input'}: {port.doc}"
     if is_output or not is_plain_type(port.type):

@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 import executive
 from executive.cell.paths import has_outside_link, is_outside_path
 from executive.errors import InputError
-from executive.mission.findings import list_choices
+from executive.mission.findings import suggest_choice
 from executive.mission.source import Source
 
 _MAX_FILE_SIZE = 1_000_000
@@ -32,7 +32,7 @@ def find_mission(name: str | Path) -> Path:
     """Return the mission file with the path `name`, or the shipped mission with this name.
 
     Raises:
-        InputError: Neither exists.
+        InputError: There is no such file and no such shipped mission.
     """
     path = Path(name)
     # Unlike the methods of Path, these functions return False for invalid file names.
@@ -45,12 +45,12 @@ def find_mission(name: str | Path) -> Path:
     stem = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
     if len(stem.parts) == 1 and os.path.isfile(shipped := get_shipped_folder() / f"{stem}.yaml"):
         return shipped
-    hint = list_choices(str(stem), list_shipped_missions(), "Shipped missions")
+    hint = suggest_choice(str(stem), list_shipped_missions(), "Shipped missions")
     raise InputError(f'there is no mission file and no shipped mission "{name}". {hint}')
 
 
 def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[str] = ("",)) -> Path:
-    """Return the file with the relative path `reference` in `folder`, or else in the shipped subfolders.
+    """Return the file with the relative path `reference`, from `folder` or else from the shipped subfolders.
 
     Raises:
         InputError: The reference leaves the folder, or the file does not exist.
@@ -69,15 +69,16 @@ def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[s
             return path
         if os.path.lexists(path):
             raise InputError(f'"{reference}" in {_shorten_path(root)} is {_describe_kind(path)}, not a file')
-    parents = [
-        (root, root / PurePosixPath(reference).parent)
+    subfolder = PurePosixPath(reference).parent
+    existing_files = {
+        path.relative_to(root).as_posix()
         for root in roots
-        if os.path.isdir(root / PurePosixPath(reference).parent)
-    ]
-    known = {p.relative_to(root).as_posix() for root, parent in parents for p in parent.glob("*.yaml")}
-    hint = list_choices(reference, sorted(known), "Existing files")
-    searched = " or ".join(dict.fromkeys(map(_shorten_path, roots)))
-    raise InputError(f'there is no file "{reference}" in {searched}. {hint}')
+        if os.path.isdir(root / subfolder)
+        for path in (root / subfolder).glob("*.yaml")
+    }
+    hint = suggest_choice(reference, sorted(existing_files), "Existing files")
+    folders = " or ".join(dict.fromkeys(map(_shorten_path, roots)))
+    raise InputError(f'there is no file "{reference}" in {folders}. {hint}')
 
 
 def read_source(path: Path) -> Source:
@@ -96,21 +97,21 @@ def read_source(path: Path) -> Source:
         return Source(_shorten_path(path), path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"there is no file {path}") from None
-    except UnicodeDecodeError as problem:
-        raise InputError(f"{path} is not UTF-8 text: byte {problem.start} is invalid") from None
-    except OSError as problem:
-        raise InputError(f"{path} cannot be read: {problem.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 text: byte {error.start} is invalid") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from None
 
 
 def _describe_kind(path: str | Path) -> str:
-    """Return the kind of an existing path that is not a regular file, with an article."""
+    """Return "a folder" or another description of a path that is not a regular file."""
     if os.path.isdir(path):
         return "a folder"
     return "a pipe or a device" if os.path.exists(path) else "a link to nothing"
 
 
 def _shorten_path(path: Path) -> str:
-    """Return the path relative to the working directory, or unchanged if it is outside this directory."""
+    """Return the path relative to the working directory; a path outside this directory is unchanged."""
     try:
         cwd = Path.cwd()
     except FileNotFoundError:  # The working directory was deleted.

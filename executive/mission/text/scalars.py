@@ -8,14 +8,15 @@ from __future__ import annotations
 import math
 import re
 
-_NULL = frozenset({"", "~", "null", "Null", "NULL"})
-_TRUE = frozenset({"true", "True", "TRUE"})
-_FALSE = frozenset({"false", "False", "FALSE"})
+_NULL_WORDS = frozenset({"", "~", "null", "Null", "NULL"})
+_TRUE_WORDS = frozenset({"true", "True", "TRUE"})
+_FALSE_WORDS = frozenset({"false", "False", "FALSE"})
 _INTEGER = re.compile(r"[-+]?[0-9]+")
 _PREFIXED_INTEGER = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _INFINITE = re.compile(r"[-+]?\.(inf|Inf|INF)")
-_NAN = frozenset({".nan", ".NaN", ".NAN"})
+_NAN_WORDS = frozenset({".nan", ".NaN", ".NAN"})
+"""The constants above contain the texts of each kind of value."""
 _MAX_NUMBER_LENGTH = 300
 """Maximum number of characters of a number; a longer scalar is a text."""
 
@@ -24,11 +25,11 @@ ScalarValue = None | bool | int | float | str
 
 def convert_scalar(text: str) -> ScalarValue:
     """Return the value of a plain scalar: None, a boolean, a number, or the text itself."""
-    if text in _NULL:
+    if text in _NULL_WORDS:
         return None
-    if text in _TRUE:
+    if text in _TRUE_WORDS:
         return True
-    if text in _FALSE:
+    if text in _FALSE_WORDS:
         return False
     if text[0] not in "+-.0123456789" or len(text) > _MAX_NUMBER_LENGTH:
         return text
@@ -40,11 +41,11 @@ def convert_scalar(text: str) -> ScalarValue:
         return float(text)
     if _INFINITE.fullmatch(text):
         return float(text.replace(".", ""))
-    return float("nan") if text in _NAN else text
+    return float("nan") if text in _NAN_WORDS else text
 
 
 def _convert_large_integer(number: int) -> int | float:
-    """Return an integer of at most 64 bits unchanged, and a larger integer as a float, as in JSON."""
+    """Return an integer of at most 64 bits unchanged, and a larger integer as a float, for JSON readers."""
     if -(2**63) <= number < 2**63:
         return number
     try:

@@ -16,14 +16,15 @@ from pydantic import JsonValue
 
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error
-from executive.mission.source import Mark, Source
+from executive.mission.source import Source, Span
 from executive.mission.text.scalars import ScalarValue, convert_scalar
 
 _MAX_DEPTH = 50
 """Maximum depth of the nesting of lists and mappings."""
 _SURROGATE = re.compile("[\ud800-\udfff]")
+"""Half of a character in UTF-16, which UTF-8 cannot encode."""
 _MAX_NODE_COUNT = 20_000
-"""Maximum number of keys and values; those of an anchor count again for each alias."""
+"""Maximum number of keys and values; the keys and values of an anchor count once more for each alias."""
 _ADVICE_BY_MESSAGE = {
     "mapping values are not allowed here": (
         "Is a colon missing at the end of the line above, or are braces, as in Detect: {view: full}? "
@@ -34,14 +35,17 @@ _ADVICE_BY_MESSAGE = {
     "expected ',' or": "Close the bracket or brace.",
 }
 """Advice on syntax errors, by the start of PyYAML's message."""
-_TOO_DEEP = f"lists and mappings are nested more than {_MAX_DEPTH} levels deep"
+_DEPTH_MESSAGE = f"lists and mappings are nested more than {_MAX_DEPTH} levels deep"
+"""Message for a nesting deeper than `_MAX_DEPTH`."""
+_LINE_LENGTH = 1000
+"""Length of a span [characters] that reaches the end of the line."""
 
 
 @dataclass(frozen=True)
 class YamlScalar:
     """A value that is no list or mapping; `text` is its text in the file without quotes."""
 
-    mark: Mark
+    span: Span
     value: ScalarValue
     text: str
 
@@ -50,7 +54,7 @@ class YamlScalar:
 class YamlSequence:
     """A list of nodes."""
 
-    mark: Mark
+    span: Span
     items: tuple[YamlNode, ...]
 
 
@@ -66,7 +70,7 @@ class YamlEntry:
 class YamlMapping:
     """Entries with unique keys, in the order of the text."""
 
-    mark: Mark
+    span: Span
     entries: tuple[YamlEntry, ...]
 
     def get_entry(self, key: str) -> YamlEntry | None:
@@ -105,9 +109,15 @@ def iterate_scalars(node: YamlNode) -> Iterator[YamlScalar]:
     """Yield every scalar of a node in the order of the text, without keys."""
     if isinstance(node, YamlScalar):
         yield node
-        return
-    for part in node.items if isinstance(node, YamlSequence) else (entry.value for entry in node.entries):
-        yield from iterate_scalars(part)
+    for child in list_children(node):
+        yield from iterate_scalars(child)
+
+
+def list_children(node: YamlNode) -> tuple[YamlNode, ...]:
+    """Return the items of a sequence, or the values of a mapping; () for a scalar."""
+    if isinstance(node, YamlMapping):
+        return tuple(entry.value for entry in node.entries)
+    return node.items if isinstance(node, YamlSequence) else ()
 
 
 def parse_yaml(source: Source) -> tuple[YamlNode | None, list[Finding]]:
@@ -115,17 +125,17 @@ def parse_yaml(source: Source) -> tuple[YamlNode | None, list[Finding]]:
     composer = _Composer(source)
     try:
         root = composer.read_document()
-    except yaml.MarkedYAMLError as problem:
-        return None, [*composer.findings, _make_syntax_error(source, problem)]
-    except yaml.reader.ReaderError as problem:
-        return None, [*composer.findings, _make_character_error(source, problem)]
+    except yaml.MarkedYAMLError as error:
+        return None, [*composer.findings, _make_syntax_error(source, error)]
+    except yaml.reader.ReaderError as error:
+        return None, [*composer.findings, _make_character_error(source, error)]
     except _IncompleteTree:
         return None, composer.findings
     return root, composer.findings
 
 
 class _IncompleteTree(Exception):
-    """An error prevents a complete tree; the findings contain the error."""
+    """An error, which the findings contain, prevents a complete tree."""
 
 
 class _Composer:
@@ -136,23 +146,25 @@ class _Composer:
         self.findings: list[Finding] = []
         # Unlike the parser of libyaml, the Python parser has the same messages in every installation.
         self._events: Iterator[yaml.Event] = yaml.parse(source.text, Loader=yaml.SafeLoader)
-        # Node, and number of keys and values in it, of each anchor.
+        # For each anchor: its node, and the number of keys and values in the node.
         self._anchors: dict[str, tuple[YamlNode, int]] = {}
         self._node_count = 0
 
     def read_document(self) -> YamlNode:
+        """Return the root node of the only document."""
         next(self._events)  # StreamStartEvent
         if isinstance(next(self._events), yaml.StreamEndEvent):
-            raise self._make_fatal_error(self.source.make_mark(), "empty", "the file is empty")
+            raise self._make_fatal_error(self.source.make_span(), "empty", "the file is empty")
         root = self._read_node(next(self._events), 0)
         next(self._events)  # DocumentEndEvent
-        following = next(self._events)
-        if not isinstance(following, yaml.StreamEndEvent):
+        event = next(self._events)
+        if not isinstance(event, yaml.StreamEndEvent):
             message = 'a second document starts here, after "---"'
-            raise self._make_fatal_error(self._make_mark(following, 3), "two-documents", message)
+            raise self._make_fatal_error(self._make_span(event, len("---")), "two-documents", message)
         return root
 
     def _read_node(self, event: yaml.Event, depth: int) -> YamlNode:
+        """Return the node that starts with `event`; `depth` is the number of lists and mappings around it."""
         if isinstance(event, yaml.AliasEvent):
             return self._resolve_alias(event, depth)
         # PyYAML checks the YAML grammar, so that only these events can start a node.
@@ -160,7 +172,7 @@ class _Composer:
         count_before = self._node_count
         self._count_nodes(1, event)
         if event.tag is not None:
-            self._add_error(self._make_mark(event), "tag", f'the tag "{event.tag}" is not allowed')
+            self._add_error(self._make_span(event), "tag", f'the tag "{event.tag}" is not allowed')
         node = self._read_value(event, depth)
         if event.anchor is not None:
             self._anchors[event.anchor] = node, self._node_count - count_before
@@ -169,10 +181,10 @@ class _Composer:
     def _resolve_alias(self, event: yaml.AliasEvent, depth: int) -> YamlNode:
         if event.anchor not in self._anchors:
             message = f'there is no anchor "&{event.anchor}" above'
-            raise self._make_fatal_error(self._make_mark(event), "alias", message)
+            raise self._make_fatal_error(self._make_span(event), "alias", message)
         node, node_count = self._anchors[event.anchor]
         if depth + _compute_height(node) > _MAX_DEPTH:
-            raise self._make_fatal_error(self._make_mark(event), "too-deep", _TOO_DEEP)
+            raise self._make_fatal_error(self._make_span(event), "too-deep", _DEPTH_MESSAGE)
         self._count_nodes(node_count, event)
         return node
 
@@ -185,27 +197,27 @@ class _Composer:
         self._node_count += count
         if self._node_count > _MAX_NODE_COUNT:
             message = f"the file has more than {_MAX_NODE_COUNT} keys and values, including those of aliases"
-            raise self._make_fatal_error(self._make_mark(event), "too-large", message)
+            raise self._make_fatal_error(self._make_span(event), "too-large", message)
 
     def _read_value(self, event: yaml.Event, depth: int) -> YamlNode:
         if isinstance(event, yaml.ScalarEvent):
             return self._read_scalar(event)
         if depth >= _MAX_DEPTH:
-            raise self._make_fatal_error(self._make_mark(event, 1), "too-deep", _TOO_DEEP)
+            raise self._make_fatal_error(self._make_span(event, 1), "too-deep", _DEPTH_MESSAGE)
         if isinstance(event, yaml.SequenceStartEvent):
             items = []
             while not isinstance(item := next(self._events), yaml.SequenceEndEvent):
                 items.append(self._read_node(item, depth + 1))
-            return YamlSequence(self._make_mark(event, 1), tuple(items))
+            return YamlSequence(self._make_span(event, 1), tuple(items))
         return self._read_mapping(event, depth)
 
     def _read_scalar(self, event: yaml.ScalarEvent) -> YamlScalar:
-        text, mark = event.value, self._make_mark(event)
+        text, span = event.value, self._make_span(event)
         if _SURROGATE.search(text):
             # An escape sequence can produce a surrogate, which cannot be encoded in UTF-8.
-            self._add_error(mark, "yaml", "a surrogate (U+D800 to U+DFFF) is no character")
+            self._add_error(span, "yaml", "a surrogate (U+D800 to U+DFFF) is no character")
             text = _SURROGATE.sub("?", text)
-        return YamlScalar(mark, convert_scalar(text) if event.implicit[0] else text, text)
+        return YamlScalar(span, convert_scalar(text) if event.implicit[0] else text, text)
 
     def _read_mapping(self, event: yaml.Event, depth: int) -> YamlMapping:
         entries: dict[str, YamlEntry] = {}
@@ -213,62 +225,60 @@ class _Composer:
             key = self._read_node(start, depth + 1)
             value = self._read_node(next(self._events), depth + 1)
             if not isinstance(key, YamlScalar):
-                self._add_error(key.mark, "bad-key", "a key must be a single word")
+                self._add_error(key.span, "bad-key", "a key must be a single word")
             elif key.text == "<<":
                 message = 'the merge key "<<" is not allowed; write the merged keys here'
-                self._add_error(key.mark, "merge-key", message)
+                self._add_error(key.span, "merge-key", message)
             elif key.text in entries:
-                first_line = entries[key.text].key.mark.line
+                first_line = entries[key.text].key.span.line
                 message = f'the key "{key.text}" occurs twice here; the first is in line {first_line}'
-                self._add_error(key.mark, "duplicate-key", message)
+                self._add_error(key.span, "duplicate-key", message)
             else:
                 entries[key.text] = YamlEntry(key, value)
-        return YamlMapping(self._make_mark(event, 1), tuple(entries.values()))
+        return YamlMapping(self._make_span(event, 1), tuple(entries.values()))
 
-    def _make_mark(self, event: yaml.Event, length: int = 0) -> Mark:
-        """Return the position of an event; by default, the rest of its line in the event is underlined."""
+    def _make_span(self, event: yaml.Event, length: int = 0) -> Span:
+        """Return the span of an event; 0 as `length` denotes the whole event, or its first line."""
         start, end = event.start_mark, event.end_mark
         assert start is not None and end is not None, "PyYAML locates every event"
         if not length:
             is_single_line = start.line == end.line
-            length = max(1, end.column - start.column) if is_single_line else 1000
-        return Mark(self.source, start.line + 1, start.column + 1, length)
+            length = max(1, end.column - start.column) if is_single_line else _LINE_LENGTH
+        return Span(self.source, start.line + 1, start.column + 1, length)
 
-    def _make_fatal_error(self, mark: Mark, code: str, message: str) -> _IncompleteTree:
+    def _make_fatal_error(self, span: Span, code: str, message: str) -> _IncompleteTree:
         """Add an error that prevents a complete tree, and return the exception to raise."""
-        self._add_error(mark, code, message)
+        self._add_error(span, code, message)
         return _IncompleteTree()
 
-    def _add_error(self, mark: Mark, code: str, message: str) -> None:
-        self.findings.append(make_error(mark, code, message))
+    def _add_error(self, span: Span, code: str, message: str) -> None:
+        self.findings.append(make_error(span, code, message))
 
 
 def _compute_height(node: YamlNode) -> int:
     """Return the depth of the nesting in a node; 0 for a scalar."""
     if isinstance(node, YamlScalar):
         return 0
-    inner = node.items if isinstance(node, YamlSequence) else [entry.value for entry in node.entries]
-    return 1 + max(map(_compute_height, inner), default=0)
+    return 1 + max(map(_compute_height, list_children(node)), default=0)
 
 
-def _make_syntax_error(source: Source, problem: yaml.MarkedYAMLError) -> Finding:
-    position = problem.problem_mark or problem.context_mark
-    mark = source.make_mark(position.line + 1, position.column + 1, 1) if position else source.make_mark()
-    if position and not source.get_line(mark.line):
+def _make_syntax_error(source: Source, error: yaml.MarkedYAMLError) -> Finding:
+    position = error.problem_mark or error.context_mark
+    span = source.make_span(position.line + 1, position.column + 1, 1) if position else source.make_span()
+    if position and not source.get_line(span.line):
         # The error is at the end of the text, so the finding shows the last line that is not empty.
-        last = source.text.rstrip().count("\n") + 1
-        mark = source.make_mark(last, max(1, len(source.get_line(last))), 1)
-    context = f" {problem.context}" if problem.context else ""
-    start = problem.context_mark
+        last_line = source.text.rstrip().count("\n") + 1
+        span = source.make_span(last_line, max(1, len(source.get_line(last_line))), 1)
+    context = f" {error.context}" if error.context else ""
+    start = error.context_mark
     note = f" that began in line {start.line + 1}" if context and start and start is not position else ""
-    message = f"not valid YAML:{context}{note}: {problem.problem}".replace("::", ":")
-    hints = (hint for begin, hint in _ADVICE_BY_MESSAGE.items() if str(problem.problem).startswith(begin))
-    return make_error(mark, "yaml", message, next(hints, ""))
+    message = f"not valid YAML:{context}{note}: {error.problem}".replace("::", ":")
+    hints = (hint for text, hint in _ADVICE_BY_MESSAGE.items() if str(error.problem).startswith(text))
+    return make_error(span, "yaml", message, next(hints, ""))
 
 
-def _make_character_error(source: Source, problem: yaml.reader.ReaderError) -> Finding:
-    lines = source.text[: problem.position + 1].splitlines()
-    line, col = len(lines), len(lines[-1])
-    character = source.text[problem.position : problem.position + 1]
-    mark = source.make_mark(line, col, 1)
-    return make_error(mark, "yaml", f"the character {character!r} is not allowed in YAML")
+def _make_character_error(source: Source, error: yaml.reader.ReaderError) -> Finding:
+    lines = source.text[: error.position + 1].splitlines()
+    character = source.text[error.position : error.position + 1]
+    span = source.make_span(len(lines), len(lines[-1]), 1)
+    return make_error(span, "yaml", f"the character {character!r} is not allowed in YAML")

@@ -90,5 +90,5 @@ def _format_advice(run: FailedRun, entry: FailurePathNode, advice: Advice) -> st
     changed_node = get_mission_node(advice.child) if advice.child else entry.node
     value = entry.node.values.get(advice.key) if isinstance(entry.node, InnerNode) else None
     params = run.loaded.mission.params.items() if isinstance(value, Literal) else ()
-    name = next((name for name, param in params if param.value.mark == getattr(value, "mark", None)), "")
+    name = next((name for name, param in params if param.value.span == getattr(value, "span", None)), "")
     return f"{advice.text} {f'with --set {name}=...' if name else f'at {run.format_place(changed_node)}'}"

@@ -69,7 +69,7 @@ def diagnose(
         status=end.status,
         reason=end.reason,
         clock=end.robot_time,
-        mission=loaded.tree.mark.source.path,
+        mission=loaded.tree.span.source.path,
         verdict=describe_cause(run),
         node=_make_deciding_node(run),
         item=run.item,
@@ -113,7 +113,7 @@ def _make_deciding_node(run: FailedRun) -> DecidingNode | None:
 
 
 def _format_place(node: Node) -> str:
-    return f"{node.mark.source.path}:{node.mark.line}"
+    return f"{node.span.source.path}:{node.span.line}"
 
 
 def _find_last_look(run: FailedRun) -> Sighting | Look | None:

@@ -63,7 +63,7 @@ class FailedRun:
 
     def format_place(self, node: Node) -> str:
         """Return the line of a node in its file, with the file name if it is not the mission file."""
-        return node.mark.describe_place(self.loaded.tree.mark.source)
+        return node.span.describe_place(self.loaded.tree.span.source)
 
 
 def describe_cause(run: FailedRun) -> str:

@@ -10,7 +10,7 @@ from executive.mission.flow.analysis import FlowAnalysis
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode
-from executive.mission.source import Mark
+from executive.mission.source import Span
 from executive.skill import EMPTY, HOLDING
 from executive.tree.flow import PossibleToolState
 from executive.tree.node import ControlNode
@@ -29,7 +29,7 @@ def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]
         elif instance and (explanation := _explain_unreachable(instance, child)):
             is_list = isinstance(child, InnerNode) and child.is_list and not child.label
             name = "this list" if is_list else get_path_name(child)
-            yield make_warning(child.mark, "unreachable", f"{name} can never run: {explanation}")
+            yield make_warning(child.span, "unreachable", f"{name} can never run: {explanation}")
             return
 
 
@@ -47,33 +47,33 @@ def check_tool_states(context: CheckContext) -> Iterator[Finding]:
             continue
         required_state = context.skills[node.skill].tool_state[0]
         use = context.library_uses_by_path.get(path)
-        mark = use.mark if use else node.mark
+        span = use.span if use else node.span
         name = f'{node.skill} in the subtree "{use.name}"' if use else node.skill
         if required_state is EMPTY and (tool := entry_state.find_tool_state(HOLDING)):
             message = f"{name} needs an empty tool, but the tool may hold an object here"
             hint = (
-                f"{_explain_tool_state(flow, tool, mark)} Put it down on every path from there to this node."
+                f"{_explain_tool_state(flow, tool, span)} Put it down on every path from there to this node."
             )
-            yield make_error(mark, "tool-state", message, hint)
+            yield make_error(span, "tool-state", message, hint)
         if required_state is HOLDING and (tool := entry_state.find_tool_state(EMPTY)):
             message = f"{name} needs an object in the tool, but the tool may be empty here"
-            yield make_error(mark, "tool-state", message, _explain_tool_state(flow, tool, mark))
+            yield make_error(span, "tool-state", message, _explain_tool_state(flow, tool, span))
 
 
 def check_tool_at_end(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning if the mission may succeed with an object in the tool."""
-    flow, mark = context.flow_analysis, context.tree.mark
-    if flow.result.success and (tool := flow.result.success.find_tool_state(HOLDING)):
+    flow, span = context.flow_analysis, context.tree.span
+    if flow.root_flow.success and (tool := flow.root_flow.success.find_tool_state(HOLDING)):
         message = "the mission may succeed with an object in the tool"
-        yield make_warning(mark, "tool-state", message, _explain_tool_state(flow, tool, mark))
+        yield make_warning(span, "tool-state", message, _explain_tool_state(flow, tool, span))
 
 
-def _explain_tool_state(flow: FlowAnalysis, tool: PossibleToolState, mark: Mark) -> str:
-    """Return a sentence with the node that may have caused the state of the tool, for a message at `mark`."""
+def _explain_tool_state(flow: FlowAnalysis, tool: PossibleToolState, span: Span) -> str:
+    """Return a sentence with the node that may have caused the state of the tool, for a message at `span`."""
     cause = flow.nodes.get(tool.cause)
     after = f", when {tool.handled_failure} is handled" if tool.handled_failure else ""
     if cause is None:
         return f"No object has been grasped before{after}."
     name = cause.skill if isinstance(cause, SkillNode) else "the node"
     state = "may hold an object" if tool.state is HOLDING else "may be empty"
-    return f"The tool {state} since {name} in {cause.mark.describe_place(mark.source)}{after}."
+    return f"The tool {state} since {name} in {cause.span.describe_place(span.source)}{after}."
