@@ -1,1 +1,1 @@
-"""Protocols and values that skills and the run use; the typed cell file; layout; shapes for display."""
+"""Parts of a work cell as protocols and values, the typed content of cell files, and display shapes."""

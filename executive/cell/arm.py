@@ -1,4 +1,4 @@
-"""Protocol of the arm, and the goals, tasks and motions that it plans and follows."""
+"""Protocols of a robot arm and its motions, and the inputs of motion planning: goal and task."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Goal:
     Attributes:
         position: Position of the tool centre point `(x, y, z)` [m].
         yaw: Rotation about the vertical axis [rad]; None: the planner chooses the rotation.
-        guarded_length: Length of the guarded descent [m], a slow vertical motion to the position that a skill
-            stops at the first contact; 0: no guarded descent.
+        guarded_length: Length of the guarded descent [m]: the slow vertical end of the motion, until the tool
+            touches the target; 0: no guarded descent.
         guarded_speed: Maximum tool speed of the guarded descent [m/s].
     """
 
@@ -40,7 +40,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Task:
-    """Load and obstacles of a motion.
+    """Load and obstacles with which a motion is planned.
 
     Attributes:
         load: Object in the tool, or None.
@@ -99,8 +99,8 @@ class Arm(Protocol):
     def plan(self, goal: Goal | str, task: Task = Task()) -> Planning:
         """Start to plan a motion from the current position to a goal, or to a named pose of the cell file.
 
-        The motion is available at once if `plan_ahead` was called with equal arguments, and the arm is at the
-        start position of the planned motion.
+        The motion is available at once if `plan_ahead` has planned the motion from the current position with
+        equal arguments.
         """
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
@@ -114,7 +114,7 @@ class Arm(Protocol):
 
 
 def reject_generator(motion: object) -> None:
-    """Raise an error if a caller passed a generator as a motion because it forgot `yield from`.
+    """Raise an error if `motion` is a generator, because its caller omitted `yield from`.
 
     Raises:
         Fault: The motion is a generator.

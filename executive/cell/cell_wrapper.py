@@ -1,4 +1,4 @@
-"""Decorator of a work cell that adds a callback after every control step."""
+"""Wrapper of a work cell that calls a function after each control step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.cell.workcell import Accounts, Workcell
 
 @dataclass(eq=False)
 class CellWrapper:
-    """Forwards everything to another work cell, unless a subclass overrides it; implements `Workcell`.
+    """Work cell that forwards each call to another work cell; subclasses override single methods.
 
     Attributes:
         inner: The wrapped work cell.
@@ -30,7 +30,7 @@ class CellWrapper:
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger, which the run closes when it ends."""
+        """The ledger, which is closed at the end of the run."""
         return self.inner.accounts
 
     @property

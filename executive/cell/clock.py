@@ -26,7 +26,7 @@ class StepClock:
         return self._get_time()
 
     def sleep(self, duration: float) -> Iterator[None]:
-        """Yield until `duration` [s] has passed on this clock."""
+        """Yield until the time of the clock has advanced by `duration` [s]."""
         end = self.now + duration
         while self.now < end - self.step / 2:
             yield

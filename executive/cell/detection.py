@@ -57,12 +57,15 @@ class Answer:
     unknown: tuple[Detection, ...] = ()
 
     def describe_doubt(self, detection: Detection) -> str:
-        """Return the message that all detections are doubtful, for the detection with the best confidence."""
-        threshold, second = self.error_rates.threshold, detection.second_confidence
-        is_below_threshold = detection.confidence < threshold
-        limit = f"< {threshold:.2f}" if is_below_threshold else f"with another class at {second:.2f}"
-        best = f"at best a {detection.label} at {detection.confidence:.2f} {limit}"
-        return f"detector {self.detector} found nothing certain: {best}"
+        """Return the message for an answer without confident detections; `detection` is the best one."""
+        threshold, doubt = (
+            self.error_rates.threshold,
+            f"with another class at {detection.second_confidence:.2f}",
+        )
+        if detection.confidence < threshold:
+            doubt = f"< {threshold:.2f}"
+        best = f"a {detection.label} at {detection.confidence:.2f} {doubt}"
+        return f"detector {self.detector} found nothing certain: at best {best}"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -87,7 +90,7 @@ class Detections(Answer):
         return self.frame.is_in_area(points, self.area, margin)
 
     def is_searched(self, points: Array) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the world points `(N, 3)` [m] at which an object is visible as a whole."""
+        """Return a mask `(N,)` of the world points `(N, 3)` [m] at which a whole object is visible."""
         return self.is_in_area(points) & self.frame.is_unoccluded(points)
 
 
@@ -99,7 +102,7 @@ class Observation:
         detection: The detection.
         position: Centre of the object `(3,)` [m] in the world.
         std: Standard deviation of the random error of the position along each axis [m].
-        is_confident: False if the detection is doubtful or contradicted.
+        is_confident: False if the detection is doubtful (`Answer.doubtful`) or has a contradiction.
         contradiction: Sentence with evidence of size or height against the detected class, or "".
     """
 

@@ -33,8 +33,8 @@ class ErrorRates:
 def assume_rates(threshold: float, reason: str) -> ErrorRates:
     """Return conservative error rates for a detector without a measurement under the current conditions.
 
-    No rate is lower than in a measurement of the embedded detector in unusual scenes: the detector missed 4 %
-    and confused 5 % of the objects, and repeated most errors in each frame.
+    In a measurement in unusual scenes, the embedded detector missed 4 % and confused 5 % of the objects, and
+    repeated most errors in each frame. The assumed rates are equal or higher.
     """
     return ErrorRates(
         threshold, miss_rate=0.15, confusion_rate=0.05, false_detections=0.2, jitter=2.0, repeated=0.8,

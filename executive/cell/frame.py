@@ -13,10 +13,8 @@ from executive.geometry import Array, Pose
 Box = tuple[float, float, float, float]
 """Left, top, right and bottom side [pixel] of a box in an image; pixel i covers [i, i + 1)."""
 
-OBJECT_RADIUS = 0.03
-"""Typical distance from the centre of an object to the outline [m]."""
-OBJECT_POINTS = OBJECT_RADIUS * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], float)
-"""Points `(5, 3)` [m], relative to the centre of an object, that are visible if a detector can find it."""
+TYPICAL_OBJECT_POINTS = 0.03 * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
+"""Centre of a typical object and four points of the outline, relative to the centre `(5, 3)` [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +66,10 @@ class Frame:
         return np.asarray(is_in_front & is_inside.all(axis=1))
 
     def is_unoccluded(self, points: Array) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the world points `(N, 3)` [m] at which the arm cannot occlude an object."""
+        """Return a mask `(N,)` of the world points `(N, 3)` [m] where the arm hides no part of an object."""
         mask = np.ones(len(points), dtype=bool)
         height, width = self.visible.shape
-        for offset in OBJECT_POINTS:
+        for offset in TYPICAL_OBJECT_POINTS:
             pixels, is_in_front = self._project(points + offset)
             columns, rows = pixels.astype(int).clip(0, (width - 1, height - 1)).T
             mask &= is_in_front & self.visible[rows, columns]
@@ -84,9 +82,8 @@ class Frame:
     def to_opencv(self) -> tuple[Array, Array, Array]:
         """Return the camera parameters of OpenCV: matrix `(3, 3)`, rvec `(3,)` [rad] and tvec `(3,)` [m].
 
-        `cv2.projectPoints(points, rvec, tvec, matrix, None)` projects world points with these parameters. Its
-        pixel centres have integer coordinates; in this project, pixel i covers [i, i + 1), so that 0.5 must
-        be added to each coordinate.
+        Add 0.5 to each result of `cv2.projectPoints(points, rvec, tvec, matrix, None)`, because pixel centres
+        have integer coordinates in OpenCV; in this project, pixel i covers [i, i + 1).
         """
         matrix = self.matrix.copy()
         matrix[:2, 2] -= 0.5
@@ -94,15 +91,16 @@ class Frame:
         return matrix, X_CW.rotation_vector, X_CW.position
 
     def _project(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the pixels `(N, 2)` of world points, and a mask of the points in front of the camera."""
+        """Return the pixels `(N, 2)` of points `(N, 3)` [m], and a mask of the points before the camera."""
         projected = self.X_WC.inverse().apply(points) @ self.matrix.T
         depth = projected[:, 2:]
+        # A division by infinity avoids warnings for points behind the camera.
         return projected[:, :2] / np.where(depth > 0, depth, np.inf), depth[:, 0] > 0
 
 
 @dataclass(frozen=True)
 class FrameCaptured(Event):
-    """A frame was captured; the journal omits this event, and has the detections in `FrameSearched`.
+    """A frame was captured; the journal omits this event with its image.
 
     Attributes:
         frame: The frame with its image.

@@ -1,4 +1,4 @@
-"""Conversion of values to JSON for records, with rounded numbers and without images."""
+"""Conversion of Python values to JSON values with rounded numbers and without images."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ DECIMAL_PLACES = 6
 """Number of decimal places of floats: a micrometre, a microradian, a microsecond."""
 
 MAX_INTEGER_BITS = 2048
-"""Size of the largest integer that is written as a number [bit]: 617 digits, of the 640 that Python reads."""
+"""Maximum size of an integer that is written as a number [bit]: 617 digits; every Python reads 640 digits."""
 
 
 def to_json(value: Any) -> Any:
-    """Return `value` as JSON that every JSON parser can read.
+    """Return `value` converted to types that `json.dumps` accepts and every JSON parser can read.
 
     Floats are rounded to `DECIMAL_PLACES`. A frame is converted without its image. Infinities, NaN and
     integers beyond `MAX_INTEGER_BITS` become text. Characters that are not UTF-8 are escaped.
@@ -32,7 +32,7 @@ def to_json(value: Any) -> Any:
 
 
 def to_json_or_type_name(value: Any) -> Any:
-    """Return `value` as JSON, or the name of its type if the value cannot be converted.
+    """Return the result of `to_json`, or the name of the type if the value cannot be converted.
 
     An output of a skill can have any type; the run must not end if the output cannot be converted.
     """
@@ -47,9 +47,9 @@ def round_values(values: Iterable[float], digits: int) -> list[float]:
     return [round(float(value), digits) + 0.0 for value in values]
 
 
-def _escape(value: str) -> str:
+def _escape_surrogates(text: str) -> str:
     """Return a text in which lone surrogates, which UTF-8 cannot encode, are escaped."""
-    return value if value.isascii() else value.encode(errors="backslashreplace").decode()
+    return text if text.isascii() else text.encode(errors="backslashreplace").decode()
 
 
 def _round_number(value: Any) -> float | str:
@@ -63,7 +63,7 @@ def _round_number(value: Any) -> float | str:
 
 _CONVERTERS: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
     (Enum, lambda value: to_json(value.value)),
-    (str, _escape),
+    (str, _escape_surrogates),
     (int, lambda value: value if value.bit_length() <= MAX_INTEGER_BITS else hex(value)),
     (type(None), lambda value: value),
     ((float, np.floating), _round_number),
@@ -71,10 +71,13 @@ _CONVERTERS: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
     (np.ndarray, lambda value: to_json(value.tolist())),
     (Frame, lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _round_number(frame.stamp)}),
     (Pose, lambda pose: pose.to_rounded_list(DECIMAL_PLACES)),
-    (Mapping, lambda mapping: {_escape(str(key)): to_json(value) for key, value in mapping.items()}),
+    (
+        Mapping,
+        lambda mapping: {_escape_surrogates(str(key)): to_json(value) for key, value in mapping.items()},
+    ),
     ((list, tuple), lambda values: [to_json(value) for value in values]),
     ((set, frozenset), lambda values: sorted((to_json(value) for value in values), key=repr)),
-    (PurePath, lambda path: _escape(str(path))),
+    (PurePath, lambda path: _escape_surrogates(str(path))),
 )
 """Types and the converters of their values to JSON; the first matching type applies."""
 

@@ -1,4 +1,4 @@
-"""Bins, object classes, heights and shapes that follow from a cell file."""
+"""Bins, object classes, heights and shapes, computed from a cell file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NECK_LENGTH = 0.015
 
 
 def build_bin(name: str, config: BinConfig) -> Bin:
-    """Return the bin of a section of a cell file, with slots evenly distributed over the floor."""
+    """Return the bin that `config` declares, with slots evenly distributed over the floor."""
     position, size = np.array(config.position), np.array(config.size)
     columns, rows = config.slots
     x = position[0] + size[0] * ((np.arange(columns) + 0.5) / columns - 0.5)
@@ -32,34 +32,35 @@ def build_bin(name: str, config: BinConfig) -> Bin:
 
 
 def build_object_class(label: str, config: ObjectConfig) -> ObjectClass:
-    """Return the object class of a section of a cell file, with the default mass."""
+    """Return the object class that `config` declares, with the default mass."""
     return ObjectClass(label, config.height, config.radius, config.ring)
 
 
 def compute_travel_height(config: CellConfig) -> float:
     """Return the tool height [m] at which a held object of any class clears all bin walls and piles."""
-    max_height = max(kind.height for kind in config.objects.values())
+    max_height = max(section.height for section in config.objects.values())
     wall_top = max(bin.position[2] + bin.size[2] for bin in config.bins.values())
     return max(wall_top, compute_max_pile_height(config)) + max_height + config.motion.clearance
 
 
 def compute_max_pile_height(config: CellConfig) -> float:
     """Return the maximum height of a pile on the table [m], which has two objects if stacks occur."""
-    max_height = max(kind.height for kind in config.objects.values())
+    max_height = max(section.height for section in config.objects.values())
     return 2 * max_height if config.table.stacked else max_height
 
 
 def list_bin_boxes(size: Vector3) -> Sequence[tuple[Vector3, Vector3]]:
-    """Return the half extents and the centre of the floor and of each wall of a bin.
+    """Return a box, as half extents and centre, for the floor and for each wall of a bin.
 
     `size` contains length, width and height [m]; centres are relative to `Bin.position` [m].
     """
     (length, width, height), thickness = size, BIN_THICKNESS
-    x, y, z = (length + thickness) / 2, (width + thickness) / 2, height / 2
+    wall_x, wall_y, wall_z = (length + thickness) / 2, (width + thickness) / 2, height / 2
     floor = (length / 2 + thickness, width / 2 + thickness, thickness / 2), (0.0, 0.0, thickness / 2)
-    x_wall, y_wall = (thickness / 2, width / 2 + thickness, z), (length / 2, thickness / 2, z)
-    walls = (x_wall, (x, 0.0, z)), (x_wall, (-x, 0.0, z)), (y_wall, (0.0, y, z)), (y_wall, (0.0, -y, z))
-    return floor, *walls
+    end_size, side_size = (thickness / 2, width / 2 + thickness, wall_z), (length / 2, thickness / 2, wall_z)
+    end_walls = [(end_size, (x, 0.0, wall_z)) for x in (wall_x, -wall_x)]
+    side_walls = [(side_size, (0.0, y, wall_z)) for y in (wall_y, -wall_y)]
+    return floor, *end_walls, *side_walls
 
 
 def find_unreachable_places(
@@ -78,12 +79,12 @@ def find_unreachable_places(
     ]
     safe_position = np.array([config.safe_place[:2]])
     places.append((("safe_place",), "the safe place", safe_position, config.safe_place[2]))
-    for keys, name, positions, surface_height in places:
+    for key_path, place_name, positions, surface_height in places:
         try:
             for position in positions:
                 require_reachable(position, surface_height)
         except Unreachable as error:
-            yield keys, f"{name} is out of reach: {error}"
+            yield key_path, f"{place_name} is out of reach: {error}"
 
 
 def build_bins(config: CellConfig) -> dict[str, Bin]:
@@ -93,4 +94,4 @@ def build_bins(config: CellConfig) -> dict[str, Bin]:
 
 def build_object_classes(config: CellConfig) -> dict[str, ObjectClass]:
     """Return the object classes of a cell file by label, each with the default mass."""
-    return {label: build_object_class(label, kind) for label, kind in config.objects.items()}
+    return {label: build_object_class(label, section) for label, section in config.objects.items()}

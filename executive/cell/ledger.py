@@ -12,7 +12,7 @@ from executive.geometry import Array
 
 
 class Ledger(Protocol):
-    """Tracker of the items of a run; it alone decides on identity, state and position of each object."""
+    """Tracker of the items of a run, which decides on the identity, state and position of each object."""
 
     @property
     def change_count(self) -> int:
@@ -20,13 +20,13 @@ class Ledger(Protocol):
 
     @property
     def unknown_labels(self) -> Mapping[str, int]:
-        """Maximum number of boxes in one look, by label that the cell file does not declare."""
+        """Maximum number of boxes in a frame, by label, for labels that the cell file does not declare."""
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
         """Update all items with the detections in a frame, and return the targets (`find_targets`).
 
-        The ledger ignores a second search of a frame, and detections at positions where the robot has moved
-        objects since the capture.
+        The ledger ignores detections in a frame that has already been searched, and detections at positions
+        where the robot has moved objects since the capture.
 
         Args:
             detections: The frame, the searched region, and the error rates of the detector.
@@ -40,16 +40,16 @@ class Ledger(Protocol):
         """Return all items that lie on the table with a probability of at least 0.5."""
 
     def find_uncertain_items(self) -> Sequence[Item]:
-        """Return the items to be sorted in the workspace that another look may confirm or refute."""
+        """Return the unsorted items in the workspace that are uncertain, or that may have been moved."""
 
     def find_held_item(self) -> Item | None:
         """Return the item in the tool, or None."""
 
     def is_current(self, frame: Frame) -> bool:
-        """Return True if the robot cannot have moved all objects since the capture of a frame."""
+        """Return False if the robot may have moved all objects on the table since the capture of a frame."""
 
     def is_fresh(self, target: Target) -> bool:
-        """Return True if the robot cannot have moved a target since its last detection."""
+        """Return False if the robot may have moved a target since its last detection."""
 
     def is_open(self, item: Item) -> bool:
         """Return True if an item is still to be sorted: on the table or dropped, and not rejected."""
@@ -70,10 +70,10 @@ class Ledger(Protocol):
         """Return the number of failed attempts to pick an item."""
 
     def count_objects_in(self, bin: str) -> int:
-        """Return the number of objects in a bin, which is the index of its next free slot."""
+        """Return the number of objects in a bin, which is also the index of the next free slot."""
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
-        """Record that the tool touched an item, and return True if the item may be of its assumed class.
+        """Record a touch of an item, and return False if the touch contradicts the class of the item.
 
         Args:
             item: The item.
@@ -105,7 +105,7 @@ class Ledger(Protocol):
         """Record that an item was put back on the table, with its centre at `position` `(3,)` [m]."""
 
     def reject(self, item: Item, reason: str) -> None:
-        """Reject an item, which is reported, and not selected again."""
+        """Reject an item: skills no longer select the item, and the result of the run lists the item."""
 
     def invalidate_positions(self) -> None:
         """Record that the robot may have moved any object on the table."""
@@ -114,14 +114,14 @@ class Ledger(Protocol):
         """Record that the tool may have moved any item outside of the bins."""
 
     def mark_unseen_as_dropped(self) -> None:
-        """Record as dropped every item that no look has shown since `lose_track`.
+        """Record as dropped every item that no frame has shown since `lose_track`.
 
-        Later looks search for these items on the table and in the bins. An item without a detection until the
-        end of the run is rejected, because its position is unknown.
+        Later frames are searched for these items on the table and in the bins. An item without a detection
+        until the end of the run is rejected, because its position is unknown.
         """
 
     def record_bin_contents(self) -> None:
-        """Record an item for each unknown object that most looks since `lose_track` show in a bin.
+        """Record an item for each unknown object in a bin, according to the frames since `lose_track`.
 
         An unknown object is assigned to a dropped item of its class, or becomes a new item.
         """

@@ -22,7 +22,7 @@ class Target:
         confidence: Confidence of the last detection, 0 to 1.
         frame: Id of the last frame that showed the item.
         change_count: Number of changes of the table by the robot before the capture.
-        stamp: Capture time of this frame on the clock of the run [s].
+        stamp: Capture time of the last frame that showed the item [s].
     """
 
     item: Item

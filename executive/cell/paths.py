@@ -1,4 +1,4 @@
-"""Checks of paths in files of the user, which must not lead out of a folder."""
+"""Checks that relative paths, which users write in files, stay inside a folder."""
 
 from __future__ import annotations
 

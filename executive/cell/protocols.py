@@ -26,7 +26,7 @@ Routes = Mapping[str, tuple[str, ...]]
 
 
 class Clock(Protocol):
-    """The only clock of the run; in simulation, it shows simulated time."""
+    """The only clock of the run, which shows simulated time in simulation."""
 
     @property
     def now(self) -> float:
@@ -37,7 +37,7 @@ class Clock(Protocol):
         """Duration of one control step [s]."""
 
     def sleep(self, duration: float) -> Steps:
-        """Yield until `duration` [s] has passed on this clock."""
+        """Yield until the time of the clock has advanced by `duration` [s]."""
 
 
 class Tool(Protocol):
@@ -123,7 +123,7 @@ class Localizer(Protocol):
         """
 
     def localize(self, detections: Detections) -> Sequence[Observation]:
-        """Return an observation of each found or doubtful detection.
+        """Return an observation of each confident and each doubtful detection.
 
         An observation is not confident if the detection is doubtful, or if the size of the box or the height
         of the top of the object contradicts the class.
@@ -156,7 +156,7 @@ class MinTimes(Protocol):
     def get_transport_time(self, bin: str | None) -> float:
         """Return the minimum time of a transport from the workspace to a bin [s], from rest to rest.
 
-        If `bin` is None, the transport is to the nearest bin. The time is 0 if the bin does not exist.
+        If `bin` is None, the transport is to the nearest bin. The time of an unknown bin is 0.
         """
 
     def get_answer_time(self, detector: str) -> float:

@@ -1,6 +1,6 @@
-"""Proxies of the parts of a cell, which pass every attribute read and every call to an interceptor.
+"""Proxies of the parts of a cell, which pass each attribute read and each call to an interceptor.
 
-Recorder, replay, test kit and fault scripts use proxies to record, replace, observe or change results.
+The input recorder, the replay, the test kit and the fault scripts intercept calls with these proxies.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Access:
         role: Role of the part, a key of `IS_METHOD`: `arm`, `tool`, `detector`, `request`, ...
         detector: Name of the detector for the roles `detector` and `request`, otherwise "".
         member: Name of the attribute or method.
-        proceed: Function that performs the access without the interceptor and returns the result.
+        proceed: Function that performs the access on the part itself and returns the result.
         arguments: Positional arguments of the call.
         keywords: Keyword arguments of the call.
     """
@@ -100,6 +100,7 @@ class _Proxy:
     def __init__(self, role: str, detector: str, part: Any, interceptor: Interceptor) -> None:
         self._role, self._detector, self._part, self._intercept = role, detector, part, interceptor
         self._attribute_accesses: dict[str, Access] = {}
+        """Accesses by attribute name, stored because attributes are read in every control step."""
 
     def __getattr__(self, member: str) -> Any:
         if member.startswith("_") or member not in IS_METHOD[self._role]:

@@ -12,11 +12,12 @@ from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
 
 AUDIT_KEYS = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
-"""Keys of the object counts of an audit; `fell_in_wrong_bin` and `unseen` are subsets of the other counts."""
+"""Keys of the object counts of an audit: objects in permitted bins, in other bins, left on the table, and
+elsewhere. The last two counts are subsets: objects that fell into a wrong bin, and undetected objects."""
 
 
 class Accounts(Protocol):
-    """Ledger with the methods that a run calls when it ends and when it is resumed."""
+    """Ledger with the methods for the end and for the resumption of a run."""
 
     def close(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the tree succeeded."""
@@ -25,15 +26,15 @@ class Accounts(Protocol):
         """Discard the items on the table; the next look adds a new item for each visible object."""
 
     def count_states(self) -> dict[str, int]:
-        """Return the number of items in each final state, and of all items except phantoms (`seen`)."""
+        """Return the number of items by final state; the key `seen` counts all items except phantoms."""
 
     @property
     def unknown_labels(self) -> Mapping[str, int]:
-        """Maximum number of boxes in one look, by label that the cell file does not declare."""
+        """Maximum number of boxes in a frame, by label, for labels that the cell file does not declare."""
 
     @property
     def assumption_reasons(self) -> Sequence[str]:
-        """Reasons for which error rates of detectors were assumed instead of measured."""
+        """Reasons why error rates of detectors were assumed, and not measured."""
 
     def list_items(self) -> Sequence[ItemChanged]:
         """Return the current state of each item, in the order of the first detection."""
@@ -48,7 +49,7 @@ class Workcell(Protocol):
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger, which the run closes when it ends."""
+        """The ledger, which is closed at the end of the run."""
 
     @property
     def steps(self) -> int:
@@ -56,9 +57,9 @@ class Workcell(Protocol):
 
     @property
     def last_command(self) -> int:
-        """Control step of the last start of a motion or command to the tool; 0 without a command.
+        """Control step of the last start of a motion or command to the tool.
 
-        The step is also 0 if it is unknown after an interruption of the run.
+        The step is 0 before the first command, and after an interruption that makes the step unknown.
         """
 
     def log_to(self, path: Path) -> None:

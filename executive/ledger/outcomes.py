@@ -105,7 +105,7 @@ def discard_rejected_items(records: Iterable[Record]) -> list[Record]:
 
 
 def count_states(records: Iterable[Record]) -> dict[str, int]:
-    """Return the number of items in each final state, and of all items except phantoms (`seen`)."""
+    """Return the number of items by final state; the key `seen` counts all items except phantoms."""
     counts = Counter(record.state for record in records)
     return {
         "seen": sum(counts.values()) - counts[State.PHANTOM],

@@ -273,7 +273,7 @@ class Tracker:
         self._records.emit(*outcomes.discard_rejected_items(self.records))
 
     def count_states(self) -> dict[str, int]:
-        """Return the number of items in each final state, and of all items except phantoms (`seen`)."""
+        """Return the number of items by final state; the key `seen` counts all items except phantoms."""
         return outcomes.count_states(self.records)
 
     def list_items(self) -> Sequence[ItemChanged]:

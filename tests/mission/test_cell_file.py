@@ -47,7 +47,7 @@ def complaint(text: str, overrides: dict[str, str] | None = None) -> str:
         ("0.06]}", "0.06], slots: [0, 3]}", "error[out-of-range]: bins.red_bin.slots[0] must be at least 1, not 0\n"),
         ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 748, 656]", "needs a table_view that is a square inside its image of 640 x 480 pixels, not [192, 100, 748, 656]\n"),
         ("table_view: [192, 100, 448, 356]", "table_view: [192, 100, 448, 350]", "needs a table_view that is a square inside its image"),
-        ("up: [1, 0, 0]", "up: [0, 0, 1]", "cameras.top needs a look_at that differs from position, and an up that is not along its axis\n"),
+        ("up: [1, 0, 0]", "up: [0, 0, 1]", "cameras.top needs a look_at other than position, and an up that is not along the axis\n"),
         ("fov_deg: 55", "width: 640", "cameras.top needs fov_deg, or a calibration instead of position, look_at, up, fov_deg\n"),
         ("fov_deg: 55", "calibration: {matrix: [[400, 0, 320], [0, 400, 240], [0, 0, 1]], mount_to_camera: {rotation: [0, 0, 0], translation: [0, 0, 1]}}", "cameras.top must not have position, look_at, up besides calibration, which defines them\n"),
         ("fov_deg: 55", "calibration: {matrix: [[400, 0, 320], [0, 400, 240], [0, 0, 1]]}", "cameras.top.calibration needs exactly one of mount_to_camera and camera_to_mount, its inverse\n"),

@@ -32,10 +32,10 @@ class NoiseConfig(Section):
 class DepthConfig(Section):
     """A depth sensor registered to the camera, and its noise, sampled for each frame.
 
-    The defaults model a RealSense D435 at 848 x 480 (focal length 425 pixels, baseline 50 mm). By Intel's
-    "Tuning depth cameras for best performance" the RMS error of a stereo camera is
-    z² · subpixel / (focal length · baseline), here with a subpixel error of 0.08. The dropout fractions and
-    the correlation of neighbouring pixels are assumed.
+    The defaults model a RealSense D435 at 848 x 480 (focal length 425 pixels, baseline 50 mm). According to
+    Intel's "Tuning depth cameras for best performance", the RMS error of a stereo camera at distance z is
+    z² · subpixel error / (focal length · baseline); the subpixel error is 0.08 pixel. The dropout fractions
+    and the correlation of neighbouring pixels are assumed.
     """
 
     floor: Distance = 0.0005
@@ -78,8 +78,8 @@ class CalibrationConfig(Section):
 
     @model_validator(mode="after")
     def _check_matrix_and_pose(self) -> CalibrationConfig:
-        (fx, skew, _), (zero, fy, _), last = self.matrix
-        if fx <= 0 or fy <= 0 or (skew, zero) != (0, 0) or last != (0, 0, 1):
+        (fx, skew, _), (zero, fy, _), last_row = self.matrix
+        if fx <= 0 or fy <= 0 or (skew, zero) != (0, 0) or last_row != (0, 0, 1):
             raise ValueError(
                 "needs a matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] with fx and fy above 0, "
                 f"not {[list(row) for row in self.matrix]}"
@@ -121,7 +121,7 @@ class CameraConfig(Section):
     """Depth sensor; by default there is none. `depth: {}` is a depth sensor with the default noise."""
 
     def get_view_box(self, view: str) -> tuple[int, int, int, int]:
-        """Return the region of the image [pixel] of a `view` (`table` or `full`)."""
+        """Return the region of the image [pixel] that a view shows: `table` (the workspace) or `full`."""
         return self.table_view if view == "table" else (0, 0, self.width, self.height)
 
     @model_validator(mode="after")
@@ -133,16 +133,14 @@ class CameraConfig(Section):
                 f"needs a table_view that is a square inside its image of {self.width} x {self.height} "
                 f"pixels, not {list(self.table_view)}"
             )
-        given = [key for key in POSE_AND_FOV_KEYS if getattr(self, key) is not None]
-        if self.calibration is not None and given:
-            raise ValueError(f"must not have {', '.join(given)} besides calibration, which defines them")
-        if self.calibration is None and len(given) < len(POSE_AND_FOV_KEYS):
-            lacking = ", ".join(key for key in POSE_AND_FOV_KEYS if key not in given)
-            raise ValueError(f"needs {lacking}, or a calibration instead of {', '.join(POSE_AND_FOV_KEYS)}")
+        present = [key for key in POSE_AND_FOV_KEYS if getattr(self, key) is not None]
+        if self.calibration is not None and present:
+            raise ValueError(f"must not have {', '.join(present)} besides calibration, which defines them")
+        if self.calibration is None and len(present) < len(POSE_AND_FOV_KEYS):
+            missing = ", ".join(key for key in POSE_AND_FOV_KEYS if key not in present)
+            raise ValueError(f"needs {missing}, or a calibration instead of {', '.join(POSE_AND_FOV_KEYS)}")
         if self.position is not None and self.look_at is not None and self.up is not None:
             axis = np.subtract(self.look_at, self.position)
             if np.linalg.norm(np.cross(axis, self.up)) < 1e-9:
-                raise ValueError(
-                    "needs a look_at that differs from position, and an up that is not along its axis"
-                )
+                raise ValueError("needs a look_at other than position, and an up that is not along the axis")
         return self

@@ -36,7 +36,7 @@ class CellConfig(Section):
     Values are in SI units; values of keys that end in `_deg` are in degrees.
     """
 
-    base: str = Field("", exclude=True)  # "" after loading.
+    base: str = Field("", exclude=True)  # The loader merges the base file, and removes this key.
     """Path of a base file, from which this file inherits missing top-level keys, missing detectors and
     missing keys of detectors."""
     cell: Name

@@ -22,6 +22,7 @@ def check_ascending(pair: tuple[Number, Number]) -> tuple[Number, Number]:
 
 
 NAME_PATTERN = re.compile(r"\w[\w -]{0,63}")
+"""Permitted names: a letter, digit or `_`, and at most 63 letters, digits, blanks, `_` and `-`."""
 
 
 def check_name(name: str) -> str:
@@ -37,15 +38,19 @@ def check_name(name: str) -> str:
 
 Name = Annotated[str, AfterValidator(check_name)]
 MIN_LENGTH, MAX_LENGTH = 1e-4, 10.0
-"""Minimum and maximum length in a cell [m]; every sensor has a larger error, every arm a shorter reach."""
+"""Minimum and maximum length in a cell [m]: below the error of each sensor, above the reach of each arm."""
 Length = Annotated[float, Field(ge=MIN_LENGTH, le=MAX_LENGTH)]
+"""A positive length [m]."""
 Distance = Annotated[float, Field(ge=0, le=MAX_LENGTH)]
+"""A length that may be 0 [m]."""
 Coordinate = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]
+"""A coordinate of a point [m]."""
 Count = Annotated[int, Field(ge=1, le=1000)]
-"""A positive number of things; no bin, table or image has more than 1000 objects."""
+"""A positive number of objects; no bin, table or image has more than 1000 objects."""
 Natural = Annotated[int, Field(ge=0, le=1000)]
-"""A number of things that may be 0."""
+"""A number that may be 0."""
 Range = Annotated[tuple[Coordinate, Coordinate], AfterValidator(check_ascending)]
+"""Minimum and maximum coordinate [m]."""
 Vector = tuple[Coordinate, Coordinate, Coordinate]
 """x, y, z [m]."""
 Angle = Annotated[float, Field(ge=-360, le=360)]
@@ -54,9 +59,10 @@ Angles = tuple[Angle, Angle, Angle]
 """Roll, pitch, yaw [degree]."""
 Force = Annotated[float, Field(ge=1e-3, le=1e4)]
 """A force [N]: from the weight of 0.1 g to the weight of 1 t."""
-Channel = Annotated[float, Field(ge=0, le=1)]
-Colour = tuple[Channel, Channel, Channel]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+"""A fraction, 0 to 1."""
+Colour = tuple[Fraction, Fraction, Fraction]
+"""Red, green and blue, 0 to 1."""
 Seconds = Annotated[float, Field(ge=0, le=600)]
 """A duration [s]; more than ten minutes is an error in the cell file."""
 
