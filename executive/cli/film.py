@@ -39,7 +39,7 @@ def command(
     with keep_stdout_clean():
         from executive.cli.progress import show_progress
         from executive.record.run_directory import RunDirectory, find_run
-        from executive.view.film.film import END_DURATION, write_film
+        from executive.view.film.film import RESULT_DISPLAY_TIME, write_film
         from executive.view.film.film_source import FilmSource
         from executive.view.film.formats import choose_format, prepare_file
 
@@ -47,10 +47,10 @@ def command(
         film_format = choose_format(output, gif)
         film_file = output or directory.path / f"film{film_format.suffix}"
         source = FilmSource(directory)
-        speed = speed or film_format.speed
+        speed = speed or film_format.default_speed
         with prepare_file(film_file, force=force) as partial_file:
             if not quiet:
-                seconds = source.events[-1].clock / speed + END_DURATION
+                seconds = source.events[-1].clock / speed + RESULT_DISPLAY_TIME
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)
             with show_progress("frames", quiet=quiet, print_lines=True) as progress:
                 frames = write_film(

@@ -13,67 +13,63 @@ from executive.cells.sim.pictures import PictureSource, count_steps, render_pict
 from executive.cells.sim.viewpoint import compute_viewpoint
 from executive.view.film.film_source import FilmSource
 from executive.view.film.formats import FilmFormat
-from executive.view.film.page import SCENE_SIZE, draw_frame, draw_result
+from executive.view.film.page import SCENE_SIZE, add_result, draw_frame
 from executive.view.film.run_state import FilmRunState
 
 CELL_BOX = (24, 76, 776, 644)
-"""Left, top, right and bottom of the box in the image in which arm, workspace and bins appear [pixel]."""
-END_DURATION = 2.0
-"""Time for which the film shows the result of the run at its end [s]."""
-
-Progress = Callable[[int, int], None]
-"""Callback that receives the number of complete frames and the number of all frames."""
+"""Region of the image that shows arm, workspace and bins: left, top, right and bottom [pixel]."""
+RESULT_DISPLAY_TIME = 2.0
+"""Time for which the last frames of a film show the result of the run [s]."""
 
 
 def write_film(
-    source: FilmSource, file: Path, format: FilmFormat, *, speed: float, workers: int, progress: Progress
-) -> int:
+    source: FilmSource, file: Path, film_format: FilmFormat, *, speed: float, workers: int,
+    progress: Callable[[int, int], None],
+) -> int:  # fmt: skip
     """Write the film of a run, and return the number of frames.
 
     Args:
-        source: The record of the run.
+        source: Record of the run.
         file: File of the film.
-        format: Format of the film.
+        film_format: File format of the film.
         speed: Seconds on the robot's clock per second of the film.
         workers: Number of rendering processes.
-        progress: Callback that receives the number of complete frames and the number of all frames.
+        progress: Callback that receives the number of written frames and the number of all frames.
     """
-    steps_per_frame = speed / format.frame_rate / source.start.step
+    steps_per_frame = speed / film_format.frame_rate / source.start.step
     steps = select_steps(count_steps(source.directory.world_log), steps_per_frame)
-    end_frame_count = round(END_DURATION * format.frame_rate)
+    result_frame_count = round(RESULT_DISPLAY_TIME * film_format.frame_rate)
 
     def iterate_with_progress() -> Generator[Image.Image, None, None]:
-        for done, frame in enumerate(frames, start=1):
-            progress(done, len(steps) + end_frame_count)
+        for frame_count, frame in enumerate(frames, start=1):
+            progress(frame_count, len(steps) + result_frame_count)
             yield frame
 
-    with closing(_draw_frames(source, steps, end_frame_count, speed, workers)) as frames:
-        format.write(file, iterate_with_progress(), format.frame_rate)
-    return len(steps) + end_frame_count
+    with closing(_draw_frames(source, steps, result_frame_count, speed, workers)) as frames:
+        film_format.write(file, iterate_with_progress(), film_format.frame_rate)
+    return len(steps) + result_frame_count
 
 
 def select_steps(step_count: int, steps_per_frame: float) -> list[int]:
-    """Return the control steps of the frames: every `steps_per_frame`, from the first step to the last."""
+    """Return the control steps of the frames: the multiples of `steps_per_frame`, and the last step."""
     frame_count = math.ceil(step_count / steps_per_frame) + 1
     return [min(round(frame * steps_per_frame), step_count) for frame in range(frame_count)]
 
 
 def _draw_frames(
-    source: FilmSource, steps: Sequence[int], end_frame_count: int, speed: float, workers: int
+    source: FilmSource, steps: Sequence[int], result_frame_count: int, speed: float, workers: int
 ) -> Generator[Image.Image, None, None]:
-    """Yield the frames of a film: one per step in `steps`, then `end_frame_count` with the result."""
+    """Yield the frames of a film: a frame per step in `steps`, then `result_frame_count` result frames."""
     start, directory = source.start, source.directory
     speed_text = f" · {speed:g}x speed" if speed != 1 else ""
     subtitle = f"seed {start.seed} · cell {source.config.cell}{speed_text}"
     duration = steps[-1] * start.step
     state = FilmRunState(source.events, source.nodes, list(directory.pictures.glob("*.jpg")))
-    view = compute_viewpoint(source.config, SCENE_SIZE, CELL_BOX)
-    picture_source = PictureSource(source.config, start.seed, directory.world_log, view, directory.scene)
+    viewpoint = compute_viewpoint(source.config, SCENE_SIZE, CELL_BOX)
+    picture_source = PictureSource(source.config, start.seed, directory.world_log, viewpoint, directory.scene)
     with closing(render_pictures(picture_source, steps, workers)) as pictures:
         for step, picture in zip(steps, pictures, strict=True):
             state.advance_to(step, step * start.step)
             yield draw_frame(source, picture, state, subtitle, duration)
-    last_frame = draw_result(
-        draw_frame(source, picture, state, subtitle, duration, has_caption=False), source.result
-    )
-    yield from [last_frame] * end_frame_count
+    last_frame = draw_frame(source, picture, state, subtitle, duration, has_caption=False)
+    yield from [add_result(last_frame, source.result)] * result_frame_count

@@ -1,4 +1,4 @@
-"""Record of a run in a simulated cell, from which a film is made."""
+"""Record of a run in a simulated cell, as the source of a film."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.replay.input_log import InputLog
 
 
 class FilmSource:
-    """Record of a run in a simulated cell.
+    """Record of a run in a simulated cell, as the source of a film.
 
     Args:
         directory: The run directory.
@@ -24,16 +24,16 @@ class FilmSource:
         start: Event of the start of the run.
         nodes: Nodes of the tree.
         config: Configuration of the cell.
-        bin_colours: Colour of each bin as `#rrggbb`, by the name of the bin.
+        bin_colours: Colour of each bin in the format `#rrggbb` of Pillow, by bin name.
         item_count: Number of items in the run.
-        result: Content of result.json; without it, the event of the end of the run; None if neither exists.
+        result: Result from result.json, or else from the journal; None for an interrupted run.
 
     Raises:
-        InputError: The record lacks the journal, the tree, the cell or the log of the world.
+        InputError: The journal, the tree, the cell or the log of the world is missing in the record.
     """
 
     def __init__(self, directory: RunDirectory) -> None:
-        _require_log(directory)
+        _require_world_log(directory)
         events = read_journal(directory.journal)
         self.directory = directory
         self.start = find_run_start(events, directory.path, "there is nothing to film")
@@ -41,19 +41,19 @@ class FilmSource:
         self.nodes = read_tree(directory.tree)
         self.config = read_cell(directory.path)
         self.bin_colours = {
-            name: "#" + "".join(f"{round(255 * channel):02x}" for channel in bin.colour)
-            for name, bin in self.config.bins.items()
+            name: "#" + bytes(round(255 * channel) for channel in bin_config.colour).hex()
+            for name, bin_config in self.config.bins.items()
         }
-        changes = (one.event for one in self.events if isinstance(one.event, ItemChanged))
-        self.item_count = len({change.item for change in changes})
+        items = {timed.event.item for timed in self.events if isinstance(timed.event, ItemChanged)}
+        self.item_count = len(items)
         self.result = read_result(directory, events) or find_run_end(events)
 
 
-def _require_log(directory: RunDirectory) -> None:
-    """Check that the record contains the log of a simulated world.
+def _require_world_log(directory: RunDirectory) -> None:
+    """Check that the record contains the log of a simulated world, `world.log`.
 
     Raises:
-        InputError: The record does not contain the log.
+        InputError: The log is missing, or the cell is not simulated.
     """
     if not directory.world_log.exists():
         raise InputError(

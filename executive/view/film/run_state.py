@@ -1,7 +1,8 @@
-"""State of a recorded run at a control step, for a frame of a film."""
+"""State of a recorded run at the control step that a film frame shows."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from executive.record.timeline.timeline import Timeline
 from executive.view.tree.tree_text import find_skill_names
 
 FAILURE_DISPLAY_TIME = 1.6
-"""Time for which a film shows a failure, on the clock of the run [s]."""
+"""Time on the clock of the run for which a film shows a failure [s]."""
 
 
 class FilmRunState:
@@ -21,7 +22,7 @@ class FilmRunState:
     Args:
         events: Events of the run in order, without the events that a resumption discarded.
         nodes: Nodes of the tree.
-        image_files: Image files on which decisions are based; their names start with the control step.
+        image_files: Files of images on which decisions are based; each name starts with the control step.
 
     Attributes:
         timeline: Timeline of the events up to the control step.
@@ -35,14 +36,14 @@ class FilmRunState:
         self.timeline = Timeline(keeps_history=False)
         self.picture_file: Path | None = None
         self.time = 0.0
-        self._events = list(events)[::-1]
-        self._image_files = sorted(image_files, reverse=True)
+        self._later_events = deque(events)
+        self._later_image_files = deque(sorted(image_files))
         self._skill_names_by_path = find_skill_names(nodes)
-        self._failure: tuple[float, str] = (-FAILURE_DISPLAY_TIME, "")
+        self._incident_text, self._incident_time = "", 0.0
 
     @property
     def active_paths(self) -> frozenset[str]:
-        """Paths of the running nodes, or after the run of the nodes that ended with the tree."""
+        """Paths of the running nodes; after the run, paths of the nodes that ended together with the tree."""
         timeline = self.timeline
         if running := timeline.find_running_activations():
             return frozenset(activation.node for activation in running)
@@ -53,32 +54,32 @@ class FilmRunState:
     @property
     def failure_text(self) -> str:
         """Text about a failure within the last `FAILURE_DISPLAY_TIME`; "" if there is none."""
-        time, text = self._failure
-        return text if self.time < time + FAILURE_DISPLAY_TIME else ""
+        return self._incident_text if self.time < self._incident_time + FAILURE_DISPLAY_TIME else ""
 
     @property
     def action_text(self) -> str:
-        """Text with the first running skill, its item, and the bin of a held item; "" if no skill runs."""
+        """Name of the first running skill, its item, and the bin of a held item; "" if no skill runs."""
         timeline = self.timeline
         for path, name in self._skill_names_by_path.items():
-            last = timeline.activation_by_path.get(path)
-            if last is not None and last.status == "RUNNING":
-                item, target = timeline.items.by_name.get(last.item), timeline.targets.get(last.item)
+            activation = timeline.activation_by_path.get(path)
+            if activation is not None and activation.status == "RUNNING":
+                item = timeline.items.by_name.get(activation.item)
+                target = timeline.targets.get(activation.item)
                 is_held = item is not None and item.last_change.state == "held"
                 bin_text = f"to {target.bin}" if target is not None and is_held else ""
-                return " ".join(part for part in (name, last.item, bin_text) if part)
+                return " ".join(part for part in (name, activation.item, bin_text) if part)
         return ""
 
     def advance_to(self, step: int, time: float) -> None:
-        """Add the events up to a control step, which began at `time` on the clock of the run [s]."""
+        """Process the events up to a control step, which began at `time` on the clock of the run [s]."""
         self.time = time
-        while self._events and self._events[-1].tick <= step:
-            timed_event = self._events.pop()
+        while self._later_events and self._later_events[0].tick <= step:
+            timed_event = self._later_events.popleft()
             self.timeline(timed_event)
-            if failure := _describe_incident(timed_event):
-                self._failure = (timed_event.clock, failure)
-        while self._image_files and int(self._image_files[-1].stem.partition("_")[0]) <= step:
-            self.picture_file = self._image_files.pop()
+            if text := _describe_incident(timed_event):
+                self._incident_text, self._incident_time = text, timed_event.clock
+        while self._later_image_files and int(self._later_image_files[0].stem.partition("_")[0]) <= step:
+            self.picture_file = self._later_image_files.popleft()
 
 
 def _get_end_key(activation: Activation | None) -> tuple[int, str]:
@@ -89,8 +90,8 @@ def _get_end_key(activation: Activation | None) -> tuple[int, str]:
 def _describe_incident(timed_event: TimedEvent) -> str:
     """Return a text about the failure of a skill with an item, a halt, a fault or a resumption; else ""."""
     match timed_event.event:
-        case NodeEnded(status="FAILURE", skill=skill, item=item) as ended if skill and item:
-            return f"{to_skill_name(ended.node)}.{ended.reason}: {ended.message}"
+        case NodeEnded(status="FAILURE", skill=skill, item=item) as event if skill and item:
+            return f"{to_skill_name(event.node)}.{event.reason}: {event.message}"
         case RunHalted():
             return "halt"
         case FaultRaised():

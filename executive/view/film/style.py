@@ -11,18 +11,19 @@ BACKGROUND, LINE = "#14181D", "#2E3742"
 TEXT, MINOR_TEXT, INACTIVE = "#F3F6F8", "#9AA6B2", "#66727F"
 """Colours of primary text, of secondary text, and of inactive nodes."""
 RUNNING, SUCCESS, FAILURE = "#F2A71B", "#45BD70", "#F0685C"
-"""Colours of the statuses: those of `view/tree/tree.svg`, adapted to a dark background."""
+"""Colours of the statuses: the colours in `view/tree/tree.svg`, lightened for the dark background."""
 STATUS_COLOURS = {"RUNNING": RUNNING, "SUCCESS": SUCCESS, "FAILURE": FAILURE}
 """Colour of a status mark by status; the mark of any other status has the colour `INACTIVE`."""
 
 _OVERSAMPLING = 8
 """Factor by which a mark is drawn larger before it is scaled down for antialiasing."""
 _LINE_WIDTH = 0.17
-"""Width of the lines of a mark [fraction of the side of the mark]."""
+"""Width of the lines of a mark [fraction of the size of the mark]."""
+_TRIANGLE_MARK = [(0.16, 0.08), (0.92, 0.5), (0.16, 0.92)]
+"""Corners of the mark for RUNNING: points (x, y), y down [fraction of the size of the mark]."""
 _CHECK_MARK = [[(0.12, 0.54), (0.4, 0.82), (0.9, 0.22)]]
-_CROSS = [[(0.17, 0.17), (0.83, 0.83)], [(0.83, 0.17), (0.17, 0.83)]]
-"""Lines of the mark, as points (x, y) [fraction of the side of the mark]; y points down."""
-_ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
+_CROSS_MARK = [[(0.17, 0.17), (0.83, 0.83)], [(0.83, 0.17), (0.17, 0.83)]]
+"""Lines of the marks for SUCCESS and FAILURE: points (x, y), y down [fraction of the size of the mark]."""
 
 
 @lru_cache(maxsize=32)
@@ -34,28 +35,26 @@ def load_font(size: float) -> ImageFont.FreeTypeFont:
 
 
 @lru_cache(maxsize=4096)
-def truncate(text: str, size: float, width: float) -> str:
-    """Return a text on one line, truncated with an ellipsis to `width` [pixel]; `size` is the font size."""
-    line = " ".join(text.split())
-    if load_font(size).getlength(line) <= width:
+def truncate_text(text: str, font_size: float, max_width: float) -> str:
+    """Return a text as one line of at most `max_width` [pixel], truncated with an ellipsis."""
+    line, font = " ".join(text.split()), load_font(font_size)
+    if font.getlength(line) <= max_width:
         return line
-    while line and load_font(size).getlength(line + _ELLIPSIS) > width:
+    while line and font.getlength(line + "…") > max_width:
         line = line[:-1]
-    return line.rstrip() + _ELLIPSIS if line else ""
+    return line.rstrip() + "…" if line else ""
 
 
-def wrap(text: str, size: float, width: float, max_lines: int) -> list[str]:
-    """Return a text as at most `max_lines` lines of at most `width` [pixel]; the last line is truncated."""
+def wrap_text(text: str, font_size: float, max_width: float, max_lines: int) -> list[str]:
+    """Return a text as at most `max_lines` lines of at most `max_width` [pixel]; truncate the last line."""
     lines: list[str] = []
-    words = text.split()
-    while words and len(lines) < max_lines - 1:
-        count = max(
-            (n for n in range(1, len(words) + 1) if load_font(size).getlength(" ".join(words[:n])) <= width),
-            default=1,
-        )
-        lines.append(truncate(" ".join(words[:count]), size, width))
-        words = words[count:]
-    return [*lines, truncate(" ".join(words), size, width)] if words else lines
+    for word in text.split():
+        line = f"{lines[-1]} {word}" if lines else word
+        if lines and (len(lines) == max_lines or load_font(font_size).getlength(line) <= max_width):
+            lines[-1] = line
+        else:
+            lines.append(word)
+    return [truncate_text(line, font_size, max_width) for line in lines]
 
 
 def draw_mark(image: Image.Image, status: str, centre: tuple[float, float], size: int) -> None:
@@ -65,7 +64,7 @@ def draw_mark(image: Image.Image, status: str, centre: tuple[float, float], size
         image: Image to draw on.
         status: Status of a node, or "" for a node that never ran.
         centre: Centre of the mark [pixel].
-        size: Side of the square around the mark [pixel].
+        size: Width and height of the mark [pixel].
     """
     left, top = round(centre[0] - size / 2), round(centre[1] - size / 2)
     box = (left, top, left + size, top + size)
@@ -75,18 +74,18 @@ def draw_mark(image: Image.Image, status: str, centre: tuple[float, float], size
 @lru_cache(maxsize=16)
 def _draw_mask(status: str, size: int) -> Image.Image:
     """Return the coverage of each pixel by the mark of a status, 0 to 255, `(size, size)`."""
-    side = size * _OVERSAMPLING
-    mask = Image.new("L", (side, side))
+    large_size = size * _OVERSAMPLING
+    mask = Image.new("L", (large_size, large_size))
     draw = ImageDraw.Draw(mask)
     if status == "RUNNING":
-        draw.polygon([(0.16 * side, 0.08 * side), (0.92 * side, 0.5 * side), (0.16 * side, 0.92 * side)], 255)
+        draw.polygon([(x * large_size, y * large_size) for x, y in _TRIANGLE_MARK], 255)
     elif status in ("SUCCESS", "FAILURE"):
-        width = round(side * _LINE_WIDTH)
-        for line in _CHECK_MARK if status == "SUCCESS" else _CROSS:
-            points = [(x * side, y * side) for x, y in line]
+        width = round(large_size * _LINE_WIDTH)
+        for line in _CHECK_MARK if status == "SUCCESS" else _CROSS_MARK:
+            points = [(x * large_size, y * large_size) for x, y in line]
             draw.line(points, 255, width, joint="curve")
             for end in (points[0], points[-1]):
                 draw.circle(end, width / 2, 255)
     else:
-        draw.circle((side / 2, side / 2), 0.16 * side, 255)
+        draw.circle((large_size / 2, large_size / 2), 0.16 * large_size, 255)
     return mask.resize((size, size), Image.Resampling.BOX)

@@ -13,10 +13,10 @@ from small_tree import NODES, ended, node, started
 
 from executive.record.result import ItemCounts, Result
 from executive.view.film.film import select_steps
-from executive.view.film.page import describe_result, draw_frame, draw_result
+from executive.view.film.page import add_result, describe_result, draw_frame
 from executive.view.film.panel import (
     MAX_ITEM_ROWS,
-    compute_height,
+    compute_items_height,
     draw_items,
     draw_tree,
     select_items,
@@ -31,8 +31,8 @@ from executive.view.film.style import (
     SUCCESS,
     draw_mark,
     load_font,
-    truncate,
-    wrap,
+    truncate_text,
+    wrap_text,
 )
 
 
@@ -64,7 +64,7 @@ def test_nothing_is_drawn_outside_of_its_box() -> None:
     draw_items(page, (20, 225, 300, 300), rows[:2], {})
     drawn = np.argwhere((np.asarray(page) != np.asarray(Image.new("RGB", (1, 1), BACKGROUND))).any(axis=2))
     (top, left), (bottom, right) = drawn.min(axis=0), drawn.max(axis=0)
-    assert min(top, left) >= 20 and right <= 300 and bottom < 225 + compute_height(2)
+    assert min(top, left) >= 20 and right <= 300 and bottom < 225 + compute_items_height(2)
 
 
 def test_settled_items_give_way_to_those_still_to_do() -> None:
@@ -75,22 +75,22 @@ def test_settled_items_give_way_to_those_still_to_do() -> None:
     assert names == sorted(names, key=lambda name: int(name[5:]))
     assert select_items(rows[:3]) == rows[:3]
     assert (
-        compute_height(3),
-        compute_height(MAX_ITEM_ROWS),
-        compute_height(MAX_ITEM_ROWS + 20),
+        compute_items_height(3),
+        compute_items_height(MAX_ITEM_ROWS),
+        compute_items_height(MAX_ITEM_ROWS + 20),
     ) == (80, 200, 200)
 
 
 def test_lines_are_as_wide_as_they_may_be() -> None:
-    cut = truncate("a word and then another one", 14, 100)
-    assert (truncate("short", 14, 100), cut[-1], truncate("anything", 14, 3)) == ("short", "…", "")
+    cut = truncate_text("a word and then another one", 14, 100)
+    assert (truncate_text("short", 14, 100), cut[-1], truncate_text("anything", 14, 3)) == ("short", "…", "")
     assert load_font(14).getlength(cut) <= 100
     text = "no seal on sphere-1 0.10 s after contact, and neither the second nor the third went any better"
-    assert " ".join(wrap(text, 14, 300, 9)) == text
-    first, second = wrap(text, 14, 300, 2)
+    assert " ".join(wrap_text(text, 14, 300, 9)) == text
+    first, second = wrap_text(text, 14, 300, 2)
     assert max(map(load_font(14).getlength, (first, second))) <= 300
     assert second.endswith("…")
-    assert wrap("", 14, 300, 2) == []
+    assert wrap_text("", 14, 300, 2) == []
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_the_end_shows_the_diagnosis_or_the_message_and_the_items(result, ending
 def test_the_end_stands_on_the_picture_and_leaves_the_page_as_it_was() -> None:
     page = Image.new("RGB", (1280, 720), "#808080")
     message = "a long sentence about what went wrong " * 12
-    shown = draw_result(page, replace(RESULT, status="FAILURE", message=message))
+    shown = add_result(page, replace(RESULT, status="FAILURE", message=message))
     assert page.getcolors() == [(1280 * 720, (128, 128, 128))]
     (top, left), (bottom, right) = (
         each(np.argwhere((np.asarray(shown) != 128).any(axis=2)), axis=0) for each in (np.min, np.max)
