@@ -7,7 +7,7 @@ from itertools import islice
 
 from executive.mission.check import (
     connection_types,
-    inner_nodes,
+    control_nodes,
     parallel_branches,
     reachability,
     reasons,
@@ -23,7 +23,7 @@ Check = Callable[[CheckContext], Iterator[Finding]]
 CHECKS: tuple[Check, ...] = (
     skill_settings.find_unknown_skills,
     skill_settings.check_settings,
-    inner_nodes.check_constants,
+    control_nodes.check_constants,
     reasons.check_labels,
     skill_settings.check_routes,
     skill_settings.find_undetectable_classes,
@@ -37,16 +37,15 @@ CHECKS: tuple[Check, ...] = (
     reachability.check_tool_states,
     reachability.check_tool_at_end,
     reachability.find_unreachable,
-    inner_nodes.check_class_rules,
+    control_nodes.run_node_checks,
     parallel_branches.find_shared_resources,
     parallel_branches.find_shared_variables,
     parallel_branches.find_read_races,
 )
-"""All checks. Each tolerates the errors that other checks report, and reports no consequence of them."""
-
+"""All checks; a check ignores the errors that another check reports, and their consequences."""
 
 MAX_FINDINGS_PER_CHECK = 1000
-"""Maximum number of findings of one check; a mission can be written to cause hundreds of thousands."""
+"""Maximum number of findings of one check; a short mission can cause hundreds of thousands of findings."""
 
 
 def run_checks(context: CheckContext) -> list[Finding]:

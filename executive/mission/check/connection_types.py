@@ -16,7 +16,7 @@ from executive.mission.model.port_types import describe_type, find_element_type,
 from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import Wire, find_control_node_outputs
 from executive.mission.source import Span
-from executive.skill import Direction, Port
+from executive.skill import Direction
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class Writer:
         name: Name in messages: `Localize.targets`, or the keyword of a control node.
         span: Position of the node.
         type: Type of the written values.
-        refers: What the written texts name, as `bin` or `item`; "" if they are no names.
-        values: Written values with their positions, if they are constants in the file; otherwise None.
+        refers: Kind of the written names, for example `bin` or `item`; "" if the output writes no names.
+        values: Written constants with their positions; None if the values are unknown before the run.
     """
 
     name: str
@@ -37,35 +37,36 @@ class Writer:
     refers: str
     values: tuple[tuple[object, Span], ...] | None = None
 
-    def describe_for(self, span: Span) -> str:
+    def describe(self, span: Span) -> str:
         """Return name and position of the writer, for a message at `span`."""
         return f"{self.name} in {self.span.describe_place(span.source)}"
 
 
 WritersByVariable = Mapping[str, Sequence[Writer]]
+"""Outputs that write a variable, by the name of the variable."""
 
 
 def check_port_types(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every input whose variable may have a value that does not fit the input."""
+    """Yield an error for every input that does not accept all possible values of its variable."""
     skill_writers: dict[str, list[Writer]] = {}
     for node in context.tree.walk():
         for wire in context.find_wires(node, Direction.OUT):
             writer = Writer(str(wire), node.span, wire.port.type, wire.port.refers)
             skill_writers.setdefault(wire.variable, []).append(writer)
 
-    def walk(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
+    def check_below(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
         for loop in _find_element_loops(node):
             list_writers = loop.find_list_writers({**skill_writers, **loop_writers})
             yield from loop.check_lists(list_writers)
-            elements = [element for writer in list_writers for element in loop.make_element_writers(writer)]
-            loop_writers = {**loop_writers, loop.variable: elements}
+            writers = [element for writer in list_writers for element in loop.make_element_writers(writer)]
+            loop_writers = {**loop_writers, loop.variable: writers}
         for wire in context.find_wires(node, Direction.IN):
             for writer in loop_writers.get(wire.variable, skill_writers.get(wire.variable, ())):
                 yield from _check_connection(context, wire, writer)
         for child in node.children:
-            yield from walk(child, loop_writers)
+            yield from check_below(child, loop_writers)
 
-    yield from walk(context.tree, {})
+    yield from check_below(context.tree, {})
 
 
 @dataclass(frozen=True)
@@ -76,28 +77,28 @@ class ElementLoop:
         keyword: Keyword of the control node.
         span: Position of the control node.
         variable: Name of the variable.
-        key: Key that gives the list.
-        source: The list, or the variable that contains the list.
+        key: Key of the control node for the list.
+        elements: The list, or the variable that contains the list.
     """
 
     keyword: str
     span: Span
     variable: str
     key: str
-    source: Literal | Reference
+    elements: Literal | Reference
 
     def find_list_writers(self, writers: WritersByVariable) -> Sequence[Writer]:
-        """Return the writers of the list; a list in the file has the control node itself as writer."""
-        if isinstance(self.source, Literal):
-            located_list = self.source.value, self.source.span
-            return [Writer(self.keyword, self.span, list[Any], "", (located_list,))]
-        return writers.get(self.source.name, ())
+        """Return the writers of the list; the control node itself counts as the writer of a constant list."""
+        if isinstance(self.elements, Literal):
+            values = ((self.elements.value, self.elements.span),)
+            return [Writer(self.keyword, self.span, list[Any], "", values)]
+        return writers.get(self.elements.name, ())
 
     def check_lists(self, list_writers: Iterable[Writer]) -> Iterator[Finding]:
-        """Yield an error for each writer that does not write a list to the variable `source`."""
-        if not isinstance(self.source, Reference):
+        """Yield an error for each writer that writes another value than a list to the variable `elements`."""
+        if not isinstance(self.elements, Reference):
             return
-        variable, span, key = self.source.name, self.source.span, f"{self.keyword}.{self.key}"
+        variable, span, key = self.elements.name, self.elements.span, f"{self.keyword}.{self.key}"
         for writer in list_writers:
             for value, value_span in writer.values or ():
                 if not isinstance(value, list):
@@ -106,12 +107,12 @@ class ElementLoop:
                     yield make_error(value_span, "port-type", message, hint)
             if writer.values is None and find_element_type(writer.type) is None:
                 message = f"{key} takes a list, but ${variable} holds {describe_type(writer.type)}"
-                yield make_error(span, "port-type", message, f"It is written by {writer.describe_for(span)}.")
+                yield make_error(span, "port-type", message, f"It is written by {writer.describe(span)}.")
 
     def make_element_writers(self, list_writer: Writer) -> Iterator[Writer]:
-        """Yield the loop as the writer of the elements of a list."""
+        """Yield the control node as the writer of the elements of the list that `list_writer` writes."""
         if list_writer.values is not None:
-            literal = self.source if isinstance(self.source, Literal) else None
+            literal = self.elements if isinstance(self.elements, Literal) else None
             values = [
                 (element, literal.get_element_span(index) if literal else span)
                 for value, span in list_writer.values
@@ -125,18 +126,19 @@ class ElementLoop:
 
 def _find_element_loops(node: Node) -> Iterator[ElementLoop]:
     for key, variable in find_control_node_outputs(node):
-        source = node.values.get(key.list_key) if isinstance(node, InnerNode) else None
-        if isinstance(source, Literal | Reference):
-            yield ElementLoop(get_type_name(node), node.span, variable.name, key.list_key, source)
+        elements = node.values.get(key.list_key) if isinstance(node, InnerNode) else None
+        if isinstance(elements, Literal | Reference):
+            yield ElementLoop(get_type_name(node), node.span, variable.name, key.list_key, elements)
 
 
 def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iterator[Finding]:
     """Yield an error for each value or type of a writer that does not fit the input `wire`."""
-    port, accepted = wire.port, f"{wire} takes {_describe_accepted_type(wire.port)}"
+    port = wire.port
+    port_type = f"the name of {_add_article(port.refers)}" if port.refers else describe_type(port.type)
     for value, span in writer.values or ():
         names = context.cell_names_by_kind.get(port.refers)
         if find_input_problem(value, port):
-            message = f"{accepted}, but ${wire.variable} gets {describe_value(value)} here"
+            message = f"{wire} takes {port_type}, but ${wire.variable} gets {describe_value(value)} here"
             hint = f"{wire} reads ${wire.variable} in {wire.span.describe_place(span.source)}."
             yield make_error(span, "port-type", message, hint)
         elif names is not None and isinstance(value, str) and value not in names:
@@ -145,19 +147,14 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
             yield make_error(span, f"unknown-{port.refers}", message, hint)
     if writer.values is not None:
         return
-    actual = ""
     if not is_assignable(writer.type, port.type):
-        actual = describe_type(writer.type)
+        written_type = describe_type(writer.type)
     elif port.refers and writer.refers != port.refers:
-        actual = f"the name of {_add_article(writer.refers)}" if writer.refers else "any text"
-    if actual:
-        message = f"{accepted}, but ${wire.variable} holds {actual}"
-        hint = f"It is written by {writer.describe_for(wire.span)}."
-        yield make_error(wire.span, "port-type", message, hint)
-
-
-def _describe_accepted_type(port: Port) -> str:
-    return f"the name of {_add_article(port.refers)}" if port.refers else describe_type(port.type)
+        written_type = f"the name of {_add_article(writer.refers)}" if writer.refers else "any text"
+    else:
+        return
+    message = f"{wire} takes {port_type}, but ${wire.variable} holds {written_type}"
+    yield make_error(wire.span, "port-type", message, f"It is written by {writer.describe(wire.span)}.")
 
 
 def _add_article(noun: str) -> str:

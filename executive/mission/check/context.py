@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 from executive.cell.config import CellConfig
 from executive.cell.protocols import MinTimes
@@ -14,13 +15,30 @@ from executive.mission.model.mission import Mission
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
 from executive.mission.model.values import Reference
 from executive.mission.model.wiring import Wire, find_wires, find_written_variables
+from executive.mission.source import Span
 from executive.skill import Direction, Skill
 from executive.tree.node_registry import ControlNodes
 
 
+class VariableRead(NamedTuple):
+    """A node that reads a variable.
+
+    Attributes:
+        node: The node.
+        input_name: Name in messages: `Approach.target`, or the keyword of a control node.
+        variable: Name of the variable.
+        span: Position of the variable; position of the skill if the mission names no variable.
+    """
+
+    node: Node
+    input_name: str
+    variable: str
+    span: Span
+
+
 @dataclass(frozen=True)
 class CheckContext:
-    """A mission to check, with everything that the checks need.
+    """A mission to check, with the installed skills and control nodes, and the cell.
 
     Attributes:
         mission: Content of the mission file, before expansion.
@@ -69,7 +87,7 @@ class CheckContext:
 
     @cached_property
     def cell_names_by_kind(self) -> Mapping[str, list[str]]:
-        """Names of the bins, detectors, poses and classes of the cell; no kinds if the cell is None."""
+        """Names of the bins, detectors, poses and classes of the cell, by kind; empty if `cell` is None."""
         if self.cell is None:
             return {}
         return {
@@ -81,23 +99,23 @@ class CheckContext:
 
     @cached_property
     def library_uses_by_path(self) -> Mapping[str, UseNode]:
-        """For the path of each node of a library, the `use` in the mission file that includes the node."""
+        """The `use` in the mission file that includes a node of a library, by the path of the node."""
         uses: dict[str, UseNode] = {}
 
-        def walk(node: Node, use: UseNode | None) -> None:
+        def add_uses_below(node: Node, use: UseNode | None) -> None:
             if node.span.source is mission_source:
                 use = node if isinstance(node, UseNode) else None
             elif use is not None:
                 uses[node.path] = use
             for child in node.children:
-                walk(child, use)
+                add_uses_below(child, use)
 
         mission_source = self.tree.span.source
-        walk(self.tree, None)
+        add_uses_below(self.tree, None)
         return uses
 
     def make_constant_hint(self, reference: Reference) -> str:
-        """Return the hint for a reference that must be a param or an argument, but is a variable."""
+        """Return the hint for a reference to a variable where only a param or an argument is allowed."""
         params = self.mission.params
         if reference.name in params:
             return (
@@ -113,6 +131,6 @@ class CheckContext:
         return f"For the variable, write ${value}." if is_variable else ""
 
     def find_wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
-        """Yield the connections of the node's ports; none if the node runs no installed skill."""
+        """Yield the connections of the ports of a node; none if the node is no installed skill."""
         if isinstance(node, SkillNode) and node.skill in self.skills:
             yield from find_wires(node, self.skills[node.skill], direction)

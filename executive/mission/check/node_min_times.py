@@ -36,33 +36,34 @@ def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
         try:
             values[name] = convert_value(literal.value, declared[name].type)
         except (KeyError, WrongType):
-            # The check of settings reports this error.
+            # `check_settings` reports an unknown name or a wrong type.
             return 0.0
     state = context.flow_analysis.entry_states.get(node.path)
-    tools = state.tool_states if state else None
-    needs_object = skill.tool_state[0] is HOLDING
-    starts_anywhere = needs_object and (tools is None or any(tool.has_arm_moved for tool in tools))
-    # The time of a transport has a bound only if it starts where an object was grasped.
-    min_times = _TimesFromAnywhere(context.min_times) if starts_anywhere else context.min_times
+    tool_states = state.tool_states if state else None
+    may_have_moved = tool_states is None or any(tool_state.has_arm_moved for tool_state in tool_states)
+    min_times = context.min_times
+    if skill.tool_state[0] is HOLDING and may_have_moved:
+        # The duration of a transport has a lower bound only if the arm starts at the place of the grasp.
+        min_times = _MinTimesFromAnyPose(min_times)
     return skill.min_time(min_times, values)
 
 
-class _TimesFromAnywhere:
-    """Minimum times of a cell if the arm may have any pose at the start of a transport."""
+class _MinTimesFromAnyPose:
+    """Minimum times of a cell if a transport may start at any pose of the arm."""
 
     def __init__(self, min_times: MinTimes) -> None:
         self._min_times = min_times
 
     @property
     def descent_time(self) -> float:
-        """Time of the guarded last part of an approach [s]."""
+        """Minimum time of the descent until contact at the end of an approach [s]."""
         return self._min_times.descent_time
 
     def get_transport_time(self, bin: str | None) -> float:
-        """Return 0, because the object may be above the bin already."""
+        """Return 0 [s], because the transport may start above the bin."""
         del bin
         return 0.0
 
     def get_answer_time(self, detector: str) -> float:
-        """Return the time from a frame to the answer of a detector [s]."""
+        """Return the minimum time from a frame to the answer of a detector [s]."""
         return self._min_times.get_answer_time(detector)

@@ -34,12 +34,13 @@ def _find_unreachable_below(node: Node, flow: FlowAnalysis) -> Iterator[Finding]
 
 
 def _explain_unreachable(instance: ControlNode, child: Node) -> str:
-    children = (each for key in instance.keys for each in instance.list_children(key))
-    return instance.explain_unreachable(next(each for each in children if get_mission_node(each) is child))
+    children = [candidate for key in instance.keys for candidate in instance.list_children(key)]
+    children_by_path = {get_mission_node(candidate).path: candidate for candidate in children}
+    return instance.explain_unreachable(children_by_path[child.path])
 
 
 def check_tool_states(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every skill that may start with the tool in another state than it declares."""
+    """Yield an error for every skill that needs an empty or full tool, but may start with the opposite."""
     flow = context.flow_analysis
     for path, entry_state in flow.entry_states.items():
         node = flow.nodes[path]
@@ -69,7 +70,7 @@ def check_tool_at_end(context: CheckContext) -> Iterator[Finding]:
 
 
 def _explain_tool_state(flow: FlowAnalysis, tool: PossibleToolState, span: Span) -> str:
-    """Return a sentence with the node that may have caused the state of the tool, for a message at `span`."""
+    """Return a sentence about the node that may have caused a state of the tool, for a message at `span`."""
     cause = flow.nodes.get(tool.cause)
     after = f", when {tool.handled_failure} is handled" if tool.handled_failure else ""
     if cause is None:

@@ -1,4 +1,4 @@
-"""Checks of labels, and of the failures that `on` and `until` name: each must be possible and unambiguous."""
+"""Checks of labels, and of the failure names below keys such as `on` and `until`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def check_labels(context: CheckContext) -> Iterator[Finding]:
 
 
 def check_failure_names(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every name of a failure that is unknown, impossible there, or ambiguous."""
+    """Yield an error for every failure name that is unknown, ambiguous, or impossible in the body."""
     analysis = context.flow_analysis
     for node in analysis.nodes.values():
         for name, keyword, body in _find_names_with_bodies(node):
@@ -61,7 +61,7 @@ def check_failure_names(context: CheckContext) -> Iterator[Finding]:
 
 
 def _find_names_with_bodies(node: Node) -> Iterator[tuple[FailureName, str, Node]]:
-    """Yield every failure that a node names, the keyword of the node, and the child that must fail so."""
+    """Yield every failure name of a node, the keyword of the node, and the child that may fail."""
     if not isinstance(node, InnerNode):
         return
     for key, name in _find_failure_names(node):
@@ -80,7 +80,7 @@ def _find_failure_names(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, F
 
 
 def _make_impossible_error(context: CheckContext, name: FailureName, keyword: str, body: Node) -> Finding:
-    """Return the error for a name that denotes no failure of `body`, a child of a node `keyword`."""
+    """Return the error if no failure of `body` has the name; `keyword` is the keyword of the parent."""
     reasons = _find_reasons(context.flow_analysis, body)
     if name.source in reasons:
         failures = context.flow_analysis.flows[body.path].failures
@@ -109,7 +109,7 @@ def _find_unknown_reason(context: CheckContext, name: FailureName, body: Node) -
 
 
 def _find_reasons(flow: FlowAnalysis, body: Node) -> dict[str, list[str]]:
-    """Return all reasons in `body`, handled or not, by the skill, keyword or label that fails."""
+    """Return all reasons in `body`, also of handled failures, by the failing skill, keyword or label."""
     reasons: dict[str, list[str]] = {}
     for node in body.walk():
         if isinstance(node, SkillNode):
@@ -120,11 +120,11 @@ def _find_reasons(flow: FlowAnalysis, body: Node) -> dict[str, list[str]]:
         if node.label and node.path in flow.flows:
             failures = flow.flows[node.path].failures
             reasons.setdefault(node.label, []).extend(failure.reason for failure in failures)
-    return {source: list(dict.fromkeys(found)) for source, found in reasons.items()}
+    return {source: list(dict.fromkeys(duplicates)) for source, duplicates in reasons.items()}
 
 
 def _find_denoted_nodes(flow: FlowAnalysis, name: FailureName, matching: list[PossibleFailure]) -> list[Node]:
-    """Return the nodes whose failures `name` denotes; none if its source is a label, which is unambiguous."""
+    """Return the nodes whose failures `name` denotes; none for a label, because labels are unambiguous."""
     if any(name.source in failure.labels for failure in matching):
         return []
     # Nodes with the same position are one node of a subtree that is used more than once.

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
 from executive.mission.descriptions import describe_value
-from executive.mission.findings import Finding, find_similar_word, make_error, suggest_choice
+from executive.mission.findings import Finding, make_error, suggest_choice, suggest_word
 from executive.mission.model.conversion import WrongType, convert_value, find_input_problem
 from executive.mission.model.nodes import SkillNode
 from executive.mission.model.values import Literal
@@ -36,10 +36,10 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
                 yield from _check_value(context, node, declarations[name], setting.value)
                 yield from _find_unknown_names(context, node, declarations[name], setting.value)
             elif name in skill.params:
-                rule, variable = f"{node.skill}.{name} must be a constant", f"${setting.value.name}"
-                message = f"{rule}, but {variable} is neither a param nor an argument"
-                hint = context.make_constant_hint(setting.value)
-                yield make_error(setting.value.span, "unknown-param", message, hint)
+                reference = setting.value
+                problem = f"must be a constant, but ${reference.name} is neither a param nor an argument"
+                hint = context.make_constant_hint(reference)
+                yield make_error(reference.span, "unknown-param", f"{node.skill}.{name} {problem}", hint)
         for param in skill.params.values():
             if param.is_required and param.name not in node.settings:
                 message = f'{node.skill} needs the param "{param.name}"'
@@ -51,7 +51,7 @@ def _check_value(
     context: CheckContext, node: SkillNode, declared: Param | Port, value: Literal
 ) -> Iterator[Finding]:
     """Yield an error if a constant does not fit the param or port to which the mission assigns it."""
-    name, code, hint, problem = f"{node.skill}.{declared.name}", "wrong-type", "", ""
+    name, code, hint = f"{node.skill}.{declared.name}", "wrong-type", ""
     if isinstance(declared, Param):
         code, problem = find_param_problem(declared, value.value)
     elif declared.direction is Direction.IN:
@@ -85,7 +85,7 @@ def _find_unknown_names(
 
 
 def find_param_problem(param: Param, value: object) -> tuple[str, str]:
-    """Return the error code, and the message without the name of the param; ("", "") if valid."""
+    """Return the code of an error and the message, which continues "<param> "; ("", "") if valid."""
     try:
         converted = convert_value(value, param.type)
     except WrongType as problem:
@@ -101,9 +101,8 @@ def find_param_problem(param: Param, value: object) -> tuple[str, str]:
         allowed = " or ".join(
             f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in param.choices
         )
-        similar = find_similar_word(value, map(str, param.choices)) if isinstance(value, str) else None
-        question = f' (did you mean "{similar}"?)' if similar else ""
-        return "wrong-value", f"must be {allowed}, not {describe_value(value)}{question}"
+        suggestion = suggest_word(value, map(str, param.choices))
+        return "wrong-value", f"must be {allowed}, not {describe_value(value)}{suggestion}"
     return "", ""
 
 
@@ -124,15 +123,17 @@ def check_routes(context: CheckContext) -> Iterator[Finding]:
 
 def find_undetectable_classes(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every class in the mission that no detector of the cell can detect."""
-    known = {name: classes for name, classes in context.classes_by_detector.items() if classes is not None}
-    if len(known) < len(context.classes_by_detector) or not known or context.cell is None:
+    detectors = {
+        name: classes for name, classes in context.classes_by_detector.items() if classes is not None
+    }
+    if len(detectors) < len(context.classes_by_detector) or not detectors or context.cell is None:
         # A detector with unknown classes may detect every class.
         return
     for label, span in _find_named_classes(context):
-        if label in context.cell.objects and not any(label in classes for classes in known.values()):
-            listed = "; ".join(f"{name}: {', '.join(classes)}" for name, classes in known.items())
+        if label in context.cell.objects and not any(label in classes for classes in detectors.values()):
+            descriptions = "; ".join(f"{name}: {', '.join(classes)}" for name, classes in detectors.items())
             message = f'no detector of the cell can detect the class "{label}"'
-            hint = f"Classes by detector: {listed}. Train another detector with `executive train`."
+            hint = f"Classes by detector: {descriptions}. Train another detector with `executive train`."
             yield make_error(span, "unseen-class", message, hint)
 
 

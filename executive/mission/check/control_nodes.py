@@ -1,4 +1,4 @@
-"""Checks of control nodes: constants against the declared keys, and the checks of the node classes."""
+"""Checks of control nodes: types of constants, and the method `check` of each node class."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from executive.tree.keys import Child, Key, KeyKind
 
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every constant of a control node with a wrong type or value, or with a variable."""
+    """Yield an error for every constant of a control node that is invalid or a reference to a variable."""
     for node in context.iterate_control_nodes():
         yield from _check_keys(context, node, node.declaring_class.keyword)
 
@@ -43,8 +43,8 @@ def _check_keys(context: CheckContext, owner: InnerNode | SectionNode, name: str
         ):
             description = f"{describe_value(value.value)}{value.origin_note}"
             message = f"{name}.{key.name} must be a list or a variable, not {description}"
-            is_written_text = isinstance(value.value, str) and not value.origin
-            hint = f"Write a list: [{value.value}]." if is_written_text else ""
+            is_text_at_key = isinstance(value.value, str) and not value.origin
+            hint = f"Write a list: [{value.value}]." if is_text_at_key else ""
             yield make_error(value.span, "wrong-type", message, hint)
 
 
@@ -58,18 +58,19 @@ def _check_constant(
         try:
             convert_constant(key, value.value, max_value)
         except WrongType as problem:
-            is_param = problem.code == "wrong-type" and value.value in [*context.mission.params]
-            hint = f"For the param, write ${value.value}." if is_param else ""
+            is_param_name = isinstance(value.value, str) and value.value in context.mission.params
+            is_missing_dollar = is_param_name and problem.code == "wrong-type"
+            hint = f"For the param, write ${value.value}." if is_missing_dollar else ""
             yield make_error(value.span, problem.code, f"{name} {problem}{value.origin_note}", hint)
 
 
-def check_class_rules(context: CheckContext) -> Iterator[Finding]:
+def run_node_checks(context: CheckContext) -> Iterator[Finding]:
     """Yield the findings of the method `check` of every control node."""
     halted_paths = {node.path for node in _find_halted_nodes(context)}
     for node in context.iterate_control_nodes():
         facts = CheckerFacts(context, node, node.path in halted_paths)
-        for finding in make_inspection_instance(node).check(facts):
-            yield _locate_finding(node, finding)
+        for node_finding in make_inspection_instance(node).check(facts):
+            yield _locate_finding(node, node_finding)
 
 
 def _find_halted_nodes(context: CheckContext) -> Iterator[Node]:
@@ -79,19 +80,19 @@ def _find_halted_nodes(context: CheckContext) -> Iterator[Node]:
             yield from get_mission_node(child).walk()
 
 
-def _locate_finding(node: InnerNode, finding: NodeFinding) -> Finding:
-    """Return the finding of a control node at the position of the key or failure name that it denotes."""
-    span, note = node.span, ""
-    if isinstance(finding.place, FailureName):
-        span = finding.place.span
-    elif isinstance(value := node.values.get(str(finding.place)), Literal):
-        span, note = value.span, value.origin_note
-    make_finding = make_warning if finding.is_warning else make_error
-    return make_finding(span, finding.code, finding.message + note, finding.hint)
+def _locate_finding(node: InnerNode, node_finding: NodeFinding) -> Finding:
+    """Return the finding of a control node with the position of its key or failure name in the file."""
+    span, message = node.span, node_finding.message
+    if isinstance(node_finding.place, FailureName):
+        span = node_finding.place.span
+    elif isinstance(value := node.values.get(str(node_finding.place)), Literal):
+        span, message = value.span, message + value.origin_note
+    make_finding = make_warning if node_finding.is_warning else make_error
+    return make_finding(span, node_finding.code, message, node_finding.hint)
 
 
 class CheckerFacts:
-    """Knowledge of the checker about a control node; implements `NodeFacts`."""
+    """Implementation of `NodeFacts` for one control node."""
 
     def __init__(self, context: CheckContext, node: InnerNode, is_halted_by_sibling: bool) -> None:
         self._context, self._node = context, node
@@ -110,7 +111,7 @@ class CheckerFacts:
         return cast("FailureName", reason).span.describe_place(cast("FailureName", reported).span.source)
 
     def is_literal(self, key: str) -> bool:
-        """Return True if the value of a key is given at the node, not through a param or an argument."""
+        """Return True if the node has a constant at a key, not a param or an argument."""
         value = self._node.values.get(key)
         return isinstance(value, Literal) and not value.origin
 
