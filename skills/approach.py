@@ -61,11 +61,11 @@ class Approach(Skill):
             detected = f"{item} was detected at {self.target.stamp:.2f} s"
             raise self.failure("stale", f"{detected}, and the robot may have moved it since; look again")
 
-        def find_goal() -> tuple[Goal, Task]:
+        def find_goal_and_task() -> tuple[Goal, Task]:
             return make_approach(cell, self.target, self.overtravel, self.offset)
 
-        motion = yield from plan(self, cell.arm, find_goal)
-        goal, _ = find_goal()
+        motion = yield from plan(self, cell.arm, find_goal_and_task)
+        goal, _ = find_goal_and_task()
         yield from follow(self, cell, motion, until=_build_contact_check(tool))
         kind, middle = cell.classes[self.target.label], float(self.target.position[2])
         height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded_length

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
-from executive.manipulation.obstacles import count_used_slots
+from executive.manipulation.obstacles import predict_object_count
 from executive.manipulation.tool_goals import sort_pickable_targets
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
@@ -45,7 +45,7 @@ class SelectTarget(Skill):
             best = min(candidates, key=lambda t: (-t.confidence, t.item))
         self.target, self.item = best, best.item
         bins = cell.routes[cell.ledger.get_label(best.item)]
-        self.bin = min(bins, key=lambda bin: count_used_slots(cell, bin))
+        self.bin = min(bins, key=lambda bin: predict_object_count(cell, bin))
         cell.report_selection(best, self.bin)
 
     def _is_requested(self, cell: Cell, item: Item) -> bool:

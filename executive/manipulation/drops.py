@@ -1,4 +1,4 @@
-"""Detection of items that drop from the tool during a motion, and prediction of their landing positions."""
+"""Detection of items that drop from the tool during a motion, and prediction of the landing positions."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ MAX_PREDICTABLE_SPEED = 0.2
 
 
 def detect_and_record_drop(cell: Cell, item: Item) -> bool:
-    """Return True if the tool has dropped the item; the first call after the drop records it in the ledger.
+    """Return True if the tool has dropped the item; the first call after the drop updates the ledger.
 
-    A transport calls the function in every control step, so that the ledger knows the drop before an image
-    shows the item elsewhere.
+    A transport calls this function in every control step, so that the ledger knows the drop before a camera
+    shows the item at another place.
     """
     if cell.tool.holding:
         return False
@@ -40,7 +40,7 @@ def predict_landing(position: Array, velocity: Array, height: float) -> Array:
         height: Height of the object [m].
     """
     vertical_speed, fall_height = float(velocity[2]), max(float(position[2]) - height, 0.0)
-    # Positive solution of fall_height + vertical_speed * t - GRAVITY / 2 * t**2 = 0.
+    # Ballistic fall: positive solution t of fall_height + vertical_speed * t - GRAVITY / 2 * t**2 = 0.
     fall_time = (vertical_speed + math.sqrt(vertical_speed**2 + 2 * GRAVITY * fall_height)) / GRAVITY
     x, y = (position + velocity * fall_time)[:2]
     return np.array((x, y, height / 2))

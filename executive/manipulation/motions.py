@@ -12,8 +12,8 @@ from executive.manipulation.drops import detect_and_record_drop
 from executive.manipulation.obstacles import list_obstacles
 from executive.skill import Skill, SkillFailed
 
-MAX_PLANS = 3
-"""Maximum number of planning attempts for one motion, if goal or task change during each attempt."""
+MAX_PLANNING_ATTEMPTS = 3
+"""Maximum number of planning attempts for one motion; the ledger may change goal or task in each."""
 
 
 def wait_for_rest(arm: Arm) -> Steps:
@@ -23,27 +23,27 @@ def wait_for_rest(arm: Arm) -> Steps:
 
 
 def plan(
-    skill: Skill, arm: Arm, find_goal: Callable[[], tuple[Goal | str, Task]]
+    skill: Skill, arm: Arm, find_goal_and_task: Callable[[], tuple[Goal | str, Task]]
 ) -> Generator[None, None, Motion]:
-    """Yield until the arm is at rest and a motion is planned, and return the motion.
+    """Yield until the arm is at rest and has planned a motion, and return the motion.
 
-    If an update of the ledger changes goal or task during the planning, the motion is planned again.
+    If an update of the ledger changes goal or task during the planning, the arm plans again.
 
     Args:
         skill: The skill that moves the arm.
         arm: The arm.
-        find_goal: Function that returns the present goal, or the name of a pose, and the present task.
+        find_goal_and_task: Function that returns the current goal (or the name of a pose) and task.
 
     Raises:
         SkillFailed: No motion was found; the reason is `unreachable` or `blocked`.
     """
     yield from wait_for_rest(arm)
-    for _ in range(MAX_PLANS):
-        goal, task = find_goal()
+    for _ in range(MAX_PLANNING_ATTEMPTS):
+        goal, task = find_goal_and_task()
         planning = arm.plan(goal, task)
         while not planning.ready:
             yield
-        if find_goal() == (goal, task):
+        if find_goal_and_task() == (goal, task):
             break
     try:
         return planning.result()
@@ -56,7 +56,8 @@ def plan(
 def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
     """Yield while the arm executes `motion`, until the arm is at rest again.
 
-    The arm brakes along the path when `until` returns True, after a collision, and if the skill is halted.
+    The arm brakes along the path as soon as `until` returns True, after a collision, and if the skill is
+    halted.
 
     Raises:
         SkillFailed: The arm collided with an obstacle; the reason is `blocked`.
@@ -74,15 +75,15 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
         raise skill.failure("blocked", arm.collision)
 
 
-def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str) -> Steps:
-    """Yield until the arm has moved `item` to `goal`; the vacuum sensor is read in every control step.
+def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) -> Steps:
+    """Yield until the arm has moved `item` to `goal`; read the vacuum sensor in every control step.
 
     Args:
         skill: The skill that moves the item.
         cell: The work cell.
         item: Item in the tool.
         goal: Goal of the motion.
-        destination: Name of the goal in error messages.
+        goal_name: Name of the goal in error messages.
 
     Raises:
         SkillFailed: No motion was found, or the arm collided; the reason is `unreachable` or `blocked`.
@@ -92,14 +93,14 @@ def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, destination: str
         motion = yield from plan(skill, cell.arm, lambda: (goal, make_transport_task(cell, item)))
         yield from follow(skill, cell, motion, until=lambda: detect_and_record_drop(cell, item))
     except SkillFailed:
-        # `dropped` has priority over other reasons, because their handlers expect the item in the tool.
+        # `dropped` has priority: handlers of the other reasons expect the item in the tool.
         if not detect_and_record_drop(cell, item):
             raise
     if detect_and_record_drop(cell, item):
         x, y, z = cell.arm.tool_pose.position
         cell.tool.open()
-        place = f"on the way to {destination}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
-        raise skill.failure("dropped", f"the seal on {item} broke {place}")
+        message = f"the seal on {item} broke on the way to {goal_name}, near ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        raise skill.failure("dropped", message)
 
 
 def release_item(
@@ -107,8 +108,8 @@ def release_item(
 ) -> Steps:
     """Switch the vacuum off, and yield for `settle_time` [s] until the item lies still.
 
-    `record_release` records the new position of the item in the ledger. If the skill is halted during the
-    wait and the tool is empty, the release is still recorded.
+    `record_release` records the new position of the item in the ledger; the function also calls it if the
+    skill is halted during the wait and the tool is empty.
 
     Raises:
         SkillFailed: The item still hangs on the tool; the reason is `stuck`.
@@ -124,12 +125,12 @@ def release_item(
 
 
 def make_task(cell: Cell) -> Task:
-    """Return the task of a motion: its obstacles, and the item in the tool as its load."""
+    """Return the task of a motion: all obstacles, and the item in the tool as the load."""
     held_item = cell.ledger.find_held_item()
     return Task(obstacles=list_obstacles(cell)) if held_item is None else make_transport_task(cell, held_item)
 
 
 def make_transport_task(cell: Cell, item: Item) -> Task:
-    """Return the task of a motion with `item` in the tool: its load and its obstacles."""
+    """Return the task of a motion with `item` as the load, and with all other objects as obstacles."""
     object_class = cell.classes[cell.ledger.get_label(item)]
     return Task(Load(object_class, cell.tool.holding_force), list_obstacles(cell, item))

@@ -1,10 +1,9 @@
-"""Goals of motions of the tool: to an object, over a slot of a bin, over a free position on the table."""
+"""Goals of the tool: the surface of an object, a slot of a bin, a free position on the table."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from itertools import product
 
 import numpy as np
@@ -16,27 +15,26 @@ from executive.cell.protocols import Cell
 from executive.geometry import Array
 from executive.manipulation.obstacles import (
     compute_layer_height,
-    count_used_slots,
     find_max_object_height,
     list_obstacles,
     make_obstacle,
+    predict_object_count,
 )
 
 DROP_HEIGHT = 0.01
-"""Default height of the underside of an item above the floor of a bin, or above the layer below, at the
-release [m]."""
+"""Default height of an item above the surface under the item when the tool releases the item [m]."""
 OVERTRAVEL = 0.015
-"""Default maximum depth of the contact below the expected surface of an object [m]."""
+"""Default distance that a guarded motion continues below the expected surface of an object [m]."""
 PROBE_CLEARANCE = 0.005
-"""Height above the table at which an approach ends after `ATTEMPTS_BEFORE_PROBE` failed attempts [m]."""
+"""Height above the table at which a probe (an approach almost down to the table) ends [m]."""
 ATTEMPTS_BEFORE_PROBE = 3
-"""Number of failed attempts after which an approach descends almost to the table."""
+"""Number of failed attempts after which each approach is a probe."""
 SPIRAL_SPACING = 0.0025
-"""Default spacing of the contact points of successive attempts on a Vogel spiral [m]."""
+"""Default scale of the Vogel spiral on which the contact points of the attempts lie [m]."""
 MIN_GAP = 0.02
 """Minimum gap between an object that is put down and other objects [m]."""
 POSITIONS_PER_SIDE = 2
-"""Number of candidate positions for a put-down on each side of the safe place, along x and along y."""
+"""Number of candidate positions for a put-down to the left, right, front and back of the safe place."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
 
@@ -44,17 +42,17 @@ GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 def make_approach(
     cell: Cell, target: Target, overtravel: float = OVERTRAVEL, spacing: float = SPIRAL_SPACING
 ) -> tuple[Goal, Task]:
-    """Return goal and task of an approach, whose last part is guarded: the arm stops on contact.
+    """Return goal and task of an approach to a target; the arm stops on contact in the last, guarded part.
 
     Each attempt has another horizontal offset. After `ATTEMPTS_BEFORE_PROBE` failed attempts, the motion ends
-    almost at the table, because the item may be a false detection.
+    `PROBE_CLEARANCE` above the table, because the item may be a false detection.
 
     Args:
         cell: The work cell.
         target: Target to touch.
-        overtravel: Maximum depth of the contact below the expected surface [m]; limited to half of the
-            object's height.
-        spacing: Spacing of the contact points of successive attempts on a spiral [m].
+        overtravel: Distance that the motion continues below the expected surface [m]; at most half the
+            height of the object.
+        spacing: Scale of the spiral of contact points [m].
     """
     object_class, failed_attempts = cell.classes[target.label], cell.ledger.count_attempts(target.item)
     goal = make_object_goal(
@@ -79,11 +77,11 @@ def make_object_goal(
     Args:
         object_class: Class of the object.
         position: Centre of the object `(3,)` [m].
-        descent: Length of the guarded part above the expected surface [m].
+        descent: Height above the expected surface at which the guarded part begins [m].
         descent_speed: Tool speed in the guarded part [m/s].
-        failed_attempts: Number of earlier attempts, which failed.
-        overtravel: Maximum depth of the contact below the expected surface [m].
-        spacing: Spacing of the contact points of successive attempts on a spiral [m].
+        failed_attempts: Number of failed attempts before this approach.
+        overtravel: Distance that the motion continues below the expected surface [m].
+        spacing: Scale of the spiral of contact points [m].
     """
     x, y, z = map(float, position)
     dx, dy = _compute_attempt_offset(failed_attempts, object_class.ring, spacing)
@@ -95,12 +93,12 @@ def make_object_goal(
 
 
 def compute_min_contact_height(object_class: ObjectClass, centre_height: float, overtravel: float) -> float:
-    """Return the minimum height of a contact with the top of an object [m]; lower contacts missed the object.
+    """Return the minimum height of a contact with an object [m]; at a lower contact, the tool missed it.
 
     Args:
         object_class: Class of the object.
         centre_height: Height of the centre of the object [m].
-        overtravel: Maximum depth of the contact below the expected surface [m].
+        overtravel: Distance that the motion continues below the expected surface [m].
     """
     return max(centre_height + object_class.height / 2 - overtravel, centre_height)
 
@@ -108,12 +106,12 @@ def compute_min_contact_height(object_class: ObjectClass, centre_height: float, 
 def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     """Return the targets that can be picked, sorted by their distance from the destination of the arm.
 
-    A target can be picked if its item is unsorted and certain, if its class has a route, and if the robot
-    cannot have moved the object since the last detection.
+    A target can be picked if its item is unsorted and certain, if its class has a route, and if its position
+    is not invalidated.
     """
     ledger, destination = cell.ledger, cell.arm.destination[:2]
 
-    def rank(target: Target) -> tuple[float, Item]:
+    def compute_sort_key(target: Target) -> tuple[float, Item]:
         return float(np.linalg.norm(target.position[:2] - destination)), target.item
 
     pickable = [
@@ -124,12 +122,12 @@ def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]
         and ledger.is_certain(target.item)
         and ledger.get_label(target.item) in cell.routes
     ]
-    return sorted(pickable, key=rank)
+    return sorted(pickable, key=compute_sort_key)
 
 
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:
-    """Return the goal of a transit: `item` is `drop_height` [m] above the next slot of a bin."""
-    bin, object_count = cell.bins[bin_name], count_used_slots(cell, bin_name, item)
+    """Return the goal of a transit: `item` in the tool, at `drop_height` [m] above the next slot of a bin."""
+    bin, object_count = cell.bins[bin_name], predict_object_count(cell, bin_name, item)
     height = cell.classes[cell.ledger.get_label(item)].height
     return make_slot_goal(bin, object_count, height, find_max_object_height(cell), drop_height)
 
@@ -143,8 +141,8 @@ def make_slot_goal(
         bin: The bin.
         object_count: Number of objects in the bin; a new layer begins if all slots are used.
         height: Height of the object in the tool [m].
-        max_object_height: Height of the tallest class of objects, which determines the height of a layer [m].
-        drop_height: Height of the underside of the object above the lower layer or the floor [m].
+        max_object_height: Height of the tallest class of objects, and thickness of each layer [m].
+        drop_height: Height of the object above the layer below or above the floor [m].
     """
     layer, slot_index = divmod(object_count, len(bin.slots))
     x, y = map(float, bin.slots[slot_index])
@@ -154,35 +152,35 @@ def make_slot_goal(
 def make_put_down_goal(
     cell: Cell, object_class: ObjectClass, drop_height: float, item: Item | None = None
 ) -> Goal:
-    """Return the goal of a put-down: `drop_height` [m] above the free position nearest to the safe place.
+    """Return the goal of a put-down: an object at `drop_height` [m] above a free position on the table.
 
-    A position is free if no bin and no other object than `item` is near. If no candidate position is free,
-    the goal is over the safe place.
+    The position is the free candidate nearest to the safe place; if no candidate is free, the safe place.
+    `item` is the object in the tool, which is no obstacle.
     """
-    radius, pitch = object_class.radius + MIN_GAP, 2 * object_class.radius + MIN_GAP
     x, y, table_height = map(float, cell.safe_place)
-    offsets = [step * pitch for step in range(-POSITIONS_PER_SIDE, POSITIONS_PER_SIDE + 1)]
+    grid_spacing = 2 * object_class.radius + MIN_GAP
+    offsets = [step * grid_spacing for step in range(-POSITIONS_PER_SIDE, POSITIONS_PER_SIDE + 1)]
     sorted_offsets = sorted(product(offsets, offsets), key=lambda offset: math.hypot(*offset))
     candidates = ((x + dx, y + dy) for dx, dy in sorted_offsets)
-    goal_x, goal_y = next(filter(partial(_is_free, cell, radius, item), candidates), (x, y))
+    free_positions = (xy for xy in candidates if _is_free(cell, xy, object_class.radius + MIN_GAP, item))
+    goal_x, goal_y = next(free_positions, (x, y))
     return Goal((goal_x, goal_y, table_height + object_class.height + drop_height))
 
 
-def _is_free(cell: Cell, radius: float, excluded: Item | None, position: tuple[float, float]) -> bool:
-    """Return True if no bin, and no object except `excluded`, is within `radius` [m] of `position` [m]."""
-    if any(bin.contains(np.array(position), radius + BIN_THICKNESS) for bin in cell.bins.values()):
-        return False
-    return all(
-        math.dist(position, (obstacle.x, obstacle.y)) > radius + obstacle.radius
-        for obstacle in list_obstacles(cell, excluded)
+def _is_free(cell: Cell, position: tuple[float, float], min_distance: float, item: Item | None) -> bool:
+    """Return True if all bins, and all objects except `item`, are `min_distance` [m] from `position` [m]."""
+    bins = cell.bins.values()
+    return not any(bin.contains(np.array(position), min_distance + BIN_THICKNESS) for bin in bins) and all(
+        math.dist(position, (obstacle.x, obstacle.y)) > min_distance + obstacle.radius
+        for obstacle in list_obstacles(cell, item)
     )
 
 
 def _compute_attempt_offset(failed_attempts: int, ring_radius: float, spacing: float) -> tuple[float, float]:
     """Return the offset `(x, y)` [m] of the contact point from the centre of the object.
 
-    The contact points of a solid object lie on a Vogel spiral. A part with a hole has a `ring_radius` [m]
-    above 0, and its contact points lie on the circle with this radius.
+    The contact point n of a solid object lies on a Vogel spiral, at the distance spacing * sqrt(n) and the
+    angle n * GOLDEN_ANGLE; that of a part with a hole lies on the circle with the radius `ring_radius` [m].
     """
     angle = failed_attempts * GOLDEN_ANGLE
     distance = ring_radius or spacing * math.sqrt(failed_attempts)

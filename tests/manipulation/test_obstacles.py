@@ -10,7 +10,7 @@ from executive.cell.bins import BIN_THICKNESS
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.manipulation.motions import make_task, make_transport_task
-from executive.manipulation.obstacles import count_used_slots, list_obstacles
+from executive.manipulation.obstacles import list_obstacles, predict_object_count
 from executive.manipulation.tool_goals import make_approach, make_bin_goal
 from executive.testing.run_skill import run_skill
 from skills.release import Release
@@ -77,14 +77,14 @@ def test_what_hangs_over_a_bin_counts_as_let_go_there_but_for_its_own_way(
     fake: FakeCell, targets: list[Target]
 ) -> None:
     pick(fake, targets[0])
-    assert count_used_slots(fake.cell, "red_bin") == 0, "it hangs over the table"
+    assert predict_object_count(fake.cell, "red_bin") == 0, "it hangs over the table"
     run_skill(Transit(held="cube-1", bin="red_bin"), fake)
     first, second = fake.cell.bins["red_bin"].slots[:2]
-    assert (count_used_slots(fake.cell, "red_bin"), count_used_slots(fake.cell, "blue_bin")) == (1, 0)
-    assert count_used_slots(fake.cell, "red_bin", "cube-1") == 0
+    assert (predict_object_count(fake.cell, "red_bin"), predict_object_count(fake.cell, "blue_bin")) == (1, 0)
+    assert predict_object_count(fake.cell, "red_bin", "cube-1") == 0
     assert np.allclose(make_bin_goal(fake.cell, "red_bin", "cube-1").position[:2], first)
     assert np.allclose(make_bin_goal(fake.cell, "red_bin", "duck-1").position[:2], second)
     before = list_obstacles(fake.cell)
     run_skill(Release(held="cube-1", bin="red_bin"), fake)
     assert list_obstacles(fake.cell) == before
-    assert count_used_slots(fake.cell, "red_bin") == 1
+    assert predict_object_count(fake.cell, "red_bin") == 1
