@@ -1,4 +1,4 @@
-"""Events of the cell: planned motions, tool commands, values read from the cell, and injected faults."""
+"""Events of the cell: planned motions, tool commands, readings of inputs, and injected faults."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class MotionPlanned(Event):
     """The arm planned a motion.
 
     Attributes:
-        planned_ahead: True if the motion was planned before a skill requested it.
+        planned_ahead: True if the motion was planned before a skill requested the motion.
         delay: Time from this event until the motion may start [s].
         duration: Duration of the motion [s]; 0 if there is no motion.
     """
@@ -27,7 +27,7 @@ class MotionPlanned(Event):
 
 @dataclass(frozen=True)
 class ToolCommanded(Event):
-    """The tool is about to be opened or closed.
+    """The tool is about to open or close.
 
     Attributes:
         action: `open` or `close`.
@@ -38,11 +38,11 @@ class ToolCommanded(Event):
 
 @dataclass(frozen=True)
 class InputRead(Event):
-    """An input of the cell was read, and its value differs from the previous reading.
+    """The run read an input of the cell whose value differs from the value of the previous reading.
 
     Attributes:
         name: Name of the input, for instance `tool.holding`.
-        read_number: How many times the input has been read in this control step, including this time.
+        read_number: Number of the reading of the input within the control step, counted from 1.
         value: The value, or the message of the exception.
         exception: Name of the exception that the cell raised; "" for a value.
     """
@@ -59,8 +59,8 @@ class FaultInjected(Event):
 
     Attributes:
         name: Name of the injected fault.
-        node: Path of the node during which the fault was injected, or "".
-        item: Item on which this node works, or "".
+        node: Path of the node that was running, or "".
+        item: Item on which the running node works, or "".
         object: Class of the affected object, or "".
         position: Position of the affected object `(3,)` [m]; empty if no object is affected.
     """

@@ -1,4 +1,4 @@
-"""Base class of the events, and an event with its time."""
+"""Base class of events, and the functions that emit and observe events."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Event:
 
     is_recorded: ClassVar[bool] = True
 
-    # Pydantic reads the events of a journal without type conversions.
+    # Pydantic refuses a journal with a value of another type, instead of converting the value.
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True)
 
 
@@ -39,11 +39,11 @@ class TimedEvent:
 
 
 Emit = Callable[[Event], None]
-"""Function that adds the time to an event and passes the timed event to all observers."""
+"""Function that emits an event: adds the time, and passes the timed event to all observers."""
 
 Observer = Callable[[TimedEvent], None]
-"""Function that receives an event in the thread of the tick loop, and returns at once."""
+"""Function that receives a timed event in the thread of the tick loop, and returns without waiting."""
 
 
 def discard_event(event: Event) -> None:
-    """Ignore an event: the `emit` function of a part that has no observers."""
+    """Ignore an event; serves as the `Emit` function of a part without observers."""

@@ -1,4 +1,4 @@
-"""Events of the ledger: looks (searches of a frame), items and targets."""
+"""Events of the ledger: searched frames, changed items and selected targets."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class DetectedObject:
         confidence: Confidence of the detector, 0 to 1.
         box: Left, top, right and bottom side [pixel].
         position: Position of the object in the world `(3,)` [m].
-        contradiction: Sentence with evidence against the class from size or height, or "".
+        contradiction: Sentence that states how size or height contradict the class, or "".
     """
 
     label: str
@@ -40,9 +40,9 @@ class FrameSearched(Event):
         frame: Number of the frame.
         camera: Name of the camera.
         detector: Name of the detector.
-        view: Name of the searched region of the frame: `table` or `full`.
-        confident: Confident detections.
-        doubtful: Doubtful or contradicted detections.
+        view: Searched part of the frame: `table` for the workspace, `full` for the whole image.
+        confident: Detections with high confidence and without a contradiction.
+        doubtful: Detections with low confidence or a contradiction.
         unknown_labels: Labels of the detections whose class the cell file does not declare.
     """
 
@@ -62,12 +62,13 @@ class ItemChanged(Event):
     Attributes:
         item: Name of the item.
         label: Class of the item.
-        state: `seen`, `held`, `dropped`, `placed`, `rejected`, `skipped`, `lost` or `phantom`.
+        state: `seen`, `held`, `dropped`, `placed` (in a bin), `rejected` or `skipped` (stays on the table),
+            `lost` (exists, but not found) or `phantom` (does not exist).
         position: Position of the item `(3,)` [m].
-        looks: Number of looks in which the item was detected.
+        looks: Number of frames in which the item was detected.
         attempts: Number of failed attempts to pick the item.
-        bin: Name of the bin that contains a placed item, or "".
-        reason: Reason of the state, or "".
+        bin: Name of the bin into which the item was placed, or "".
+        reason: Sentence that explains the state, or "".
     """
 
     item: str

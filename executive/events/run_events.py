@@ -1,4 +1,4 @@
-"""Events of a run: start, requests of the operator, halt, resumption, faults and end."""
+"""Events of a run: start, requests of the operator, halt, resume, fault and end."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ JOURNAL_FORMAT = 3
 """Version of the journal format; journals of format 1 contain no version."""
 
 RunStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|INCOMPLETE|FAILURE|FAULT|HALTED)$")]
+"""Final status of a run; INCOMPLETE if the tree succeeded but items were rejected."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class RunStarted(Event):
 
 @dataclass(frozen=True)
 class OperatorAsked(Event):
-    """The run waits for a request of the operator.
+    """The run began to wait for a request of the operator.
 
     Attributes:
         choices: Classes that the operator can request.
@@ -69,10 +70,10 @@ class RequestGiven(Event):
 
 @dataclass(frozen=True)
 class RunHalted(Event):
-    """The run was halted: the tick loop ended, and the arm starts to brake.
+    """A halt ended the tick loop, and the arm starts to brake.
 
     Attributes:
-        is_tree_ticked: True if the tree was ticked in this control step.
+        is_tree_ticked: True if the tree was ticked in the control step of the halt.
     """
 
     is_tree_ticked: bool
@@ -84,8 +85,8 @@ class RunResumed(Event):
 
     Attributes:
         valid_ticks: Number of control steps before the interruption that are still valid.
-        last_command: Last command to the tool before the interruption, `open` or `close`; "" without a
-            command; `unknown` if arm or tool executed commands that the journal lacks.
+        last_command: Last command to the tool before the interruption: `open` or `close`; "" for none;
+            `unknown` if arm or tool executed commands that the journal does not contain.
         versions: Versions of this project, Python, the machine and the required packages.
     """
 
@@ -110,14 +111,13 @@ class RunEnded(Event):
     """A run ended; the arm is at rest.
 
     Attributes:
-        status: `SUCCESS`, `FAILURE`, `FAULT`, `HALTED`, or `INCOMPLETE` if the tree succeeded but items were
-            rejected.
+        status: Final status.
         reason: Reason of the failure, for instance `Transit.dropped`; "" on success.
         message: Sentence that explains the status, with measured values, or "".
-        node: Path of the node that determined the status, or "".
-        is_table_empty: True if the ledger contains no object with a route, and no look showed a label that
+        node: Path of the node that caused the status, or "".
+        is_table_empty: True if the ledger contains no object with a route, and no frame showed a label that
             the cell file does not declare.
-        held_item: Item in the tool; `something` if the ledger has no such item; "" for an empty tool.
+        held_item: Item in the tool; `something` if the item is unknown; "" for an empty tool.
         ticks: Number of control steps.
         robot_time: Time on the clock of the run [s].
     """

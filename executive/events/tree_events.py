@@ -11,11 +11,12 @@ from pydantic import Field, JsonValue
 from executive.events.event import Event
 
 NodeStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|FAILURE|INVALID)$")]
+"""Final status of a node; INVALID for a node that was halted or raised a fault."""
 
 
 @dataclass(frozen=True)
 class NodeStarted(Event):
-    """A node of the tree was started.
+    """A node of the tree started.
 
     Attributes:
         node: Path of the node.
@@ -34,14 +35,14 @@ class NodeEnded(Event):
 
     Attributes:
         node: Path of the node.
-        status: Final status; INVALID if the node was halted or raised a fault.
+        status: Final status.
         skill: Name of the skill; "" for a control node.
         item: Item on which the skill worked, or "".
-        reason: Reason of a failure, for instance `missed` for a skill, `Grasp.missed` for a control node;
-            `fault` for a fault of a skill; "" otherwise.
+        reason: Reason of a failure: `missed` for a skill, `Grasp.missed` for a control node. `fault` for a
+            fault of a skill; "" for all other ends.
         message: Message of the failure or fault, or "".
         origin: Path of the node that caused the failure of a control node, or "".
-        outputs: Values of the outputs of a skill that succeeded, otherwise None.
+        outputs: Values of the outputs of a successful skill by name; None for other nodes and ends.
     """
 
     node: str
@@ -56,13 +57,13 @@ class NodeEnded(Event):
 
 @dataclass(frozen=True)
 class BranchChosen(Event):
-    """A control node decided which child it runs next.
+    """A control node made a decision, for instance to run another child after a failure.
 
     Attributes:
         node: Path of the control node.
         choice: Description of the decision.
         reason: Failure that caused the decision, for instance `Grasp.missed`, or "".
-        message: Message of this failure, or "".
+        message: Message of the failure, or "".
     """
 
     node: str
