@@ -77,7 +77,7 @@ class TreeBuilder:
                 body = self.build_node(subtree_root)
                 # The root of the subtree has its own label, so a sequence gets the label of the `use`.
                 root = self.node_classes[SEQUENCE_KEYWORD](context, do=(body,)) if node.label else body
-                root.subtrees = (node.name, *root.subtrees)
+                root.subtree_names = (node.name, *root.subtree_names)
                 return root
         raise AssertionError(f"a checked mission contains no {type(node).__name__}")
 

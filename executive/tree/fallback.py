@@ -33,7 +33,7 @@ class Fallback(ControlNode):
         """Tick the current child; after a failure, tick the next child in the same tick."""
         while True:
             child = self.do[self._child_index]
-            status = self.run_child(child)
+            status = self.tick_child(child)
             if status is not Status.FAILURE:
                 return status
             failure = self.get_failure(child)
@@ -42,7 +42,7 @@ class Fallback(ControlNode):
                 return self.fail(failure)
             self.report_choice(f"choice {self._child_index + 1} of {len(self.do)}", failure)
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends; each child is entered after a failure of the previous child."""
         success = halted = None
         failures: Mapping[PossibleFailure, FlowState] = {}
@@ -50,15 +50,15 @@ class Fallback(ControlNode):
         for child in self.do:
             if entry is None:
                 break
-            flow = flow_of(child, entry)
+            flow = get_flow(child, entry)
             success, halted = join_states((success, flow.success)), join_states((halted, flow.halted))
             failures = flow.failures
             entry = join_states(end.with_handled_failure(failure) for failure, end in failures.items())
         return Flow(success, failures, halted)
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of the fastest child [s]."""
-        return min(map(min_time_of, self.do))
+        return min(map(get_min_time, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
         """Return the cause: a child before `child` cannot fail."""

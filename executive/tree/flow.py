@@ -197,7 +197,7 @@ FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]
 
 
 def find_fixed_point(
-    flow_of: FlowFunction, child: Child, state: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
+    get_flow: FlowFunction, child: Child, state: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
 ) -> tuple[Flow, FlowState]:
     """Return the possible ends of a child that is entered repeatedly, and the joined state of all entries.
 
@@ -206,7 +206,7 @@ def find_fixed_point(
     """
     entry = state
     while True:
-        flow = flow_of(child, entry)
+        flow = get_flow(child, entry)
         # Each iteration removes variables or adds states of the tool, so the loop ends.
         joined_entry = entry.join(get_next_entry(flow) or entry)
         if joined_entry == entry:

@@ -50,7 +50,7 @@ class ForEach(Loop):
     def step(self) -> Status:
         """Tick the body; begin the next iteration in the same tick if `begin_iteration` allows it."""
         while self._element_index < len(self._elements):
-            status = self.run_iteration(self.do)
+            status = self.tick_in_iteration(self.do)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
@@ -91,12 +91,12 @@ class ForEach(Loop):
             )
         return tuple(value)
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends; the body is entered again in the state after its success."""
         if self.in_ == ():
             return Flow(state, {}, None)
         entry = state.with_variables([self.each])
-        body_flow, entry = find_fixed_point(flow_of, self.do, entry, lambda flow: flow.success)
+        body_flow, entry = find_fixed_point(get_flow, self.do, entry, lambda flow: flow.success)
         # A list in a variable may be empty.
         success = join_states((body_flow.success, state if isinstance(self.in_, VariableName) else None))
         # While the loop waits for the next tick before an iteration, it can be halted.
@@ -107,9 +107,9 @@ class ForEach(Loop):
             halted and halted.without_variable(self.each),
         )
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of all iterations [s]; 0 if their number is unknown."""
-        return 0.0 if isinstance(self.in_, VariableName) else len(self.in_) * min_time_of(self.do)
+        return 0.0 if isinstance(self.in_, VariableName) else len(self.in_) * get_min_time(self.do)
 
     def explain_unreachable(self, child: Child) -> str:
         """Return the cause: the list is empty."""

@@ -34,7 +34,7 @@ class NodeFinding:
     is_warning: bool = False
 
 
-class NodeFacts(Protocol):
+class NodeAnalysis(Protocol):
     """Facts of the checker about a control node in a mission and about the children of the node."""
 
     @property
@@ -74,7 +74,7 @@ class PropagatedFailure:
             label.
         handled_counts: Number of failures that the node handled before, by name.
         last_messages: The last message of each handled failure, by name.
-        last_handled: Name of the failure that the node handled last, or "".
+        last_handled_name: Name of the failure that the node handled last, or "".
         last_choice: Last decision of the node as a text: `attempt 2 of 3`.
         duration: Time from the start of the node to its end [s].
         has_child_failed: Function that returns True if a child ran and failed in this activation of the node.
@@ -85,12 +85,12 @@ class PropagatedFailure:
     reasons: frozenset[Reason]
     handled_counts: Mapping[str, int]
     last_messages: Mapping[str, str]
-    last_handled: str
+    last_handled_name: str
     last_choice: str
     duration: float
     has_child_failed: Callable[[Child], bool]
 
-    def is_one_of(self, reasons: Sequence[Reason]) -> bool:
+    def matches(self, reasons: Sequence[Reason]) -> bool:
         """Return True if one of `reasons` denotes the failure."""
         # The checker uses a subclass with a position; its instances are never equal to a `Reason`.
         return any(Reason(reason.source, reason.reason) in self.reasons for reason in reasons)

@@ -20,14 +20,14 @@ class Invert(ControlNode):
 
     def step(self) -> Status:
         """Tick the body."""
-        status = self.run_child(self.do)
+        status = self.tick_child(self.do)
         if status is Status.SUCCESS:
             return self.fail_with_reason("inverted", f"{self.do.name} succeeded")
         return Status.SUCCESS if status is Status.FAILURE else status
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends of the body, with success and failure exchanged."""
-        flow = flow_of(self.do, state)
+        flow = get_flow(self.do, state)
         inverted = PossibleFailure(self.keyword, "inverted", self.path)
         failures = {} if flow.success is None else {inverted: flow.success}
         return Flow(join_states(flow.failures.values()), failures, flow.halted)

@@ -25,9 +25,9 @@ class Loop(ControlNode):
         """Begin the first iteration."""
         self.has_tick_passed = False
 
-    def run_iteration(self, child: Child) -> Status:
+    def tick_in_iteration(self, child: Child) -> Status:
         """Tick a child as part of the current iteration."""
-        status = self.run_child(child)
+        status = self.tick_child(child)
         if status is Status.RUNNING:
             self.has_tick_passed = True
         return status

@@ -22,7 +22,7 @@ from executive.tree.blackboard import Blackboard
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.halting import halt
-from executive.tree.inspection import Advice, MinTimeFunction, NodeFacts, NodeFinding, PropagatedFailure
+from executive.tree.inspection import Advice, MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, KeyKind, KeyOwner, KeySection
 
 
@@ -53,10 +53,10 @@ class TreeNode(Behaviour):
         label: Label of the node in the mission, or "".
         blackboard: Variables of the run.
         failure: The failure while the status is FAILURE; else None.
-        subtrees: Names of the subtrees whose root is this node, the outermost first.
+        subtree_names: Names of the subtrees whose root is this node, the outermost first.
     """
 
-    subtrees: tuple[str, ...] = ()
+    subtree_names: tuple[str, ...] = ()
 
     def __init__(self, context: NodeContext, name: str) -> None:
         super().__init__(context.label or name)
@@ -135,18 +135,18 @@ class ControlNode(KeyOwner, TreeNode):
 
     # Methods for the checker.
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends of the node that is entered in `state`; `flow_of` does so for a child."""
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        """Return the possible ends of the node that is entered in `state`; `get_flow` does so for a child."""
         raise NotImplementedError
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
-        """Return a lower bound of the time to success [s]; `min_time_of` returns the bound for a child."""
-        del min_time_of
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
+        """Return a lower bound of the time to success [s]; `get_min_time` returns the bound for a child."""
+        del get_min_time
         return 0.0
 
-    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield mistakes in the use of this control node in the mission."""
-        del facts
+        del analysis
         yield from ()
 
     def explain_unreachable(self, child: Child) -> str:
@@ -192,7 +192,7 @@ class ControlNode(KeyOwner, TreeNode):
 
     # Methods that subclasses call.
 
-    def run_child(self, child: Child) -> Status:
+    def tick_child(self, child: Child) -> Status:
         """Tick a child and return its status."""
         child.tick_once()
         status = child.status

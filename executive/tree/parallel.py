@@ -87,12 +87,12 @@ class Parallel(ControlNode):
     def _tick_lead(self) -> Status:
         """Tick the lead; if the lead is still running, tick the other running children."""
         lead, *siblings = self._running_children
-        status = self.run_child(lead)
+        status = self.tick_child(lead)
         if status is not Status.RUNNING:
             self.halt_children(siblings)
             return status if status is Status.SUCCESS else self.fail(self.get_failure(lead))
         for child in siblings:
-            status = self.run_child(child)
+            status = self.tick_child(child)
             if status is not Status.RUNNING:
                 self._running_children.remove(child)
             if status is Status.FAILURE:
@@ -100,7 +100,7 @@ class Parallel(ControlNode):
         return Status.RUNNING
 
     def _tick_all(self) -> Status:
-        statuses = {self.run_child(child) for child in self._running_children}
+        statuses = {self.tick_child(child) for child in self._running_children}
         return Status.RUNNING if statuses == {Status.RUNNING} else self._decide()
 
     def _decide(self) -> Status:
@@ -130,9 +130,9 @@ class Parallel(ControlNode):
         for failure in failures:
             self.report_choice(choice, failure)
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends: every child is entered in the same state, and the ends are combined."""
-        flows = [flow_of(child, state) for child in self.do]
+        flows = [get_flow(child, state) for child in self.do]
         ends_with_halt = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         halted = join_states(flow.halted for flow in flows)
         halted = halted and halted.with_tool_states(combine_tool_states(state.tool_states, ends_with_halt))
@@ -163,11 +163,11 @@ class Parallel(ControlNode):
             )
         return success.with_tool_states(combine_tool_states(state.tool_states, ends))
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of the lead, or the n-th shortest if n children must succeed [s]."""
         if self._has_lead:
-            return min_time_of(self.do[0])
-        return sorted(map(min_time_of, self.do))[self._required_count - 1]
+            return get_min_time(self.do[0])
+        return sorted(map(get_min_time, self.do))[self._required_count - 1]
 
     @property
     def concurrent_children(self) -> Children:

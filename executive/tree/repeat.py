@@ -42,7 +42,7 @@ class Repeat(Loop):
     def step(self) -> Status:
         """Tick the body; begin the next iteration in the same tick if `begin_iteration` allows it."""
         while self._completed_count != self.times:
-            status = self.run_iteration(self.do)
+            status = self.tick_in_iteration(self.do)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
@@ -56,12 +56,12 @@ class Repeat(Loop):
                 return Status.RUNNING
         return Status.SUCCESS
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends: the body is entered again in the state after its success."""
         if self.times == 0:
             return Flow(state, {}, None)
         body, entry = find_fixed_point(
-            flow_of, self.do, state, lambda flow: None if self.times == 1 else flow.success
+            get_flow, self.do, state, lambda flow: None if self.times == 1 else flow.success
         )
         items = body.failures.items()
         expected_ends = [end for failure, end in items if failure.may_match(self.until)]
@@ -69,9 +69,9 @@ class Repeat(Loop):
         failures = {failure: end for failure, end in items if not failure.must_match(self.until)}
         return Flow(success, failures, join_states((body.halted, entry)))
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of all iterations [s]; 0 if a failure may end the loop with success."""
-        return 0.0 if self.until else (self.times or 0) * min_time_of(self.do)
+        return 0.0 if self.until else (self.times or 0) * get_min_time(self.do)
 
     def explain_unreachable(self, child: Child) -> str:
         """Return the cause: the number of iterations is 0."""

@@ -15,7 +15,7 @@ from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, 
 from executive.tree.inspection import (
     Advice,
     MinTimeFunction,
-    NodeFacts,
+    NodeAnalysis,
     NodeFinding,
     PropagatedFailure,
     format_reasons,
@@ -79,7 +79,7 @@ class Retry(Loop):
         """Tick the current child; begin the next attempt in the same tick if `begin_iteration` allows it."""
         while True:
             if self._pending_failure is None:
-                status = self.run_iteration(self.do)
+                status = self.tick_in_iteration(self.do)
                 if status is not Status.FAILURE:
                     return status
                 failure = self.get_failure(self.do)
@@ -109,13 +109,13 @@ class Retry(Loop):
             return Status.RUNNING
         if self.recover is None:
             return Status.SUCCESS
-        status = self.run_iteration(self.recover)
+        status = self.tick_in_iteration(self.recover)
         if status is Status.FAILURE:
             self.report_choice("give up: the recovery failed", self.get_failure(self.recover))
             return self.fail(failure)
         return status
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends: body and recovery are entered in turn until no new state occurs."""
 
         def is_retried(failure: PossibleFailure) -> bool:
@@ -129,9 +129,9 @@ class Retry(Loop):
             retry_state = compute_retry_state(body)
             if retry_state is None or self.recover is None:
                 return Flow(retry_state, {}, None)
-            return flow_of(self.recover, retry_state)
+            return get_flow(self.recover, retry_state)
 
-        body, _ = find_fixed_point(flow_of, self.do, state, lambda flow: compute_recovery_flow(flow).success)
+        body, _ = find_fixed_point(get_flow, self.do, state, lambda flow: compute_recovery_flow(flow).success)
         recovery = compute_recovery_flow(body)
         failed_recovery = join_states(recovery.failures.values())
         failures = {
@@ -141,20 +141,20 @@ class Retry(Loop):
         delay_state = compute_retry_state(body) if self.backoff else None
         return Flow(body.success, failures, join_states((body.halted, recovery.halted, delay_state)))
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of one attempt [s]."""
-        return min_time_of(self.do)
+        return get_min_time(self.do)
 
-    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning if nothing changes between the attempts, and if there is only one attempt."""
-        skills = facts.list_skills()
+        skills = analysis.list_skills()
         may_change = any(skill is None or skill.senses or skill.moves for skill in skills)
         if not self.backoff and skills and not may_change:
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
             hint = "Put a look or a motion into do or recover, or wait with backoff."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
         # A number of attempts from a param is no mistake: the param may have another value in another run.
-        if self.attempts == 1 and facts.is_literal("attempts"):
+        if self.attempts == 1 and analysis.is_literal("attempts"):
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
@@ -169,9 +169,9 @@ class Retry(Loop):
         counts = Counter(failure.handled_counts)
         if self._has_recovery_failed(failure):
             attempt, _ = self.count_attempts(failure)
-            cause = f"{failure.last_handled}: {failure.last_messages[failure.last_handled]}"
+            cause = f"{failure.last_handled_name}: {failure.last_messages[failure.last_handled_name]}"
             return f"gave up after attempt {attempt} of {self.attempts}: its recovery failed with {cause}"
-        if self.on and not failure.is_one_of(self.on):
+        if self.on and not failure.matches(self.on):
             earlier_failures = f"; failures before: {_format_counts(counts)}" if counts else ""
             return f"runs again only after {format_reasons(self.on)}{earlier_failures}"
         counts[failure.name] += 1
@@ -189,8 +189,8 @@ class Retry(Loop):
         """Yield the advice to handle a failure in the recovery, or to allow more attempts."""
         attempt, attempts = self.count_attempts(failure)
         if self._has_recovery_failed(failure):
-            yield Advice(f"handle {failure.last_handled} in the recovery", child=self.recover)
-        elif attempt == attempts and (not self.on or failure.is_one_of(self.on)):
+            yield Advice(f"handle {failure.last_handled_name} in the recovery", child=self.recover)
+        elif attempt == attempts and (not self.on or failure.matches(self.on)):
             yield Advice(f"allow more than {attempts} attempt{'s' * (attempts > 1)}", "attempts")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:

@@ -26,7 +26,7 @@ class Sequence(ControlNode):
         """Tick the current child; after a success, tick the next child in the same tick."""
         while self._child_index < len(self.do):
             child = self.do[self._child_index]
-            status = self.run_child(child)
+            status = self.tick_child(child)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
@@ -34,7 +34,7 @@ class Sequence(ControlNode):
             self._child_index += 1
         return Status.SUCCESS
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends; each child is entered after success of the previous child."""
         failures: dict[PossibleFailure, FlowState] = {}
         halted = None
@@ -42,14 +42,14 @@ class Sequence(ControlNode):
         for child in self.do:
             if entry is None:
                 break
-            flow = flow_of(child, entry)
+            flow = get_flow(child, entry)
             failures.update(flow.failures)
             entry, halted = flow.success, join_states((halted, flow.halted))
         return Flow(entry, failures, halted)
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the sum of the minimum times of all children [s]."""
-        return sum(map(min_time_of, self.do))
+        return sum(map(get_min_time, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
         """Return the cause: a child before `child` cannot succeed."""

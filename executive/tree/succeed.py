@@ -21,14 +21,14 @@ class Succeed(ControlNode):
         """Tick the body, if any."""
         if self.do is None:
             return Status.SUCCESS
-        status = self.run_child(self.do)
+        status = self.tick_child(self.do)
         if status is Status.FAILURE:
             self.report_choice("succeed despite the failure", self.get_failure(self.do))
         return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends: success after every end of the body."""
         if self.do is None:
             return Flow(state, {}, None)
-        flow = flow_of(self.do, state)
+        flow = get_flow(self.do, state)
         return Flow(join_states((flow.success, *flow.failures.values())), {}, flow.halted)

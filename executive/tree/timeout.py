@@ -8,7 +8,7 @@ from py_trees.common import Status
 
 from executive.skill import Seconds
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure
-from executive.tree.inspection import Advice, MinTimeFunction, NodeFacts, NodeFinding, PropagatedFailure
+from executive.tree.inspection import Advice, MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
@@ -40,7 +40,7 @@ class Timeout(ControlNode):
 
     def step(self) -> Status:
         """Tick the body, then compare the clock with the deadline."""
-        status = self.run_child(self.do)
+        status = self.tick_child(self.do)
         if status is Status.FAILURE:
             return self.fail(self.get_failure(self.do))
         # The tolerance of 1 ns covers rounding errors of a clock that adds up control periods.
@@ -49,25 +49,25 @@ class Timeout(ControlNode):
             return self.fail_with_reason("timeout", f"the body was not done after {self.seconds:g} s")
         return status
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends of the body, and the timeout if the body can take more than one tick."""
-        flow = flow_of(self.do, state)
+        flow = get_flow(self.do, state)
         failures = dict(flow.failures)
         if flow.halted is not None:
             failures[PossibleFailure(self.keyword, "timeout", self.path)] = flow.halted
         return Flow(flow.success, failures, flow.halted)
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of the body [s]."""
-        return min_time_of(self.do)
+        return get_min_time(self.do)
 
-    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield an error if the limit is shorter than the minimum time of the body."""
-        body_time = facts.get_min_time(self.do)
+        body_time = analysis.get_min_time(self.do)
         if self.seconds >= body_time - CLOCK_TOLERANCE:
             return
         message = f"timeout.seconds is {self.seconds:g} s, but its body takes at least {body_time:.2f} s"
-        skill_times = [(name, time) for name, time in facts.list_skill_times(self.do) if time > 0]
+        skill_times = [(name, time) for name, time in analysis.list_skill_times(self.do) if time > 0]
         hint = f"Minimum times: {', '.join(f'{name} {time:.2f} s' for name, time in skill_times)}."
         # In a fallback or a parallel, the minimum times of the skills do not explain their sum.
         has_hint = abs(sum(time for _, time in skill_times) - body_time) <= 1e-9

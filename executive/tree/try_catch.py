@@ -12,7 +12,7 @@ from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, 
 from executive.tree.inspection import (
     Advice,
     MinTimeFunction,
-    NodeFacts,
+    NodeAnalysis,
     NodeFinding,
     PropagatedFailure,
     format_reasons,
@@ -62,7 +62,7 @@ class TryCatch(ControlNode):
         """Tick the current child; after its end, tick the next child in the same tick."""
         while True:
             child = self._current_child
-            status = self.run_child(child)
+            status = self.tick_child(child)
             if status is Status.RUNNING:
                 return status
             failure = self.get_failure(child) if status is Status.FAILURE else None
@@ -83,12 +83,12 @@ class TryCatch(ControlNode):
     def _find_handler(self, failure: Failure) -> Child | None:
         return next((handler.do for handler in self.catch if failure.matches(handler.on)), None)
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends.
 
         Each handler is entered in the states after the failures that it handles, `finally` in all end states.
         """
-        body = flow_of(self.do, state)
+        body = get_flow(self.do, state)
         success, halted, failures = body.success, body.halted, dict(body.failures)
         earlier_reasons: list[Reason] = []
         for handler in self.catch:
@@ -104,27 +104,27 @@ class TryCatch(ControlNode):
             for failure in handled:
                 if failure.must_match(handler.on):
                     failures.pop(failure, None)
-            flow = flow_of(handler.do, entry)
+            flow = get_flow(handler.do, entry)
             success, halted = join_states((success, flow.success)), join_states((halted, flow.halted))
             failures.update(flow.failures)
         flow = Flow(success, failures, halted)
-        return flow if self.finally_ is None else _append_finally(self.finally_, flow, flow_of)
+        return flow if self.finally_ is None else _append_finally(self.finally_, flow, get_flow)
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum of the times of body and handlers, plus the time of `finally` [s]."""
-        fastest = min(min_time_of(child) for child in (self.do, *(handler.do for handler in self.catch)))
-        return fastest + (min_time_of(self.finally_) if self.finally_ else 0.0)
+        fastest = min(get_min_time(child) for child in (self.do, *(handler.do for handler in self.catch)))
+        return fastest + (get_min_time(self.finally_) if self.finally_ else 0.0)
 
-    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning for every reason of a handler whose failures earlier reasons catch already."""
-        body = facts.get_flow(self.do)
+        body = analysis.get_flow(self.do)
         failures = () if body is None else body.failures
         earlier_reasons: list[Reason] = []
         for reason in [reason for handler in self.catch for reason in handler.on]:
             matching = [failure for failure in failures if failure.may_match([reason])]
             if matching and all(failure.must_match(earlier_reasons) for failure in matching):
                 catching = next(earlier for earlier in earlier_reasons if matching[0].must_match([earlier]))
-                place = facts.describe_place(catching, reason)
+                place = analysis.describe_place(catching, reason)
                 message = f"{reason} is caught already, as {catching} in {place}"
                 yield NodeFinding(reason, "unreachable", message, is_warning=True)
             earlier_reasons.append(reason)
@@ -139,7 +139,7 @@ class TryCatch(ControlNode):
         if failure.child is self.finally_:
             return "the child finally failed"
         if failure.child is not self.do:
-            name = failure.last_handled
+            name = failure.last_handled_name
             return f"caught {name} ({failure.last_messages.get(name, '')}), but the handler failed"
         reasons = [reason for handler in self.catch for reason in handler.on]
         return f"catches only {format_reasons(reasons)}" if reasons else "has no catch"
@@ -157,16 +157,16 @@ class TryCatch(ControlNode):
             yield "finally", self.finally_
 
 
-def _append_finally(finally_child: Child, flow: Flow, flow_of: FlowFunction) -> Flow:
+def _append_finally(finally_child: Child, flow: Flow, get_flow: FlowFunction) -> Flow:
     """Return the possible ends of a node whose child `finally_child` runs after each end in `flow`."""
     success, halted = None, flow.halted
     failures: dict[PossibleFailure, FlowState] = {}
     if flow.success is not None:
-        finally_flow = flow_of(finally_child, flow.success)
+        finally_flow = get_flow(finally_child, flow.success)
         success, halted = finally_flow.success, join_states((halted, finally_flow.halted))
         failures.update(finally_flow.failures)
     for failure, entry in flow.failures.items():
-        finally_flow = flow_of(finally_child, entry)
+        finally_flow = get_flow(finally_child, entry)
         halted = join_states((halted, finally_flow.halted))
         # The node passes on `failure` after success and failure of `finally`.
         ends = (finally_flow.success, *finally_flow.failures.values())

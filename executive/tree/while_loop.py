@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
-from executive.tree.inspection import NodeFacts, NodeFinding, PropagatedFailure
+from executive.tree.inspection import NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
 from executive.tree.loop import Loop
 
@@ -33,7 +33,7 @@ class While(Loop):
         """Tick the current child; begin the next iteration in this tick if `begin_iteration` allows it."""
         while True:
             child = self._current_child
-            status = self.run_iteration(child)
+            status = self.tick_in_iteration(child)
             if status is Status.RUNNING:
                 return status
             if status is Status.FAILURE:
@@ -49,24 +49,24 @@ class While(Loop):
                 if not self.begin_iteration():
                     return Status.RUNNING
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends: condition and body are entered in turn until no new state occurs."""
 
         def compute_body_flow(condition: Flow) -> Flow:
-            return flow_of(self.do, condition.success) if condition.success else Flow(None, {}, None)
+            return get_flow(self.do, condition.success) if condition.success else Flow(None, {}, None)
 
         condition, entry = find_fixed_point(
-            flow_of, self.condition, state, lambda flow: compute_body_flow(flow).success
+            get_flow, self.condition, state, lambda flow: compute_body_flow(flow).success
         )
         body = compute_body_flow(condition)
         halted = join_states((condition.halted, entry, body.halted))
         return Flow(join_states(condition.failures.values()), body.failures, halted)
 
-    def check(self, facts: NodeFacts) -> Iterator[NodeFinding]:
+    def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield an error if the loop never ends because its condition cannot fail."""
-        condition = facts.get_flow(self.condition)
-        if condition is not None and not condition.failures and not facts.is_halted_by_sibling:
-            message = f"this loop never ends: its condition, {facts.get_name(self.condition)}, cannot fail"
+        condition = analysis.get_flow(self.condition)
+        if condition is not None and not condition.failures and not analysis.is_halted_by_sibling:
+            message = f"this loop never ends: its condition, {analysis.get_name(self.condition)}, cannot fail"
             yield NodeFinding("", "endless", message, "Use repeat with times or until.")
 
     def explain_unreachable(self, child: Child) -> str:

@@ -49,7 +49,7 @@ class Race(ControlNode):
         for child in list(self._running):
             if child is not self.do[0] and self.clock.now < self._begin:
                 continue
-            status = self.run_child(child)
+            status = self.tick_child(child)
             if status is Status.SUCCESS:
                 self.halt_children(other for other in self._running if other is not child)
                 return status
@@ -59,8 +59,8 @@ class Race(ControlNode):
                     return self.fail(self.get_failure(child))
         return Status.RUNNING
 
-    def compute_flow(self, flow_of: FlowFunction, state: FlowState) -> Flow:
-        flows = [flow_of(child, state) for child in self.do]
+    def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
+        flows = [get_flow(child, state) for child in self.do]
         ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         tools = combine_tool_states(state.tool_states, ends)
         success = join_states(flow.success for flow in flows)
@@ -69,8 +69,8 @@ class Race(ControlNode):
         ends = [end for flow in flows for end in flow.failures.items()]
         return Flow(success, {failure: end.with_tool_states(tools) for failure, end in ends}, halted)
 
-    def min_time(self, min_time_of: MinTimeFunction) -> float:
-        return min(min_time_of(child) for child in self.do)
+    def min_time(self, get_min_time: MinTimeFunction) -> float:
+        return min(get_min_time(child) for child in self.do)
 
     @property
     def concurrent_children(self) -> Children:

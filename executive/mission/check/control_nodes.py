@@ -68,8 +68,8 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
     """Yield the findings of the method `check` of every control node."""
     halted_paths = {node.path for node in _find_halted_nodes(context)}
     for node in context.iterate_control_nodes():
-        facts = CheckerFacts(context, node, node.path in halted_paths)
-        for node_finding in make_inspection_instance(node).check(facts):
+        analysis = CheckerAnalysis(context, node, node.path in halted_paths)
+        for node_finding in make_inspection_instance(node).check(analysis):
             yield _locate_finding(node, node_finding)
 
 
@@ -91,8 +91,8 @@ def _locate_finding(node: InnerNode, node_finding: NodeFinding) -> Finding:
     return make_finding(span, node_finding.code, message, node_finding.hint)
 
 
-class CheckerFacts:
-    """Implementation of `NodeFacts` for one control node."""
+class CheckerAnalysis:
+    """Implementation of `NodeAnalysis` for one control node."""
 
     def __init__(self, context: CheckContext, node: InnerNode, is_halted_by_sibling: bool) -> None:
         self._context, self._node = context, node

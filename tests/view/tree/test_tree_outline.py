@@ -45,7 +45,7 @@ def pick(path: str, label: str = "", wiring: Wiring | None = None) -> SkillLeaf:
 
 
 def in_subtree(node: Behaviour, *subtrees: str) -> Behaviour:
-    node.subtrees = subtrees
+    node.subtree_names = subtrees
     return node
 
 
