@@ -13,7 +13,7 @@ from executive.cell.frame import Frame, FrameCaptured
 from executive.events import DetectedObject, FrameSearched, NodeEnded, TargetSelected, TimedEvent
 from executive.record.pictures.drawing_thread import PictureDrawer
 from executive.record.pictures.picture_content import PictureContent
-from executive.record.timeline.activation import to_skill_name
+from executive.record.timeline.activation import get_skill_name
 from executive.record.timeline.timeline import Timeline
 
 MAX_STORED_LOOKS = 24
@@ -39,7 +39,7 @@ class PictureRecorder:
 
     def __init__(self, folder: Path) -> None:
         self._drawer = PictureDrawer(folder)
-        self._timeline = Timeline(keeps_history=False)
+        self._timeline = Timeline(has_history=False)
         self._last_frame: Frame | None = None
         self._looks: dict[int, tuple[Frame, FrameSearched]] = {}
         self._selected_frame_id: int | None = None
@@ -85,7 +85,7 @@ class PictureRecorder:
 
     def _draw_failure(self, timed: TimedEvent, failure: NodeEnded) -> None:
         """Draw the selection of the item of a failed skill, or else the last look if it was not yet drawn."""
-        selection = self._timeline.targets.get(failure.item)
+        selection = self._timeline.selections.get(failure.item)
         if selection is not None:
             self._draw(timed, selection.frame, selection, failure)
         elif self._undrawn_frame_id is not None:
@@ -132,12 +132,12 @@ class PictureRecorder:
             detector=search.detector,
             age=timed.clock - frame.stamp,
             phase=" + ".join(
-                to_skill_name(last.node) for last in timeline.find_running_activations() if last.skill
+                get_skill_name(last.node) for last in timeline.find_running_activations() if last.skill
             ),
             item=item,
             bin=selection.bin if selection else "",
             attempts=history.last_change.attempts if history else 0,
-            failure=f"{to_skill_name(failure.node)}.{failure.reason}" if failure else "",
+            failure=f"{get_skill_name(failure.node)}.{failure.reason}" if failure else "",
             message=failure.message if failure else "",
             outcomes=_group_items(timeline),
             classes=tuple(timeline.items.classes),

@@ -153,7 +153,7 @@ class RecordedRun:
     start_message: str = ""
 
     def __post_init__(self) -> None:
-        self._timeline = Timeline(keeps_history=False)
+        self._timeline = Timeline(has_history=False)
 
     def execute(self, seed: int, start_time: float) -> Result:
         """Execute the run, write its result into the run directory, and return the result.

@@ -21,7 +21,7 @@ from executive.events import (
 )
 from executive.mission.load import LoadedMission
 from executive.record.recorded_mission import read_mission_of_run
-from executive.record.timeline.activation import to_skill_name
+from executive.record.timeline.activation import get_skill_name
 from executive.replay.input_log import InputLog
 from executive.run.assembly import assemble_replay
 from executive.run.resume import ResumedRun
@@ -192,7 +192,7 @@ def _to_decision(timed: TimedEvent, edited: bool) -> TimedEvent | None:
         case NodeStarted(node, skill) | NodeEnded(node, _, skill):
             if edited and not skill:
                 return None
-            event = replace(event, node=to_skill_name(node) if edited else node)
+            event = replace(event, node=get_skill_name(node) if edited else node)
             if isinstance(event, NodeEnded):
                 event = replace(event, message="", origin="")
         case BranchChosen() if not edited:

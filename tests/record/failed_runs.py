@@ -57,7 +57,7 @@ class FailedRun:
             file = Path("trial.yaml")
             file.write_text(HEAD + mission)
         self.loaded = load_mission(file, load_skills(), overrides or {})
-        self.timeline = Timeline(keeps_history=False)
+        self.timeline = Timeline(has_history=False)
         options = RunOptions(3, requests, kind=FakeCell)
         self.run = assemble(self.loaded, load_skills(), options, [self.timeline])
         assert isinstance(self.run.workcell, FakeCell)

@@ -27,10 +27,10 @@ from executive.events import (
 )
 from executive.record.journal import Journal, read_journal
 from executive.record.timeline.activation import (
-    describe_ends,
     find_last_failure,
+    format_counts,
+    get_skill_name,
     group_by_node,
-    to_skill_name,
 )
 from executive.record.timeline.timeline import PlanningTotals, Timeline
 
@@ -58,7 +58,9 @@ def test_the_journal_of_a_run_gives_the_timeline_that_was_observed(mission, tmp_
     assert recorded == live
     # Without history, only the past is missing.
     assert (
-        replace(run.timeline, keeps_history=True, activations=live.activations, selections=live.selections)
+        replace(
+            run.timeline, has_history=True, activations=live.activations, selection_times=live.selection_times
+        )
         == live
     )
 
@@ -109,8 +111,8 @@ def test_the_ends_of_a_node_are_counted_and_its_last_failure_is_found() -> None:
         skill_started("tree/Wait"),
     )  # fmt: skip
     grasp, wait = group_by_node(timeline.activations).values()
-    assert (describe_ends(grasp), find_last_failure(grasp)) == ("1 done, 2 failed, 1 halted", "blocked")
-    assert (describe_ends(wait), find_last_failure(wait)) == ("1 running", "")
+    assert (format_counts(grasp), find_last_failure(grasp)) == ("1 done, 2 failed, 1 halted", "blocked")
+    assert (format_counts(wait), find_last_failure(wait)) == ("1 running", "")
     assert timeline.end_counts == {"tree/Grasp": {"FAILURE": 2, "INVALID": 1, "SUCCESS": 1}}
 
 
@@ -140,7 +142,7 @@ def test_a_control_node_knows_the_skills_that_it_halted() -> None:
         NodeStarted("tree"), skill_started("tree/Wait"), skill_ended("tree/Wait", "INVALID"),
         NodeEnded("tree", "FAILURE", reason="timeout.timeout"),
     )  # fmt: skip
-    assert (timeline.activation_by_path["tree"].halted, timeline.halted) == (("tree/Wait",), ())
+    assert (timeline.activation_by_path["tree"].halted_skills, timeline.halted_skills) == (("tree/Wait",), ())
 
 
 def test_a_failed_skill_has_the_answers_of_the_cell_until_then_without_lists() -> None:
@@ -168,7 +170,7 @@ def test_skills_that_run_are_in_the_order_of_their_starts() -> None:
     [("tree/do/Grasp", "Grasp"), ("tree/do/2:Detect", "Detect"), ("tree/recover/look/pick", "pick")],
 )
 def test_a_skill_has_its_name_or_label(path: str, name: str) -> None:
-    assert to_skill_name(path) == name
+    assert get_skill_name(path) == name
 
 
 def test_an_item_has_its_last_sighting_and_the_number_of_looks_since_then() -> None:
@@ -193,7 +195,7 @@ def test_the_accounts_after_the_end_of_the_tree_leave_the_final_states_as_they_w
         NodeStarted("tree"), item_changed("cube-1"), item_changed("cube-2", "held"),
         NodeEnded("tree", "FAILURE"), item_changed("cube-1", "rejected"), item_changed("cube-2", "placed"),
     )  # fmt: skip
-    assert list(timeline.items.find_in_states("seen", "held")) == ["cube-1"]
+    assert list(timeline.items.find_items_in_states("seen", "held")) == ["cube-1"]
 
 
 def test_an_item_has_its_last_failure() -> None:
@@ -217,7 +219,7 @@ def test_motions_targets_questions_and_injected_faults_are_kept() -> None:
         OperatorAsked(["cube"]), RequestGiven(None), FaultInjected("object removed", "", "", "", []),
     )  # fmt: skip
     assert timeline.planning == PlanningTotals(2, 1, 0.07)
-    assert (timeline.targets, timeline.selections) == ({"cube-1": selected}, [(3.0, "cube-1")])
+    assert (timeline.selections, timeline.selection_times) == ({"cube-1": selected}, [(3.0, "cube-1")])
     assert (timeline.question, timeline.requests) == (None, [None])
     assert timeline.faults == [(6.0, "object removed")]
 
@@ -230,7 +232,7 @@ def test_the_memory_of_a_live_run_grows_only_with_its_items(tmp_path, monkeypatc
     run.run.add_observer(events.append)
     run.slip(2)
     run.run.execute()
-    timeline, sizes = Timeline(keeps_history=False), []
+    timeline, sizes = Timeline(has_history=False), []
     for number in range(40):
         for timed in events:
             if not isinstance(timed.event, FrameCaptured):

@@ -37,7 +37,7 @@ def list_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[
         resumption = f"to resume this run, leave {content} in the tool; " if can_resume else ""
         yield f"{resumption}take {content} out of the tool before a new run"
     else:
-        for name in run.timeline.items.find_in_states("held"):
+        for name in run.timeline.items.find_items_in_states("held"):
             yield f"find {name} in the cell: the tool released it at the end of the run"
     for reading in reads:
         if reading.raised == Unavailable.__name__:

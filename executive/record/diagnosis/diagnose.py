@@ -17,7 +17,7 @@ from executive.record.diagnosis.failed_run import FailedRun, describe_cause
 from executive.record.picture_recorder import find_picture
 from executive.record.result import FINAL_STATUSES
 from executive.record.run_directory import RunDirectory
-from executive.record.timeline.activation import Reading, to_skill_name
+from executive.record.timeline.activation import Reading, get_skill_name
 from executive.record.timeline.items import ItemHistory, Look, Sighting
 from executive.record.timeline.timeline import Timeline
 from executive.skill import Skill
@@ -63,7 +63,7 @@ def diagnose(
     reads = list(_list_deciding_readings(run, skills))
     journal = RunDirectory(run_folder).journal
     has_begun = journal.exists() and journal.stat().st_size > 0
-    unfinished = timeline.items.find_in_states("seen", "dropped", "held")
+    unfinished = timeline.items.find_items_in_states("seen", "dropped", "held")
     left = {name: item for name, item in unfinished.items() if name not in run.lost_items}
     return Diagnosis(
         status=end.status,
@@ -126,7 +126,7 @@ def _find_last_look(run: FailedRun) -> Sighting | Look | None:
 def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
     failure, failed = item.failure, None
     if failure is not None:
-        failed = ItemFailure(f"{to_skill_name(failure.node)}.{failure.reason}", failure.message, failure.end)
+        failed = ItemFailure(f"{get_skill_name(failure.node)}.{failure.reason}", failure.message, failure.end)
     return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failed)
 
 

@@ -8,7 +8,7 @@ from executive.errors import RecordLost
 from executive.events import RunEnded
 from executive.mission.model.nodes import Node, SkillNode
 from executive.record.diagnosis.failure_path import find_failure_path, find_nodes_on_path
-from executive.record.timeline.activation import to_skill_name
+from executive.record.timeline.activation import get_skill_name
 from executive.record.timeline.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -47,10 +47,10 @@ class FailedRun:
         }
         self.deciding_activation = timeline.activation_by_path.get(end.node)
         self.deciding_node = next(iter(find_nodes_on_path(loaded.tree, end.node)[-1:]), None)
-        self.halted_skills = timeline.halted
+        self.halted_skills = timeline.halted_skills
         deciding = self.deciding_activation
         if failed:
-            self.halted_skills = deciding.halted if deciding is not None else ()
+            self.halted_skills = deciding.halted_skills if deciding is not None else ()
         activations = [deciding, *map(timeline.activation_by_path.get, self.halted_skills)]
         items = [activation.item for activation in activations if activation is not None and activation.item]
         self.item = next(iter([*items, *self.lost_items]), "")
@@ -59,7 +59,7 @@ class FailedRun:
     def format_skill_name(self, path: str) -> str:
         """Return the name of a skill with the item of its last activation: `Grasp of cube-1`."""
         last = self.timeline.activation_by_path.get(path)
-        return to_skill_name(path) + (f" of {last.item}" if last is not None and last.item else "")
+        return get_skill_name(path) + (f" of {last.item}" if last is not None and last.item else "")
 
     def format_place(self, node: Node) -> str:
         """Return the line of a node in its file, with the file name if it is not the mission file."""

@@ -1,4 +1,4 @@
-"""Executions of a node, and the values that were read from the cell before a failure."""
+"""Activations (executions) of a node, and readings of the cell before a failure."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 _STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted", "RUNNING": "running"}
+"""Text for each status, in the order of the texts in `format_status_counts`."""
+"""Text for each status, in the order of the texts in `format_counts`."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """Number, truth value or string that was read from the cell.
+    """Number, truth value or string that a skill read from the cell.
 
     Attributes:
         name: Name of the input.
-        value: The value, or the message of the exception.
-        raised: Name of the exception that the cell raised; "" for a value.
-        tick: Control step in which this value was read first.
-        clock: Time of this control step [s].
+        value: Value of the input, or message of the exception that the cell raised.
+        raised: Name of the exception that the cell raised, or "".
+        tick, clock: Control step and time [s] at which the skill first read `value`.
     """
 
     name: str
@@ -38,15 +39,15 @@ class Activation:
         skill: Name of the skill; "" for a control node.
         item: Item that the skill works on, or "".
         status: `RUNNING`, `SUCCESS`, `FAILURE` or `INVALID`.
-        start_tick, end_tick: Control steps of start and end; equal while the node runs.
-        start, end: Times of start and end [s]; equal while the node runs.
+        start_tick, end_tick: Control steps of start and end; a running node has the end of its start.
+        start, end: Times of start and end [s]; a running node has the end of its start.
         reason, message: Reason and message of the failure or fault, or "".
-        choice: Last decision of a control node, or "".
-        handled_counts: Number of failures that a control node handled, by reason.
-        message_by_reason: Message of the last handled failure, by reason.
-        last_handled_reason: Reason of the last handled failure, or "".
-        halted: Paths of the skills that the control node halted before it ended.
-        readings: Last value of each input before the failure of a skill, the latest at the end.
+        choice: Last decision of a control node as text (`attempt 2 of 3`), or "".
+        handled_counts: Number of failures that a control node handled, by name (`Grasp.missed`).
+        message_by_reason: Message of the last handled failure, by name of the failure.
+        last_handled_reason: Name of the last handled failure, or "".
+        halted_skills: Paths of the skills that the control node halted before its end.
+        readings: Last reading of each input before the failure of a skill, sorted by time.
     """
 
     node: str
@@ -64,30 +65,30 @@ class Activation:
     handled_counts: Counter[str] = field(default_factory=Counter)
     message_by_reason: dict[str, str] = field(default_factory=dict)
     last_handled_reason: str = ""
-    halted: tuple[str, ...] = ()
+    halted_skills: tuple[str, ...] = ()
     readings: tuple[Reading, ...] = ()
 
     @property
     def failure(self) -> str:
-        """Reason and message of the failure, or ""."""
+        """Text with the reason and the message of the failure, or ""."""
         return ": ".join(filter(None, (self.reason, self.message)))
 
     @property
-    def note(self) -> str:
-        """Reason of the failure, or else name of the item."""
+    def reason_or_item(self) -> str:
+        """Reason of the failure; without a failure, the name of the item."""
         return self.reason or self.item
 
 
 def group_by_node(activations: Iterable[Activation]) -> dict[str, list[Activation]]:
-    """Return the activations of each node by its path."""
+    """Return the activations of each node, by path of the node."""
     activations_by_node: dict[str, list[Activation]] = {}
     for activation in activations:
         activations_by_node.setdefault(activation.node, []).append(activation)
     return activations_by_node
 
 
-def describe_ends(activations: Iterable[Activation]) -> str:
-    """Return a text with the number of activations in each status: `3 done, 1 failed`."""
+def format_counts(activations: Iterable[Activation]) -> str:
+    """Return the number of activations with each status as text: `3 done, 1 failed`."""
     counts = Counter(activation.status for activation in activations)
     return ", ".join(f"{counts[status]} {text}" for status, text in _STATUS_TEXTS.items() if counts[status])
 
@@ -98,6 +99,6 @@ def find_last_failure(activations: Sequence[Activation]) -> str:
     return next(failures, "")
 
 
-def to_skill_name(path: str) -> str:
-    """Return the name or label of the skill in the node at `path`."""
+def get_skill_name(path: str) -> str:
+    """Return the name or label of a skill from its path `.../name` or `.../key:name`."""
     return path.rpartition("/")[2].rpartition(":")[2]

@@ -18,7 +18,7 @@ class PlanningTotals:
     Attributes:
         motions: Number of planned motions, including repeated plans and plans without a solution.
         ahead: Number of motions that were planned before a skill requested them.
-        waited_s: Total time spent waiting for plans [s].
+        waited_s: Total time for which skills waited for plans [s].
     """
 
     motions: int = 0
@@ -31,26 +31,27 @@ class Timeline:
     """Observer that computes the state and the history of a run from its events.
 
     Attributes:
-        keeps_history: True to store all activations and selections; otherwise the memory depends only on the
-            number of nodes and items.
+        has_history: True to store all activations and selections; False to limit the memory in a long run.
         started, ended: Events of the start and the end of the run, or None.
         tick, clock: Control step and time of the last event [s].
         activation_by_path: Last activation of each node, by path of the node.
         end_counts: Number of ended activations by status, for each node by path.
-        last_end: The activation that ended last, or None.
-        halted: Paths of the skills that were halted since the last start, success or failure of a node.
+        last_end: Activation that ended last, or None.
+        halted_skills: Paths of the skills that were halted since a node last started, succeeded or failed.
         activations: All activations in the order of their starts.
         items: History of the items.
-        targets: Last selection of each item as a target, by name of the item.
-        selections: Time [s] and item of each selection of a target.
+        selections: Last selection of each item as a target, by name of the item.
+        selection_times: Time [s] and item of each selection of a target.
         planning: Statistics of motion planning.
         question: Question to the operator that is not yet answered, or None.
         requests: Requests of the operator; None for the request to quit.
         faults: Time [s] and name of each injected fault.
         traceback: Traceback of the exception that ended the run, or "".
+        _root_path: Path of the root of the tree; "" before its start.
+        _reading_by_input: Last reading of each input by name, sorted by time.
     """
 
-    keeps_history: bool = True
+    has_history: bool = True
     started: events.RunStarted | None = None
     ended: events.RunEnded | None = None
     tick: int = 0
@@ -58,25 +59,25 @@ class Timeline:
     activation_by_path: dict[str, Activation] = field(default_factory=dict)
     end_counts: dict[str, Counter[str]] = field(default_factory=dict)
     last_end: Activation | None = None
-    halted: tuple[str, ...] = ()
+    halted_skills: tuple[str, ...] = ()
     activations: list[Activation] = field(default_factory=list)
     items: ItemsTimeline = field(default_factory=ItemsTimeline)
-    targets: dict[str, events.TargetSelected] = field(default_factory=dict)
-    selections: list[tuple[float, str]] = field(default_factory=list)
+    selections: dict[str, events.TargetSelected] = field(default_factory=dict)
+    selection_times: list[tuple[float, str]] = field(default_factory=list)
     planning: PlanningTotals = field(default_factory=PlanningTotals)
     question: events.OperatorAsked | None = None
     requests: list[str | None] = field(default_factory=list)
     faults: list[tuple[float, str]] = field(default_factory=list)
     traceback: str = ""
-    _root: str = ""
+    _root_path: str = ""
     _activation_count: int = 0
-    _readings: dict[str, Reading] = field(default_factory=dict)
+    _reading_by_input: dict[str, Reading] = field(default_factory=dict)
 
     @staticmethod
-    def from_events(recorded: Iterable[events.TimedEvent]) -> Timeline:
-        """Return the timeline of a recorded run; activations without end last until the last event."""
+    def from_events(timed_events: Iterable[events.TimedEvent]) -> Timeline:
+        """Return the timeline of a recorded run; the last event ends the running activations."""
         timeline = Timeline()
-        for timed in recorded:
+        for timed in timed_events:
             timeline(timed)
         for running in timeline.find_running_activations():
             running.end_tick, running.end = timeline.tick, timeline.clock
@@ -90,9 +91,9 @@ class Timeline:
             case events.InputRead():
                 self._add_reading(event)
             case events.NodeStarted():
-                self._start_activation(event)
+                self._add_start(event)
             case events.NodeEnded():
-                self._end_activation(event)
+                self._add_end(event)
             case events.BranchChosen():
                 self._add_choice(event)
             case events.ItemChanged():
@@ -100,9 +101,9 @@ class Timeline:
             case events.FrameSearched():
                 self.items.add_look(event, self.clock)
             case events.TargetSelected():
-                self.targets[event.item] = event
-                if self.keeps_history:
-                    self.selections.append((self.clock, event.item))
+                self.selections[event.item] = event
+                if self.has_history:
+                    self.selection_times.append((self.clock, event.item))
             case events.MotionPlanned():
                 self.planning.motions += 1
                 self.planning.ahead += event.planned_ahead
@@ -123,8 +124,8 @@ class Timeline:
 
     def find_running_activations(self) -> list[Activation]:
         """Return the activations that have not ended, in the order of their starts."""
-        running = (last for last in self.activation_by_path.values() if last.status == "RUNNING")
-        return sorted(running, key=lambda last: last.number)
+        activations = (each for each in self.activation_by_path.values() if each.status == "RUNNING")
+        return sorted(activations, key=lambda activation: activation.number)
 
     def find_current_activation(self, path: str) -> Activation | None:
         """Return the last activation of a node, or None if an ancestor of the node was started after it."""
@@ -138,58 +139,57 @@ class Timeline:
         return last
 
     def _has_tree_ended(self) -> bool:
-        """Return True if the tree has ended."""
-        root = self.activation_by_path.get(self._root)
+        root = self.activation_by_path.get(self._root_path)
         return root is not None and root.status != "RUNNING"
 
-    def _start_activation(self, event: events.NodeStarted) -> None:
+    def _add_start(self, event: events.NodeStarted) -> None:
         interrupted = self.activation_by_path.get(event.node)
         if interrupted is not None and interrupted.status == "RUNNING":
             # A resumed run restarts the nodes that were running at the interruption.
-            self._close(interrupted, "INVALID")
-        self._root = self._root or event.node
+            self._end_activation(interrupted, "INVALID")
+        self._root_path = self._root_path or event.node
         self._activation_count += 1
-        number, now = self._activation_count, (self.tick, self.clock)
-        activation = Activation(event.node, number, event.skill, event.item, "RUNNING", *now, *now)
+        number, start = self._activation_count, (self.tick, self.clock)
+        activation = Activation(event.node, number, event.skill, event.item, "RUNNING", *start, *start)
         self.activation_by_path[event.node] = activation
-        self.halted = ()
-        if self.keeps_history:
+        self.halted_skills = ()
+        if self.has_history:
             self.activations.append(activation)
 
-    def _end_activation(self, event: events.NodeEnded) -> None:
-        ended = self.activation_by_path.get(event.node)
-        if ended is None or ended.status != "RUNNING":
+    def _add_end(self, event: events.NodeEnded) -> None:
+        activation = self.activation_by_path.get(event.node)
+        if activation is None or activation.status != "RUNNING":
             return
-        self._close(ended, event.status)
-        ended.reason, ended.message = event.reason, event.message
-        ended.item = event.item or ended.item
+        self._end_activation(activation, event.status)
+        activation.reason, activation.message = event.reason, event.message
+        activation.item = event.item or activation.item
         if event.status != "INVALID":
-            ended.halted, self.halted = self.halted, ()
+            activation.halted_skills, self.halted_skills = self.halted_skills, ()
         elif event.skill:
-            self.halted += (event.node,)
+            self.halted_skills += (event.node,)
         if event.skill and event.reason:
-            ended.readings = tuple(self._readings.values())
+            activation.readings = tuple(self._reading_by_input.values())
         if event.skill and event.status == "FAILURE" and event.item in self.items.by_name:
-            self.items.by_name[event.item].failure = ended
+            self.items.by_name[event.item].failure = activation
 
-    def _close(self, activation: Activation, status: str) -> None:
+    def _end_activation(self, activation: Activation, status: str) -> None:
         activation.status, activation.end_tick, activation.end = status, self.tick, self.clock
         self.end_counts.setdefault(activation.node, Counter())[status] += 1
         self.last_end = activation
 
     def _add_choice(self, event: events.BranchChosen) -> None:
-        last = self.activation_by_path.get(event.node)
-        if last is None:
+        activation = self.activation_by_path.get(event.node)
+        if activation is None:
             return
-        last.choice = event.choice
+        activation.choice = event.choice
         if event.reason:
-            last.handled_counts[event.reason] += 1
-            last.message_by_reason[event.reason] = event.message
-            last.last_handled_reason = event.reason
+            activation.handled_counts[event.reason] += 1
+            activation.message_by_reason[event.reason] = event.message
+            activation.last_handled_reason = event.reason
 
     def _add_reading(self, event: events.InputRead) -> None:
-        self._readings.pop(event.name, None)
-        # The diagnosis quotes only values of these types, not poses, images or lists.
+        self._reading_by_input.pop(event.name, None)  # The new reading must be the last entry.
+        # A diagnosis shows only numbers, truth values and strings, not poses, images or lists.
         if isinstance(event.value, (bool, int, float, str)):
             reading = Reading(event.name, event.value, event.exception, self.tick, self.clock)
-            self._readings[event.name] = reading
+            self._reading_by_input[event.name] = reading

@@ -64,7 +64,7 @@ def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state:
         name = style.truncate_text(node.name, TEXT_SIZE, right - x)
         draw.text((x, middle), name, colour, font, "lm")
         x += font.getlength(name) + 10
-        note = style.truncate_text(activation.note if activation else "", TEXT_SIZE, right - x)
+        note = style.truncate_text(activation.reason_or_item if activation else "", TEXT_SIZE, right - x)
         draw.text((x, middle), note, FAILURE if status == "FAILURE" else MINOR_TEXT, font, "lm")
 
 

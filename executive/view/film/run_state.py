@@ -8,7 +8,7 @@ from pathlib import Path
 
 from executive.events import FaultRaised, NodeEnded, RunHalted, RunResumed, TimedEvent
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation, to_skill_name
+from executive.record.timeline.activation import Activation, get_skill_name
 from executive.record.timeline.timeline import Timeline
 from executive.view.tree.tree_text import find_skill_names
 
@@ -33,7 +33,7 @@ class FilmRunState:
     def __init__(
         self, events: Sequence[TimedEvent], nodes: Sequence[OutlineNode], image_files: Sequence[Path]
     ) -> None:
-        self.timeline = Timeline(keeps_history=False)
+        self.timeline = Timeline(has_history=False)
         self.picture_file: Path | None = None
         self.time = 0.0
         self._later_events = deque(events)
@@ -64,7 +64,7 @@ class FilmRunState:
             activation = timeline.activation_by_path.get(path)
             if activation is not None and activation.status == "RUNNING":
                 item = timeline.items.by_name.get(activation.item)
-                target = timeline.targets.get(activation.item)
+                target = timeline.selections.get(activation.item)
                 is_held = item is not None and item.last_change.state == "held"
                 bin_text = f"to {target.bin}" if target is not None and is_held else ""
                 return " ".join(part for part in (name, activation.item, bin_text) if part)
@@ -91,7 +91,7 @@ def _describe_incident(timed_event: TimedEvent) -> str:
     """Return a text about the failure of a skill with an item, a halt, a fault or a resumption; else ""."""
     match timed_event.event:
         case NodeEnded(status="FAILURE", skill=skill, item=item) as event if skill and item:
-            return f"{to_skill_name(event.node)}.{event.reason}: {event.message}"
+            return f"{get_skill_name(event.node)}.{event.reason}: {event.message}"
         case RunHalted():
             return "halt"
         case FaultRaised():

@@ -33,7 +33,7 @@ class PageState:
     def __init__(self) -> None:
         self.values: Json = {"paused": False, "has_ended": False, "nodes": {}, "items": {}}
         self._changes: Json = {}
-        self._timeline = Timeline(keeps_history=False)
+        self._timeline = Timeline(has_history=False)
 
     def apply(self, message: Message) -> None:
         """Update the state by a message of the run."""

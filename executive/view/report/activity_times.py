@@ -52,7 +52,7 @@ def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> 
     """
     skills = {node.path: node for node in nodes if node.kind == "skill"}
     activations = [activation for activation in timeline.activations if activation.node in skills]
-    selections = timeline.selections
+    selections = timeline.selection_times
     times: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     # Dictionaries without values are used as ordered sets.
     skill_activities: dict[str, None] = {}

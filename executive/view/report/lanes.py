@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import ceil
 
 from executive.mission.outline import OutlineNode
-from executive.record.timeline.activation import Activation, describe_ends, find_last_failure, group_by_node
+from executive.record.timeline.activation import Activation, find_last_failure, format_counts, group_by_node
 from executive.record.timeline.timeline import Timeline
 from executive.view.text import estimate_text_width, render_template, wrap_and_truncate
 
@@ -138,7 +138,7 @@ def _make_bar(node: OutlineNode, group: Sequence[Activation]) -> Bar:
     first, end_time = group[0], group[-1].end
     has_one_item = len({activation.item for activation in group}) == 1
     item_text = f" of {first.item}" if first.item and has_one_item else ""
-    status_text = first.status if len(group) == 1 else describe_ends(group)
+    status_text = first.status if len(group) == 1 else format_counts(group)
     heading = f"{node.name}{item_text}: {status_text}"
     times_text = f"{first.start:.2f} s to {end_time:.2f} s ({end_time - first.start:.2f} s)"
     tooltip = "\n".join(filter(None, (heading, times_text, find_last_failure(group))))

@@ -17,7 +17,7 @@ from executive.record.diagnosis import diagnosis_text
 from executive.record.pictures.palette import PALETTE
 from executive.record.result import describe_disagreement
 from executive.record.run_directory import RunDirectory, convert_os_errors
-from executive.record.timeline.activation import describe_ends, find_last_failure, group_by_node
+from executive.record.timeline.activation import find_last_failure, format_counts, group_by_node
 from executive.view.report.activity_times import LOOK, RETRY, WAITING
 from executive.view.report.lanes import draw_lanes
 from executive.view.report.report_data import ReportData
@@ -124,6 +124,6 @@ def _make_node_results(data: ReportData) -> dict[str, NodeResult]:
     """Return the result of each node that ran, by its path."""
     results = {}
     for path, activations in group_by_node(data.timeline.activations).items():
-        lines = tuple(filter(None, (describe_ends(activations), find_last_failure(activations))))
+        lines = tuple(filter(None, (format_counts(activations), find_last_failure(activations))))
         results[path] = NodeResult(activations[-1].status, lines)
     return results

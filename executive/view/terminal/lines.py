@@ -29,7 +29,7 @@ class LineView:
         self._stream = stream
         self._names_by_path: dict[str, str] = {}
         self._skill_names_by_path: dict[str, str] = {}
-        self.timeline = Timeline(keeps_history=False)
+        self.timeline = Timeline(has_history=False)
 
     def open(self, run: Run) -> None:
         """Store the names of the nodes of a run."""

@@ -51,7 +51,7 @@ class TerminalView:
         self._key_reader: KeyReader | None = None
         self._nodes: Sequence[OutlineNode] = ()
         self._lock = threading.Lock()
-        self.timeline = Timeline(keeps_history=False)
+        self.timeline = Timeline(has_history=False)
         self._live = Live(
             console=console, get_renderable=self.render, refresh_per_second=REDRAWS_PER_SECOND, transient=True
         )
@@ -110,7 +110,7 @@ class TerminalView:
         for node, prefix in zip(shown_nodes, draw_line_prefixes(shown_nodes), strict=True):
             last = self.timeline.activation_by_path.get(node.path)
             mark, style = _STATUS_MARKS.get(last.status if last else "", ("·", "dim"))
-            note = escape_control_characters(last.note) if last else ""
+            note = escape_control_characters(last.reason_or_item) if last else ""
             lines.append(prefix, style="dim")
             lines.append(f"{mark} {node.name}", style=style)
             lines.append(f"  {note}\n", style="dim")
