@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.protocols import Routes
 from executive.cell.workcell import AUDIT_KEYS
 from executive.geometry import Array
-from executive.ledger.item import Record, State
+from executive.ledger.item import ItemRecord, State
 
 UNKNOWN_LABEL = "unknown"
 """Label of an object without a class."""
@@ -38,7 +38,7 @@ class FinalObject:
 
 
 def audit_objects(
-    objects: Iterable[FinalObject], records: Sequence[Record], routes: Routes, max_distance: float
+    objects: Iterable[FinalObject], records: Sequence[ItemRecord], routes: Routes, max_distance: float
 ) -> dict[str, int]:
     """Return the number of objects by outcome.
 

@@ -18,11 +18,11 @@ from executive.cell.error_rates import ErrorRates
 VIEWPOINT_GRID_SPACING = 0.02
 """Spacing of the grid to which camera positions are rounded [m]; equal grid points are one viewpoint."""
 ITEM_AREA_FRACTION = 0.02
-"""Area of an item in an image, as a fraction: probability that a false detection is assigned to the item."""
+"""Fraction of an image that an item covers: probability that a false detection is assigned to the item."""
 MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM = math.log(0.1)
 """Maximum log odds of existence of a new item that may be a known item at a wrongly measured position."""
-LOG_ODDS_OF_PROOF = math.log(1e4)
-"""Minimum log odds of existence of a proved item; two agreeing looks of a good detector reach this value."""
+MIN_LOG_ODDS_OF_PROOF = math.log(1e4)
+"""Minimum log odds of existence of a proved item; two equal detections of a good detector suffice."""
 
 
 def make_viewpoint_key(look: Detections) -> str:
@@ -48,7 +48,7 @@ class Belief:
     Attributes:
         first_label: Class in the first detection.
         log_odds: Posterior log odds that the item exists.
-        is_proved: True if the item certainly exists: enough looks agree, or the tool touched the item.
+        is_proved: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
         uncertain_look_count: Number of looks with a low-confidence detection since the last confident one.
         last_label_by_viewpoint: Last detected class by viewpoint key, since the last possible move.
@@ -101,6 +101,7 @@ class Belief:
         A small value shows that the detector confuses classes more often than its error rates state.
         """
         wrong_count = self.look_count - self.label_counts[self.label]
+        # bdtrc(k, n, p) is the probability of more than k events in n trials with the event probability p.
         return float(bdtrc(wrong_count - 1, self.look_count, self.max_confusion_rate))
 
     @property
@@ -133,12 +134,13 @@ class Belief:
         self.max_confusion_rate = max(self.max_confusion_rate, confusion_rate)
         if is_ambiguous and not self.look_count:
             self.log_odds = min(self.log_odds, MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM)
+        # The prior odds of a new item contain the evidence of its first confident detection.
         elif not is_ambiguous and (self.look_count or self.uncertain_look_count):
             false_positive_rate = min(rates.false_detections * ITEM_AREA_FRACTION, 1.0)
             self.log_odds += _compute_log_ratio(1.0 - rates.miss_rate, false_positive_rate, copy_probability)
         self.label_counts[label] += 1
         self.uncertain_look_count = 0
-        self.is_proved = self.is_proved or self.log_odds >= LOG_ODDS_OF_PROOF
+        self.is_proved = self.is_proved or self.log_odds >= MIN_LOG_ODDS_OF_PROOF
 
     def add_miss(self, rates: ErrorRates) -> None:
         """Update the existence with a look that shows the item's position, but does not detect the item."""
@@ -158,5 +160,5 @@ def _compute_log_ratio(probability: float, alternative: float, copy_probability:
 
     `probability` and `alternative` are the probabilities of an independent answer under both hypotheses.
     """
-    p, p_alternative = (compute_repeat_probability(p, copy_probability) for p in (probability, alternative))
-    return math.log(p / p_alternative)
+    numerator = compute_repeat_probability(probability, copy_probability)
+    return math.log(numerator / compute_repeat_probability(alternative, copy_probability))

@@ -16,14 +16,14 @@ from executive.cell.error_rates import ErrorRates
 from executive.cell.protocols import Routes
 from executive.geometry import Array
 from executive.ledger.association import MAX_STANDARD_DEVIATIONS
-from executive.ledger.item import Record, State
+from executive.ledger.item import ItemRecord, State
 
 WALL_MARGIN = 0.035
 """Minimum distance from the walls at which an object that lands in a bin certainly stays there [m]."""
 LOG_ODDS_FELL_IN_BIN = math.log(0.95 / 0.05)
 """Prior log odds that a dropped item lies in the bin over which it was predicted to land."""
 BIN_AREA_FRACTION = 0.04
-"""Area of a bin in an image, as a fraction: probability that a false detection lies in the bin."""
+"""Fraction of an image that a bin covers: probability that a false detection lies in the bin."""
 FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
 """Points of a bin's floor that must be visible, in units of half its length and half its width `(5, 3)`."""
 
@@ -42,12 +42,12 @@ class BinContents:
     bins: Mapping[str, Bin]
     routes: Routes
 
-    def count_objects_in(self, bin_name: str, records: Iterable[Record]) -> int:
+    def count_objects_in(self, bin_name: str, records: Iterable[ItemRecord]) -> int:
         """Return the number of items that were released in a bin or have probably fallen into the bin."""
         return sum(bin_name in (record.bin, find_probable_bin(record)) for record in records)
 
     def find_bin_name(
-        self, observation: Observation, bias_std: float, records: Collection[Record]
+        self, observation: Observation, bias_std: float, records: Collection[ItemRecord]
     ) -> str | None:
         """Return the name of the bin in which an observed object lies, or None.
 
@@ -58,16 +58,16 @@ class BinContents:
             bias_std: Standard deviation of the systematic measurement error along each axis [m].
             records: All items.
         """
-        error = MAX_STANDARD_DEVIATIONS * math.hypot(observation.std, bias_std)
+        max_error = MAX_STANDARD_DEVIATIONS * math.hypot(observation.std, bias_std)
         for name, bin in self.bins.items():
-            if bin.contains(observation.position, error if self.count_objects_in(name, records) else 0.0):
+            if bin.contains(observation.position, max_error if self.count_objects_in(name, records) else 0.0):
                 return name
         return None
 
-    def set_prior_log_odds(self, record: Record, landing: Array | None) -> None:
+    def set_prior_log_odds(self, record: ItemRecord, landing: Array | None) -> None:
         """Set the prior log odds that a dropped item lies in each permitted bin.
 
-        `landing` is the predicted landing position `(3,)` [m]; None if it is unknown.
+        `landing` is the predicted landing position `(3,)` [m]; None: unknown.
         """
         record.bin_log_odds.clear()
         for bin_name in self.routes.get(record.label, ()):
@@ -75,11 +75,11 @@ class BinContents:
                 record.bin_log_odds[bin_name] = LOG_ODDS_FELL_IN_BIN
 
     def place_dropped_items(
-        self, look: Detections, bin_names: Mapping[Observation, str | None], records: Collection[Record]
-    ) -> list[Record]:
-        """Set dropped items that certainly lie in a permitted bin to PLACED, and return these items.
+        self, look: Detections, bin_names: Mapping[Observation, str | None], records: Collection[ItemRecord]
+    ) -> list[ItemRecord]:
+        """Mark and return, as PLACED, the dropped items that almost certainly lie in a permitted bin.
 
-        If a look shows more objects of a class in a bin than known items, one of them may be a dropped item.
+        If a look shows more objects of a class in a bin than known items, an object may be a dropped item.
 
         Args:
             look: Detections in a whole image.
@@ -113,16 +113,16 @@ class BinContents:
         return bool(look.is_searched(bin.position + half_size * FLOOR_POINTS).all())
 
 
-def find_probable_bin(record: Record) -> str | None:
+def find_probable_bin(record: ItemRecord) -> str | None:
     """Return the name of the bin that contains a dropped item with at least 95 % probability, or None."""
     if record.state is not State.DROPPED:
         return None
-    entries = record.bin_log_odds.items()
-    return next((bin_name for bin_name, log_odds in entries if log_odds >= LOG_ODDS_FELL_IN_BIN), None)
+    log_odds = record.bin_log_odds
+    return next((bin_name for bin_name in log_odds if log_odds[bin_name] >= LOG_ODDS_FELL_IN_BIN), None)
 
 
-def update_bin_log_odds(record: Record, bin_name: str, rates: ErrorRates, *, is_visible: bool) -> None:
-    """Update the log odds that a dropped item lies in a bin with one look; the minimum of the log odds is 0.
+def update_bin_log_odds(record: ItemRecord, bin_name: str, rates: ErrorRates, *, is_visible: bool) -> None:
+    """Update, by one look, the log odds that a dropped item lies in a bin; negative log odds become 0.
 
     `is_visible` is True if the look shows more objects of the item's class in the bin than known items.
     """

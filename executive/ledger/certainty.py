@@ -1,4 +1,4 @@
-"""Thresholds of the evidence with which an item is sorted, and with which it is rejected as uncertain.
+"""Decisions whether the evidence about an item suffices to sort the item, or to reject it as uncertain.
 
 A look is an image with its detections.
 """
@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 from executive.cell.config import LedgerConfig
 from executive.ledger.association import MIN_EXISTENCE_PROBABILITY
-from executive.ledger.item import REASON_UNCERTAIN, Record, State
+from executive.ledger.item import REASON_UNCERTAIN, ItemRecord, State
 
 MIN_P_VALUE = 0.01
 """Minimum p-value of the class-consistency test (`Belief.p_value`) of an item that is sorted."""
-REJECTION_P_VALUE = 0.001
-"""p-value of the class-consistency test below which an item is rejected after `MIN_LOOKS_TO_REJECT` looks."""
+MAX_P_VALUE_TO_REJECT = 0.001
+"""Upper limit of the p-value of an item that is rejected because the looks disagree about its class."""
 RETRY_STANDARD_ERROR_FACTOR = 2 / 3
 """Maximum standard error of an item's position after a failed grasp, as a fraction of the usual maximum."""
 MIN_MISS_PROBABILITY_OF_PICK = 0.1
@@ -24,13 +24,13 @@ MIN_MISS_PROBABILITY_OF_PICK = 0.1
 MIN_LOOKS_TO_REJECT = 40
 """Minimum number of looks at an item that is rejected because the looks disagree about its class."""
 MIN_CONTRADICTIONS_TO_REJECT = 3
-"""Minimum number of contradicted looks (`Record.contradiction_count`) at a rejected item."""
+"""Minimum number of contradicted looks (`ItemRecord.contradiction_count`) at a rejected item."""
 MIN_REPEATS_FOR_SATURATION = 2
 """Number of repeated classes after which more looks from a viewpoint add hardly any evidence."""
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
 """Maximum class error of an item that the tool may touch to determine the class by the height."""
-UNCERTAIN_LOOKS_TO_REJECT = 10
-"""Number of looks with low-confidence detections only after which an item is rejected."""
+MIN_UNCERTAIN_LOOKS_TO_REJECT = 10
+"""Minimum number of looks in a row with only low-confidence detections of a rejected item."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Certainty:
     config: LedgerConfig
     labels_with_unique_height: Collection[str]
 
-    def is_certain(self, record: Record) -> bool:
+    def is_certain(self, record: ItemRecord) -> bool:
         """Return True if an item's existence, class and position are certain enough to touch the item.
 
         After a failed grasp, the position must be known more precisely. A larger class error is permitted if
@@ -66,53 +66,55 @@ class Certainty:
             <= error_factor * self.config.max_position_std
         )
 
-    def may_be_on_table(self, record: Record) -> bool:
+    def may_be_on_table(self, record: ItemRecord) -> bool:
         """Return True if an item in the state SEEN may still lie on the table."""
         may_exist = record.belief.existence_probability > self.config.max_miss_probability
         return record.state is State.SEEN and may_exist and not self.is_position_empty(record)
 
-    def is_position_empty(self, record: Record) -> bool:
+    def is_position_empty(self, record: ItemRecord) -> bool:
         """Return True if an item's position is almost certainly empty, because looks have missed the item."""
         return record.belief.miss_probability <= self.config.max_miss_probability
 
-    def reject_if_uncertain(self, record: Record, *, is_settled: bool) -> None:
+    def reject_if_uncertain(self, record: ItemRecord, *, is_unmoved: bool) -> None:
         """Reject an item in the state SEEN if more looks are unlikely to make the item certain.
 
         Args:
             record: The item.
-            is_settled: True if the item cannot have moved since its last detection.
+            is_unmoved: True if the item cannot have moved since its last detection.
         """
         belief = record.belief
-        is_certain = is_settled and self.is_certain(record)
+        is_certain = is_unmoved and self.is_certain(record)
         if is_certain:
             belief.uncertain_look_count = 0
         if record.state is not State.SEEN:
             return
-        if belief.look_count >= MIN_LOOKS_TO_REJECT and belief.p_value < REJECTION_P_VALUE:
+        if belief.look_count >= MIN_LOOKS_TO_REJECT and belief.p_value < MAX_P_VALUE_TO_REJECT:
             counts = ", ".join(f"{count} {label}" for label, count in belief.label_counts.most_common())
             record.set_state(State.REJECTED, f"looks disagree about its class: {counts}")
         elif self._needs_other_viewpoint(record):
-            error = f"a probability of {belief.class_error:.1%} that it is no {record.label}"
-            reason = f"{belief.look_count} looks from one pose leave {error}"
-            limit = f"at most {self.config.max_class_error:.1%} is allowed"
-            record.set_state(State.REJECTED, f"{reason}; {limit}")
+            reason = (
+                f"{belief.look_count} looks from one pose leave a probability of {belief.class_error:.1%}"
+            )
+            reason += f" that it is no {record.label}; at most {self.config.max_class_error:.1%} is allowed"
+            record.set_state(State.REJECTED, reason)
         elif not is_certain and (
-            belief.uncertain_look_count >= UNCERTAIN_LOOKS_TO_REJECT
+            belief.uncertain_look_count >= MIN_UNCERTAIN_LOOKS_TO_REJECT
             or record.contradiction_count >= max(MIN_CONTRADICTIONS_TO_REJECT, belief.look_count + 1)
         ):
             details = f": {record.last_contradiction}" if record.last_contradiction else ""
             record.set_state(State.REJECTED, REASON_UNCERTAIN + details)
+            # A rejected item counts as existing, so that the end of the run does not discard it as a phantom.
             belief.log_odds = max(belief.log_odds, 0.0)
 
-    def register_low_touch(self, record: Record) -> bool:
+    def register_low_touch(self, record: ItemRecord) -> bool:
         """Count a touch below the height of the class; return False if the touch contradicts the class.
 
-        The first low touch may have missed the top of the object, if the looks prove the class.
+        The first low touch is no contradiction if the looks prove the class; it may have missed the top.
         """
         record.low_touch_count += 1
         return record.low_touch_count == 1 and record.belief.class_error <= self.config.max_class_error
 
-    def _needs_other_viewpoint(self, record: Record) -> bool:
+    def _needs_other_viewpoint(self, record: ItemRecord) -> bool:
         """Return True if only looks from a second viewpoint can prove the class of an item."""
         belief = record.belief
         return (

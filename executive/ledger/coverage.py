@@ -16,19 +16,19 @@ GRID_PITCH = 0.02
 """Distance between neighbouring grid points [m], smaller than the smallest object."""
 GRID_MARGIN = 0.4
 """Width of the margin of the grid around the workspace [m]; dropped and pushed objects stay on the grid."""
-PRIOR_OUTSIDE = 0.01
+PRIOR_OUTSIDE_WORKSPACE = 0.01
 """Prior probability of an object at a grid point outside the workspace before any drop or push."""
 PRIOR_OUTSIDE_AFTER_CHANGE = 0.1
 """Prior probability of an object at a grid point outside the workspace after a drop or a push."""
 MIN_MISS_PROBABILITY = 1e-4
 """Lower limit of the miss probability; correlated looks must not add evidence without limit."""
 RECENT_FULL_LOOK_COUNT = 4
-"""Number of recent looks of which one must show a point outside the workspace that counts as visible."""
+"""Number of most recent looks at the whole image; a point that none of them shows is not visible."""
 BORDER_WIDTH = 12.0
 """Width of the border of an image in which a point does not count as visible [pixel]."""
 WORKSPACE_TOLERANCE = 0.03
 """Maximum distance from the workspace of an object that counts as inside [m]."""
-PRIOR_INSIDE = 0.1
+PRIOR_IN_WORKSPACE = 0.1
 """Prior probability of an object at a grid point of the workspace: three objects of 6 cm x 6 cm on the
 22 cm x 44 cm of the shipped cells."""
 POINT_HEIGHT = 0.025
@@ -39,9 +39,9 @@ class Coverage:
     """Probability, for each of `N` grid points on the table, that looks have missed an object at the point.
 
     A look is an image with its detections. The miss probability of a point is the probability that all looks
-    missed an object at the point. The probability starts at 1 in the workspace, and at the prior probability
-    of an object outside. A look multiplies the probability of each point that the look searched by the miss
-    rate of the detector. A change of the table that may have moved an object to a point resets its value.
+    missed an object at the point. The initial value is 1 in the workspace, and the prior probability of an
+    object outside the workspace. A look multiplies the values of the searched points by the miss rate of the
+    detector. A change of the table that may have moved an object to a point resets the value of the point.
 
     Args:
         table: The workspace.
@@ -55,9 +55,9 @@ class Coverage:
         self._points = np.array([(x, y, POINT_HEIGHT) for x in xs for y in ys])
         self._workspace_mask = self._find_points_inside(self._points, 0.0)
         inside_mask = self._find_points_inside(self._points, WORKSPACE_TOLERANCE)
-        self._priors = np.where(inside_mask, PRIOR_INSIDE, 1.0)
-        """Factors `(N,)` from miss probabilities to probabilities of an object."""
-        self._miss_probabilities = np.where(inside_mask, 1.0, PRIOR_OUTSIDE)
+        self._priors = np.where(inside_mask, PRIOR_IN_WORKSPACE, 1.0)
+        """Prior probabilities `(N,)`; 1 where the miss probability already contains the prior probability."""
+        self._miss_probabilities = np.where(inside_mask, 1.0, PRIOR_OUTSIDE_WORKSPACE)
         self._reset_values = np.where(inside_mask, 1.0, PRIOR_OUTSIDE_AFTER_CHANGE)
         """Miss probabilities `(N,)` after a change of the table."""
         self._last_change_numbers = np.zeros(len(self._points), dtype=int)
@@ -81,11 +81,11 @@ class Coverage:
         viewpoint = f"{make_viewpoint_key(look)} {look.view}"
         miss_rate, repeated = look.error_rates.miss_rate, look.error_rates.repeated
         repeated_miss_rate = compute_repeat_probability(miss_rate, repeated)
-        earlier_mask = self._searched_masks.setdefault(viewpoint, np.zeros(len(self._points), bool))
-        miss_rates = np.where(earlier_mask, repeated_miss_rate, miss_rate)
+        repeated_mask = self._searched_masks.setdefault(viewpoint, np.zeros(len(self._points), bool))
+        miss_rates = np.where(repeated_mask, repeated_miss_rate, miss_rate)
         self._miss_probabilities[searched_mask] *= miss_rates[searched_mask]
         self._miss_probabilities = self._miss_probabilities.clip(MIN_MISS_PROBABILITY)
-        earlier_mask |= searched_mask
+        repeated_mask |= searched_mask
         if look.view == "full":
             self._full_look_count += 1
             # Points at the border of the image do not count as visible, because no later look may show them.
@@ -104,7 +104,8 @@ class Coverage:
         """Return the probability that looks have missed an object at `position` `(3,)` [m]."""
         distances = self._compute_distances(position)
         nearest = int(np.argmin(distances))
-        return float(self._miss_probabilities[nearest]) if distances[nearest] <= GRID_PITCH else PRIOR_OUTSIDE
+        is_on_grid = distances[nearest] <= GRID_PITCH
+        return float(self._miss_probabilities[nearest]) if is_on_grid else PRIOR_OUTSIDE_WORKSPACE
 
     def is_in_workspace(self, position: Array) -> bool:
         """Return True if `position` `(3,)` [m] is in the workspace or at most `WORKSPACE_TOLERANCE` away."""
@@ -121,9 +122,9 @@ class Coverage:
         return float((self._priors * self._miss_probabilities)[self._visible_mask].max())
 
     def is_visible(self, position: Array) -> bool:
-        """Return True if all grid points around `position` `(3,)` [m] are visible, and not only some.
+        """Return True if all grid points around `position` `(3,)` [m] are visible.
 
-        A part of the points around a position may be occluded by the arm in every look.
+        Some of the points may be invisible, because the arm occludes them in every look.
         """
         near_mask = self._compute_distances(position) <= GRID_PITCH
         return bool(near_mask.any() and self._visible_mask[near_mask].all())

@@ -28,7 +28,7 @@ REASON_UNCERTAIN = "no look is certain of it"
 
 
 class State(Enum):
-    """State of an item; at the end of a run, it is PLACED, REJECTED, SKIPPED, LOST or PHANTOM."""
+    """State of an item; the final states are PLACED, REJECTED, SKIPPED, LOST and PHANTOM."""
 
     SEEN = "seen"
     """The item lies on the table and is not sorted yet."""
@@ -54,7 +54,7 @@ ON_TABLE = (State.SEEN, State.REJECTED)
 
 
 @dataclass(eq=False)
-class Record:
+class ItemRecord:
     """Record of one item.
 
     A look is an image with its detections. A change of the table is an action of the robot that may have
@@ -128,14 +128,9 @@ class Record:
     def target(self) -> Target:
         """The item as the target that skills receive."""
         return Target(
-            self.item,
-            self.label,
-            self.position,
-            self.confidence,
-            self.frame_id,
-            self.change_count,
+            self.item, self.label, self.position, self.confidence, self.frame_id, self.change_count,
             self.stamp,
-        )
+        )  # fmt: skip
 
     @property
     def event(self) -> ItemChanged:
@@ -154,21 +149,21 @@ class Record:
         self.state, self.reason = state, reason
 
     def forget_viewpoints(self) -> None:
-        """Forget the viewpoints of earlier looks: looks at a moved item do not repeat their errors."""
+        """Forget earlier viewpoints, because looks at a moved item do not repeat earlier errors."""
         self.belief.last_label_by_viewpoint.clear()
         self.belief.repeat_count = self.contradiction_count = 0
 
-    def update_position(self, position: Array, std: float, *, is_settled: bool) -> None:
-        """Update the position with a measurement, which replaces earlier measurements after a move.
+    def update_position(self, position: Array, std: float, *, is_unmoved: bool) -> None:
+        """Replace the position by a measurement after a move, else by the inverse-variance weighted mean.
 
         Args:
             position: Measured position `(3,)` [m].
             std: Standard deviation of the random error of the measurement along each axis [m].
-            is_settled: True if the item cannot have moved since its last detection.
+            is_unmoved: True if the item cannot have moved since its last detection.
         """
         if self.distance_to(position) > SAME_POSITION_TOLERANCE:
             self.empty_probe_count = 0
-        if is_settled and math.isfinite(self.standard_error):
+        if is_unmoved and math.isfinite(self.standard_error):
             old_weight, new_weight = self.standard_error**-2, std**-2
             weight = old_weight + new_weight
             self.position = np.asarray((self.position * old_weight + position * new_weight) / weight)
@@ -180,25 +175,25 @@ class Record:
             self.first_position = self.position
         self.belief.miss_probability = 1.0
 
-    def observe(self, observation: Observation, frame: Frame, bias_std: float, *, is_settled: bool) -> None:
-        """Update the position with an observation, and the data of the last detection with its frame.
+    def observe(self, observation: Observation, frame: Frame, bias_std: float, *, is_unmoved: bool) -> None:
+        """Store an observation as the last detection of the item, and update the position.
 
-        `bias_std` is the standard deviation of the systematic error along each axis [m]; `is_settled` is True
+        `bias_std` is the standard deviation of the systematic error along each axis [m]; `is_unmoved` is True
         if the item cannot have moved since its last detection.
         """
-        self.update_position(observation.position, observation.std, is_settled=is_settled)
+        self.update_position(observation.position, observation.std, is_unmoved=is_unmoved)
         self.bias_std, self.confidence = bias_std, observation.detection.confidence
         self.change_count, self.frame_id, self.stamp = frame.change_count, frame.id, frame.stamp
 
-    def merge(self, new: Record) -> None:
-        """Add the evidence and the position of `new`, which is the same object after a move."""
-        self.belief.merge(new.belief)
+    def merge(self, new_item: ItemRecord) -> None:
+        """Add the evidence and the position of `new_item`, which is the same object after a move."""
+        self.belief.merge(new_item.belief)
         self.empty_probe_count = 0
-        self.position, self.standard_error = new.position, new.standard_error
-        self.change_count, self.frame_id, self.stamp = new.change_count, new.frame_id, new.stamp
         # `first_position` stays the position before the move.
-        self.was_moved, self.confidence = True, new.confidence
+        self.position, self.standard_error, self.was_moved = new_item.position, new_item.standard_error, True
+        self.change_count, self.frame_id = new_item.change_count, new_item.frame_id
+        self.stamp, self.confidence = new_item.stamp, new_item.confidence
         if self.state is State.PHANTOM:
-            self.belief.log_odds, self.reason = new.belief.log_odds, ""
+            self.belief.log_odds, self.reason = new_item.belief.log_odds, ""
         if self.state in (State.DROPPED, State.PHANTOM):
             self.state = State.REJECTED if self.reason else State.SEEN

@@ -11,18 +11,18 @@ from executive.ledger.item import (
     REASON_NOT_FOUND,
     REASON_UNCERTAIN,
     REASON_UNTRACKED,
-    Record,
+    ItemRecord,
     State,
 )
 
 MIN_EMPTY_PROBES = 3
-"""Minimum number of descents that touched only the table (`Record.empty_probe_count`) at a phantom."""
+"""Minimum number of descents that touched only the table (`ItemRecord.empty_probe_count`) at a phantom."""
 FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 """Final states of items that exist; other items end as PHANTOM."""
 
 
 def find_final_state(
-    record: Record, certainty: Certainty, *, has_route: bool, is_completed: bool, has_touched_item: bool
+    record: ItemRecord, certainty: Certainty, *, has_route: bool, is_completed: bool, has_touched_item: bool
 ) -> tuple[State, str] | None:
     """Return the final state of an item and the reason, or None if the current state is final.
 
@@ -74,26 +74,26 @@ def find_final_state(
     return State.REJECTED, "the run ended before its turn"
 
 
-def discard_moved_items(records: Collection[Record], dropped: Collection[Record]) -> list[Record]:
+def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[ItemRecord]) -> list[ItemRecord]:
     """Set lost items that a person has moved elsewhere to PHANTOM, and return the phantoms.
 
     A lost item counts as moved if a new item of the same class appeared at an empty position after the last
-    detection of the lost item. A new item must certainly exist, and explains one lost item. An item in
-    `dropped` is never moved by a person, because the tool held the item after its last detection.
+    detection of the lost item. A new item must certainly exist, and replaces one lost item. Dropped items
+    do not count, because the tool held them after their last detection.
     """
-    proved = (record for record in records if record.belief.is_proved and record.state in FINAL_STATES)
-    new_items = [record for record in proved if record.has_appeared]
+    proved_items = (record for record in records if record.belief.is_proved and record.state in FINAL_STATES)
+    new_items = [record for record in proved_items if record.has_appeared]
     phantoms = []
-    for lost in (record for record in records if record.state is State.LOST and record not in dropped):
-        matches = (new for new in new_items if new.label == lost.label and new.first_stamp > lost.stamp)
-        if new := next(matches, None):
-            lost.set_state(State.PHANTOM, f"it is {new.item}")
-            new_items.remove(new)
-            phantoms.append(lost)
+    for lost_item in (record for record in records if record.state is State.LOST and record not in dropped):
+        later_items = (item for item in new_items if item.first_stamp > lost_item.stamp)
+        if new_item := next((item for item in later_items if item.label == lost_item.label), None):
+            lost_item.set_state(State.PHANTOM, f"it is {new_item.item}")
+            new_items.remove(new_item)
+            phantoms.append(lost_item)
     return phantoms
 
 
-def discard_rejected_items(records: Iterable[Record]) -> list[Record]:
+def discard_rejected_items(records: Iterable[ItemRecord]) -> list[ItemRecord]:
     """Set each rejected or skipped item to PHANTOM, and return these items.
 
     The next look adds a new item, without evidence, for each object that is still on the table.
@@ -104,7 +104,7 @@ def discard_rejected_items(records: Iterable[Record]) -> list[Record]:
     return phantoms
 
 
-def count_states(records: Iterable[Record]) -> dict[str, int]:
+def count_states(records: Iterable[ItemRecord]) -> dict[str, int]:
     """Return the number of items by final state; the key `seen` counts all items except phantoms."""
     counts = Counter(record.state for record in records)
     return {

@@ -10,10 +10,10 @@ from executive.errors import Fault
 from executive.events import Emit
 from executive.geometry import Array
 from executive.ledger.belief import Belief
-from executive.ledger.item import Record, State
+from executive.ledger.item import ItemRecord, State
 
 
-class Records:
+class ItemRecords:
     """Records of the items of a run, in the order of the first detection.
 
     Args:
@@ -22,14 +22,14 @@ class Records:
 
     def __init__(self, emit: Emit) -> None:
         self._emit = emit
-        self._records: dict[Item, Record] = {}
+        self._records: dict[Item, ItemRecord] = {}
         self._name_counts: Counter[str] = Counter()
 
-    def __iter__(self) -> Iterator[Record]:
+    def __iter__(self) -> Iterator[ItemRecord]:
         """Return an iterator over all records; records may be added and removed during the iteration."""
         return iter(list(self._records.values()))
 
-    def find(self, item: Item) -> Record:
+    def find(self, item: Item) -> ItemRecord:
         """Return the record of an item.
 
         Raises:
@@ -43,7 +43,7 @@ class Records:
 
     def add(
         self, belief: Belief, position: Array, change_count: int, stamp: float, *, has_appeared: bool
-    ) -> Record:
+    ) -> ItemRecord:
         """Add an item with the name `<class>-<number>` and return its record.
 
         `position` `(3,)` [m], `change_count` and `stamp` [s] are values of the first detection.
@@ -51,30 +51,30 @@ class Records:
         label = belief.first_label
         self._name_counts[label] += 1
         name = f"{label}-{self._name_counts[label]}"
-        record = Record(name, belief, position, change_count, stamp, has_appeared)
+        record = ItemRecord(name, belief, position, change_count, stamp, has_appeared)
         self._records[name] = record
         return record
 
-    def remove(self, record: Record) -> None:
+    def remove(self, record: ItemRecord) -> None:
         """Remove an item that no event has reported yet."""
         del self._records[record.item]
 
-    def emit(self, *records: Record) -> None:
+    def emit(self, *records: ItemRecord) -> None:
         """Emit the current state of each given item as an event."""
         for record in records:
             self._emit(record.event)
 
-    def change_state(self, record: Record, state: State) -> None:
+    def change_state(self, record: ItemRecord, state: State) -> None:
         """Set the state of an item, and emit the item."""
         record.state = state
         self.emit(record)
 
-    def set_placed(self, record: Record, bin_name: str) -> None:
+    def set_placed(self, record: ItemRecord, bin_name: str) -> None:
         """Set the state of an item to PLACED in a bin, and emit the item."""
         record.bin = bin_name
         self.change_state(record, State.PLACED)
 
-    def reject(self, record: Record, reason: str) -> None:
+    def reject(self, record: ItemRecord, reason: str) -> None:
         """Reject an item; a held or dropped item keeps its state until a look shows the item on the table."""
         record.reason = f"{reason}: {record.last_contradiction}" if record.last_contradiction else reason
         is_off_table = record.state in (State.HELD, State.DROPPED)

@@ -7,10 +7,10 @@ from collections.abc import Collection, Iterator, Mapping
 from statistics import median_low
 
 from executive.cell.detection import Detections, Observation
-from executive.ledger.belief import LOG_ODDS_OF_PROOF, Belief
+from executive.ledger.belief import MIN_LOG_ODDS_OF_PROOF, Belief
 from executive.ledger.bin_contents import BinContents
-from executive.ledger.item import Record, State
-from executive.ledger.records import Records
+from executive.ledger.item import ItemRecord, State
+from executive.ledger.records import ItemRecords
 
 
 class Recovery:
@@ -21,12 +21,12 @@ class Recovery:
         bins: Contents of the bins.
     """
 
-    def __init__(self, records: Records, bins: BinContents) -> None:
+    def __init__(self, records: ItemRecords, bins: BinContents) -> None:
         self._records, self._bins = records, bins
         self._counts_by_bin: dict[str, list[Counter[str]]] = defaultdict(list)
         """Number of visible objects of each class, by bin, in each look that shows the whole bin."""
 
-    def mark_as_dropped(self, records: Collection[Record], change_count: int) -> None:
+    def mark_as_dropped(self, records: Collection[ItemRecord], change_count: int) -> None:
         """Set items to DROPPED, so that looks search for them on the table and in the bins.
 
         `change_count` is the number of changes of the table so far.
@@ -58,7 +58,7 @@ class Recovery:
             untracked = (record for record in self._records if record.is_untracked and record.label == label)
             record = next((record for record in untracked if record.state is State.DROPPED), None)
             if record is None:
-                belief = Belief(label, LOG_ODDS_OF_PROOF, is_proved=True)
+                belief = Belief(label, MIN_LOG_ODDS_OF_PROOF, is_proved=True)
                 position = self._bins.bins[bin_name].position
                 record = self._records.add(belief, position, change_count, 0.0, has_appeared=True)
             if bin_name in self._bins.routes.get(label, ()):
@@ -71,14 +71,17 @@ class Recovery:
         """Yield class and bin name of each object in a bin that is not an item of the ledger.
 
         The number of visible objects is the median over the looks. If known items were detected with wrong
-        classes, the objects of permitted classes are the unknown objects.
+        classes, too many objects seem unknown; therefore, objects of permitted classes come first.
         """
-        for bin_name, looks in self._counts_by_bin.items():
-            counts = {label: median_low(look[label] for look in looks) for label in set().union(*looks)}
-            unknown_count = sum(counts.values()) - self._bins.count_objects_in(bin_name, self._records)
-            forbidden = {label for label in counts if bin_name not in self._bins.routes.get(label, ())}
-            for label in sorted(counts, key=lambda label: (label in forbidden, label)):
+        for bin_name, look_counts in self._counts_by_bin.items():
+            labels = set().union(*look_counts)
+            visible_counts = {label: median_low(counts[label] for counts in look_counts) for label in labels}
+            unknown_count = sum(visible_counts.values()) - self._bins.count_objects_in(
+                bin_name, self._records
+            )
+            forbidden_labels = {label for label in labels if bin_name not in self._bins.routes.get(label, ())}
+            for label in sorted(labels, key=lambda label: (label in forbidden_labels, label)):
                 known_count = sum((item.label, item.bin) == (label, bin_name) for item in self._records)
-                count = max(min(counts[label] - known_count, unknown_count), 0)
+                count = max(min(visible_counts[label] - known_count, unknown_count), 0)
                 unknown_count -= count
                 yield from [(label, bin_name)] * count

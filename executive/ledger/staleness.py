@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from executive.geometry import Array
-from executive.ledger.item import Record
+from executive.ledger.item import ItemRecord
 
 
 class Staleness:
@@ -29,7 +29,7 @@ class Staleness:
         """Record that objects within `radius` [m] of `centre` `(3,)` [m] may have been moved."""
         self._changes.append((centre, radius))
 
-    def is_settled(self, record: Record) -> bool:
+    def is_unmoved(self, record: ItemRecord) -> bool:
         """Return True if no change after the last detection of an item may have moved the item."""
         return self.is_unchanged(record.position, record.change_count)
 

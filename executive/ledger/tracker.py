@@ -21,9 +21,9 @@ from executive.ledger import outcomes
 from executive.ledger.bin_contents import BinContents, find_probable_bin
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
-from executive.ledger.item import ON_TABLE, Record, State
+from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
-from executive.ledger.records import Records
+from executive.ledger.records import ItemRecords
 from executive.ledger.recovery import Recovery
 from executive.ledger.staleness import Staleness
 
@@ -52,7 +52,7 @@ class Tracker:
         labels_with_unique_height: Collection[str] = (),
     ) -> None:  # fmt: skip
         self._config, self._routes, self._emit = config, routes, emit
-        self._records = Records(emit)
+        self._records = ItemRecords(emit)
         self._certainty = Certainty(config, labels_with_unique_height)
         self._bins = BinContents(config, bins, routes)
         self._coverage, self._staleness = Coverage(table), Staleness()
@@ -63,7 +63,7 @@ class Tracker:
         self.assumption_reasons: list[str] = []
 
     @property
-    def records(self) -> Sequence[Record]:
+    def records(self) -> Sequence[ItemRecord]:
         """All items, in the order of the first detection."""
         return list(self._records)
 
@@ -76,7 +76,7 @@ class Tracker:
         """Update all items with the detections in one frame, and return the targets."""
         frame = detections.frame
         self.unknown_labels |= Counter(detection.label for detection in detections.unknown)
-        # A reason is stored once, although the numbers after its colon differ between frames.
+        # The text before the colon identifies a reason; the numbers after the colon differ between frames.
         reason = detections.error_rates.assumption_reason
         reason_start = reason.partition(":")[0]
         if reason and not any(known.startswith(reason_start) for known in self.assumption_reasons):
@@ -90,33 +90,33 @@ class Tracker:
 
     def find_targets(self) -> Sequence[Target]:
         """Return a target for each item in the state SEEN that cannot have moved since its last detection."""
-        settled = [record for record in self.records if self._staleness.is_settled(record)]
-        return [record.target for record in settled if record.state is State.SEEN]
+        seen_items = [record for record in self.records if record.state is State.SEEN]
+        return [record.target for record in seen_items if self._staleness.is_unmoved(record)]
 
     def find_objects_on_table(self) -> Sequence[Target]:
         """Return all items that lie on the table with a probability of at least 0.5."""
         on_table = [record for record in self.records if record.state in ON_TABLE]
-        probable = [record for record in on_table if record.belief.existence_probability >= 0.5]
-        return [record.target for record in probable if not self._certainty.is_position_empty(record)]
+        probable_items = [record for record in on_table if record.belief.existence_probability >= 0.5]
+        return [item.target for item in probable_items if not self._certainty.is_position_empty(item)]
 
     def find_uncertain_items(self) -> Sequence[Item]:
-        """Return the items to be sorted in the workspace that another look may confirm or refute."""
+        """Return the unsorted items in the workspace that are uncertain, or that may have been moved."""
         on_table = [record for record in self.records if self._certainty.may_be_on_table(record)]
         in_workspace = [record for record in on_table if self._coverage.is_in_workspace(record.position)]
-        settled = [record for record in in_workspace if self._staleness.is_settled(record)]
-        certain = [record for record in settled if self._certainty.is_certain(record)]
-        return [record.item for record in in_workspace if record not in certain]
+        unmoved_items = [record for record in in_workspace if self._staleness.is_unmoved(record)]
+        certain_items = [record for record in unmoved_items if self._certainty.is_certain(record)]
+        return [record.item for record in in_workspace if record not in certain_items]
 
     def find_held_item(self) -> Item | None:
         """Return the item in the tool, or None."""
         return next((record.item for record in self.records if record.state is State.HELD), None)
 
     def is_current(self, frame: Frame) -> bool:
-        """Return True if the robot cannot have moved all objects since the capture of a frame."""
+        """Return False if the robot may have moved all objects on the table since the capture of a frame."""
         return self._staleness.is_table_unchanged(frame.change_count)
 
     def is_fresh(self, target: Target) -> bool:
-        """Return True if the robot cannot have moved a target since its last detection."""
+        """Return False if the robot may have moved a target since its last detection."""
         return self._staleness.is_unchanged(target.position, target.change_count)
 
     def is_open(self, item: Item) -> bool:
@@ -133,13 +133,13 @@ class Tracker:
 
         `label` is the class of the counted objects; None: all classes with a route.
         """
-        return self._coverage.max_object_probability <= self._config.max_miss_probability and not any(
-            # An item without a confident detection counts as an object of every class.
-            ((record.label in self._routes and label in (None, record.label)) or not record.belief.look_count)
-            and self._certainty.may_be_on_table(record)
-            and self._coverage.is_visible(record.position)
-            for record in self.records
-        )
+        if self._coverage.max_object_probability > self._config.max_miss_probability:
+            return False
+        on_table = [record for record in self.records if self._certainty.may_be_on_table(record)]
+        visible_items = [record for record in on_table if self._coverage.is_visible(record.position)]
+        labels = [routed_label for routed_label in self._routes if label in (None, routed_label)]
+        # An item without a confident detection counts as an object of every class.
+        return not any(item.label in labels or not item.belief.look_count for item in visible_items)
 
     def get_label(self, item: Item) -> str:
         """Return the most probable class of an item."""
@@ -154,10 +154,10 @@ class Tracker:
         return self._bins.count_objects_in(bin, self.records)
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
-        """Record a touch, which proves that an item exists; return False if the touch contradicts its class.
+        """Record a touch, and return False if the touch contradicts the class of the item.
 
-        An item that has been touched at the height of its class may fall over later, so that a touch at
-        another height is no contradiction. `may_miss_top` is True if the tool may have missed the top.
+        A touch proves that the item exists. After a touch at the height of the class, a touch at another
+        height is no contradiction: the item may have fallen over. `may_miss_top`: see `Ledger`.
         """
         record = self._records.find(item)
         record.belief.is_proved, record.had_contact, record.empty_probe_count = True, True, 0
@@ -219,7 +219,7 @@ class Tracker:
     def record_put_down(self, item: Item, position: Array) -> None:
         """Record that an item was put down at `position` `(3,)` [m]; a look must confirm the position."""
         record = self._records.find(item)
-        record.update_position(position, self._config.gate, is_settled=False)
+        record.update_position(position, self._config.gate, is_unmoved=False)
         record.change_count = self.change_count
         self._records.change_state(record, State.REJECTED if record.reason else State.SEEN)
         self.invalidate_positions()
@@ -242,9 +242,9 @@ class Tracker:
 
     def mark_unseen_as_dropped(self) -> None:
         """Set each item on the table that no look has detected since `lose_track` to DROPPED."""
-        seen = [record for record in self.records if record.state is State.SEEN]
-        probable = [record for record in seen if record.belief.existence_probability >= 0.5]
-        self._mark_as_dropped([record for record in probable if not self._staleness.is_settled(record)])
+        seen_items = [record for record in self.records if record.state is State.SEEN]
+        probable_items = [record for record in seen_items if record.belief.existence_probability >= 0.5]
+        self._mark_as_dropped([item for item in probable_items if not self._staleness.is_unmoved(item)])
 
     def record_bin_contents(self) -> None:
         """Record an item for each unknown object in a bin, according to the looks since `lose_track`."""
@@ -284,16 +284,17 @@ class Tracker:
         """Update the items on the table and the dropped items with the observations of a look."""
         bias_std = detections.error_rates.bias
         bin_names = {entry: self._bins.find_bin_name(entry, bias_std, self.records) for entry in observations}
+        observations_on_table = [entry for entry, bin_name in bin_names.items() if bin_name is None]
         update = LookUpdate(self._config, self._records, self._coverage, self._staleness, detections)
-        for record in update.apply([entry for entry, bin_name in bin_names.items() if bin_name is None]):
-            self._certainty.reject_if_uncertain(record, is_settled=self._staleness.is_settled(record))
+        for record in update.apply(observations_on_table):
+            self._certainty.reject_if_uncertain(record, is_unmoved=self._staleness.is_unmoved(record))
             self._records.emit(record)
         if detections.view == "full" and self._recovery is not None:
             self._recovery.add_look(detections, bin_names)
         elif detections.view == "full":
             self._records.emit(*self._bins.place_dropped_items(detections, bin_names, self.records))
 
-    def _mark_as_dropped(self, records: Collection[Record]) -> None:
+    def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""
         assert self._recovery is not None, "items are marked as dropped after `lose_track`"
         self._recovery.mark_as_dropped(records, self.change_count)

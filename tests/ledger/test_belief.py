@@ -14,7 +14,7 @@ from executive.cell.error_rates import ErrorRates
 from executive.ledger.association import compute_association_distance
 from executive.ledger.belief import Belief
 from executive.ledger.bin_contents import update_bin_log_odds
-from executive.ledger.item import Record
+from executive.ledger.item import ItemRecord
 
 GOOD = ErrorRates(threshold=0.5, miss_rate=0.02, confusion_rate=0.0025, false_detections=0.02, jitter=0.7)
 BAD = ErrorRates(threshold=0.5, miss_rate=0.2, confusion_rate=0.1, false_detections=0.5, jitter=5.0)
@@ -25,8 +25,8 @@ def belief(log_odds: float = 0.0) -> Belief:
     return Belief("cube", log_odds)
 
 
-def record() -> Record:
-    return Record("cube-1", belief(), HERE, 0, 0.0, False)
+def record() -> ItemRecord:
+    return ItemRecord("cube-1", belief(), HERE, 0, 0.0, False)
 
 
 def test_one_vote_of_a_good_detector_is_enough_for_a_class_and_three_of_a_bad_one() -> None:
@@ -104,10 +104,10 @@ def test_what_the_tool_has_met_exists_however_often_it_is_overlooked() -> None:
 def test_agreeing_looks_reduce_the_standard_error_and_a_push_resets_it() -> None:
     item = record()
     for offset in (-0.01, 0.01, -0.01, 0.01):
-        item.update_position(HERE + np.array([offset, 0, 0]), 0.013, is_settled=True)
+        item.update_position(HERE + np.array([offset, 0, 0]), 0.013, is_unmoved=True)
     assert item.position == pytest.approx(HERE)
     assert item.standard_error == pytest.approx(0.013 / 2)
-    item.update_position(HERE + np.array([0.05, 0, 0]), 0.013, is_settled=False)
+    item.update_position(HERE + np.array([0.05, 0, 0]), 0.013, is_unmoved=False)
     assert item.position[0] == pytest.approx(0.55)
     assert item.standard_error == 0.013
     assert item.first_position == pytest.approx(HERE), "where it was before it was moved"
@@ -115,8 +115,8 @@ def test_agreeing_looks_reduce_the_standard_error_and_a_push_resets_it() -> None
 
 def test_measurements_count_by_how_good_they_are() -> None:
     item = record()
-    item.update_position(HERE, 0.001, is_settled=True)
-    item.update_position(HERE + np.array([0.011, 0, 0]), 0.0031623, is_settled=True)
+    item.update_position(HERE, 0.001, is_unmoved=True)
+    item.update_position(HERE + np.array([0.011, 0, 0]), 0.0031623, is_unmoved=True)
     assert item.position[0] - HERE[0] == pytest.approx(0.001, rel=0.02)
 
 

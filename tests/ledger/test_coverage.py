@@ -13,9 +13,9 @@ from executive.cell.detection import Detections
 from executive.cell.error_rates import ErrorRates
 from executive.ledger.coverage import (
     MIN_MISS_PROBABILITY,
-    PRIOR_INSIDE,
-    PRIOR_OUTSIDE,
+    PRIOR_IN_WORKSPACE,
     PRIOR_OUTSIDE_AFTER_CHANGE,
+    PRIOR_OUTSIDE_WORKSPACE,
     Coverage,
 )
 
@@ -40,12 +40,12 @@ def test_every_look_leaves_as_much_doubt_as_its_detector_misses(coverage: Covera
     for looks in range(1, 5):
         coverage.update(look())
         assert coverage.find_miss_probability(MIDDLE) == pytest.approx(0.2**looks)
-        assert coverage.max_object_probability == pytest.approx(PRIOR_INSIDE * 0.2**looks)
+        assert coverage.max_object_probability == pytest.approx(PRIOR_IN_WORKSPACE * 0.2**looks)
 
 
 def test_before_anything_was_dropped_hardly_anything_lies_beside_the_workspace(coverage: Coverage) -> None:
     beside = np.array([0.53, 0.40, 0.025])
-    assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE
+    assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE_WORKSPACE
     coverage.reset_near(MIDDLE, math.inf, change_number=1)
     assert coverage.find_miss_probability(beside) == PRIOR_OUTSIDE_AFTER_CHANGE
 
@@ -63,7 +63,7 @@ def test_what_the_arm_hides_is_not_believed_empty(coverage: Coverage) -> None:
         coverage.update(look(hidden=slice(320, 640)))
     sides = [coverage.find_miss_probability(np.array([0.53, y, 0.025])) for y in (-0.15, 0.15)]
     assert sorted(sides) == [pytest.approx(0.2**5), 1.0]
-    assert coverage.max_object_probability == PRIOR_INSIDE
+    assert coverage.max_object_probability == PRIOR_IN_WORKSPACE
 
 
 def test_a_place_is_searched_only_if_all_of_an_object_there_would_show(coverage: Coverage) -> None:
@@ -116,6 +116,6 @@ def test_a_place_counts_if_all_places_around_it_do(coverage: Coverage, y: float,
 def test_a_place_beyond_the_table_or_near_something_unsure_does_not_count(coverage: Coverage) -> None:
     coverage.update(look(), [MIDDLE])
     assert not coverage.is_visible(np.array([0.53, 2.0, 0.025]))
-    assert coverage.find_miss_probability(np.array([0.53, 2.0, 0.025])) == PRIOR_OUTSIDE
+    assert coverage.find_miss_probability(np.array([0.53, 2.0, 0.025])) == PRIOR_OUTSIDE_WORKSPACE
     missed = [coverage.find_miss_probability(np.add(MIDDLE, (x, 0, 0))) for x in (0.0, 0.04)]
     assert missed == [1.0, pytest.approx(0.2)]

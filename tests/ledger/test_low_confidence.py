@@ -6,7 +6,7 @@ import pytest
 from ledger_bench import Bench
 
 from executive.events import FrameSearched, ItemChanged
-from executive.ledger.certainty import UNCERTAIN_LOOKS_TO_REJECT
+from executive.ledger.certainty import MIN_UNCERTAIN_LOOKS_TO_REJECT
 
 THERE = ("cube", 0.5, 0.0)
 UNSURE = ("rejected", "no look is certain of it")
@@ -34,10 +34,10 @@ def test_a_table_with_something_in_doubt_is_not_believed_to_be_empty(bench: Benc
         (1, 2, False, PHANTOM),
         (1, 1, True, PHANTOM),
         (1, 0, True, UNSURE),
-        (UNCERTAIN_LOOKS_TO_REJECT - 1, 0, False, ("seen", "")),
-        (UNCERTAIN_LOOKS_TO_REJECT, 0, False, UNSURE),
-        (UNCERTAIN_LOOKS_TO_REJECT, 0, True, UNSURE),
-        (UNCERTAIN_LOOKS_TO_REJECT, 3, True, PHANTOM),
+        (MIN_UNCERTAIN_LOOKS_TO_REJECT - 1, 0, False, ("seen", "")),
+        (MIN_UNCERTAIN_LOOKS_TO_REJECT, 0, False, UNSURE),
+        (MIN_UNCERTAIN_LOOKS_TO_REJECT, 0, True, UNSURE),
+        (MIN_UNCERTAIN_LOOKS_TO_REJECT, 3, True, PHANTOM),
     ],
 )
 def test_what_no_look_is_sure_of_is_given_up_and_what_looks_miss_was_nothing(
@@ -52,7 +52,7 @@ def test_what_no_look_is_sure_of_is_given_up_and_what_looks_miss_was_nothing(
 
 
 def test_given_up_too_early_it_is_open_again_when_a_look_is_sure(bench: Bench) -> None:
-    for _ in range(UNCERTAIN_LOOKS_TO_REJECT):
+    for _ in range(MIN_UNCERTAIN_LOOKS_TO_REJECT):
         bench.look(unsure=[THERE])
     bench.look(THERE)
     assert bench.states() == {"cube-1": ("seen", "")}
@@ -98,7 +98,7 @@ def test_a_look_that_is_unsure_of_a_known_item_does_not_miss_it(bench: Bench) ->
 def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
     bench.look(THERE)
     bench.ledger.record_miss("cube-1")
-    for _ in range(UNCERTAIN_LOOKS_TO_REJECT):
+    for _ in range(MIN_UNCERTAIN_LOOKS_TO_REJECT):
         bench.look(unsure=[THERE])
     bench.look(THERE)
     assert bench.states() == {"cube-1": UNSURE}
@@ -107,7 +107,7 @@ def test_given_up_after_a_failed_grasp_it_stays_so(bench: Bench) -> None:
 def test_a_known_item_that_waits_its_turn_is_not_rejected_for_uncertain_looks(bench: Bench) -> None:
     for _ in range(3):
         bench.look(THERE, ("cube", 0.55, 0.0))
-    for _ in range(UNCERTAIN_LOOKS_TO_REJECT + 5):
+    for _ in range(MIN_UNCERTAIN_LOOKS_TO_REJECT + 5):
         bench.look(("cube", 0.55, 0.0), unsure=[THERE])
     assert bench.ledger.is_certain("cube-1")
     bench.ledger.record_grasp("cube-2")  # its neighbour

@@ -9,7 +9,7 @@ from executive.cell.protocols import Routes
 from executive.cells.audit import FinalObject, audit_objects
 from executive.cells.sim.world import World
 from executive.geometry import Array
-from executive.ledger.item import Record
+from executive.ledger.item import ItemRecord
 
 MIN_CENTRE_HEIGHT = -0.05
 """Minimum height of the centre of an object that is still on the table [m]."""
@@ -18,7 +18,7 @@ MIN_CENTRE_HEIGHT = -0.05
 def audit_bodies(
     world: World,
     rest_positions: Mapping[int, Sequence[Array]],
-    records: Sequence[Record],
+    records: Sequence[ItemRecord],
     bins: Mapping[str, Bin],
     routes: Routes,
     max_distance: float,
