@@ -23,7 +23,7 @@ class Solutions(NamedTuple):
     """Inverse-kinematics solutions of one tool pose in `N` branches.
 
     Attributes:
-        qs: Joint positions `(N, n)` [rad], not limited to the joint range; NaN in the row of a branch without
+        qs: Joint positions `(N, n)` [rad], even outside the joint range; NaN in the row of a branch without
             a solution.
         branches: Branch of each row.
     """
@@ -33,9 +33,9 @@ class Solutions(NamedTuple):
 
 
 class Kinematics(Protocol):
-    """Kinematics of an arm with `n` joints, whose base is the world frame, and of the tool on its flange.
+    """Kinematics of an arm with `n` joints, and of the tool on its flange.
 
-    The tool axis is the axis of the last joint.
+    The base frame of the arm is the world frame. The tool axis is the axis of the last joint.
     """
 
     @property
@@ -49,31 +49,31 @@ class Kinematics(Protocol):
         """Return the flange pose `X_WF` at `q` `(n,)` [rad]."""
 
     def compute_joint_frames(self, q: ArrayLike) -> tuple[Pose, ...]:
-        """Return the frame of each joint at `q` `(n,)` [rad]; its origin is the centre of the joint."""
+        """Return the frame of each joint at `q` `(n,)` [rad]; each origin is the centre of its joint."""
 
-    def compute_tips_and_axes(self, qs: Array) -> tuple[Array, Array]:
+    def compute_tcps_and_axes(self, qs: Array) -> tuple[Array, Array]:
         """Return tool centre points `(N, 3)` [m] and tool axes `(N, 3)` at joint positions `(N, n)` [rad]."""
 
     def find_branch(self, q: ArrayLike) -> BranchKey:
         """Return the branch of the joint positions `q` `(n,)` [rad]."""
 
     def solve(self, X_WT: Pose, branch: BranchKey) -> Array:
-        """Return the joint positions `(n,)` [rad] of a tool pose in one branch, not limited to the range.
+        """Return the joint positions `(n,)` [rad] of a tool pose in one branch, even outside `joint_range`.
 
         Raises:
             Unreachable: The pose is too near to the arm or too far from the arm.
         """
 
-    def solve_all(self, X_WT: Pose, q_near: ArrayLike, spacing: float) -> Solutions:
+    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
         """Return the solutions of a tool pose in all branches.
 
         A redundant arm has infinitely many branches; the function samples the redundancy angle evenly. Calls
-        with the same `q_near` and `spacing` return the same branches in the same order.
+        with equal `q_seed` and `angle_step` return equal branches in equal order.
 
         Args:
             X_WT: Tool pose.
-            q_near: Joint positions `(n,)` [rad] whose redundancy angle is one of the samples.
-            spacing: Distance between the samples of the redundancy angle [rad], unused without redundancy.
+            q_seed: Joint positions `(n,)` [rad] whose redundancy angle is one of the samples.
+            angle_step: Distance between the samples of the redundancy angle [rad], unused without redundancy.
 
         Raises:
             Unreachable: The pose is too near to the arm or too far from the arm.

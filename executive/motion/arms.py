@@ -13,7 +13,7 @@ from executive.motion.limits import JointLimits, JointRange
 from executive.motion.planner import CollisionCheck, Planner
 
 KinematicsFactory = Callable[[float, JointRange, float | None], Kinematics]
-"""Function that builds kinematics from tool length [m], joint range, and minimum distance of links [m]."""
+"""Function of tool length [m], joint range, and minimum distance between links [m] or None."""
 
 ARMS_BY_URDF: Mapping[str, tuple[int, KinematicsFactory]] = {
     "kuka_iiwa/model.urdf": (IIWA14_JOINT_COUNT, Iiwa14)
@@ -22,7 +22,7 @@ ARMS_BY_URDF: Mapping[str, tuple[int, KinematicsFactory]] = {
 
 
 def find_arm_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield a key and a message if the arm of a cell file has no kinematics or another number of joints."""
+    """Yield the key and the message of each error: unsupported arm, or wrong number of joints."""
     if config.arm.urdf not in ARMS_BY_URDF:
         yield (
             ("arm", "urdf"),
@@ -44,10 +44,12 @@ def build_kinematics(config: CellConfig, min_link_distance: float | None = None)
 
     `min_link_distance` is the minimum distance between links of the arm [m], or None for no minimum.
     """
-    _, build = ARMS_BY_URDF[config.arm.urdf]
-    return build(config.tool.length, JointLimits.from_config(config.arm.limits).position, min_link_distance)
+    _, factory = ARMS_BY_URDF[config.arm.urdf]
+    joint_range = JointLimits.from_config(config.arm.limits).position
+    return factory(config.tool.length, joint_range, min_link_distance)
 
 
-def build_planner(config: CellConfig, check: CollisionCheck | None = None) -> Planner:
-    """Return the planner for the arm of a cell file; `check` is an additional collision check, or None."""
-    return Planner(config, build_kinematics(config, config.motion.margin + SAMPLING_MARGIN), check)
+def build_planner(config: CellConfig, check_collision: CollisionCheck | None = None) -> Planner:
+    """Return the planner for the arm of a cell file, optionally with an additional collision check."""
+    kinematics = build_kinematics(config, config.motion.margin + SAMPLING_MARGIN)
+    return Planner(config, kinematics, check_collision)

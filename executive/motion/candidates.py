@@ -16,12 +16,12 @@ from executive.motion.limits import JointLimits, compute_min_time
 from executive.motion.state import JointState
 
 MIN_JOINT_DIFFERENCE = 0.2
-"""Difference that two candidates exceed in at least one joint [rad]."""
+"""Minimum difference between two candidates in the joint that differs most [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A candidate for the end of a motion, which consists of a free part and a straight arrival.
+    """A candidate for the end of a motion that consists of a free part and an optional straight arrival.
 
     Attributes:
         min_duration: Minimum duration of the free part [s].
@@ -42,26 +42,28 @@ class Candidate:
 
 
 def find_candidates(
-    kinematics: Kinematics, limits: JointLimits, start: JointState, goal: Goal, length: float
+    kinematics: Kinematics, limits: JointLimits, start: JointState, goal: Goal, arrival_length: float
 ) -> Iterator[Candidate]:
     """Yield candidates for motions from `start` to a goal, in the order of their minimum durations.
 
-    The last `length` [m] of each motion is straight.
+    The last `arrival_length` [m] of each motion is straight; 0: no straight arrival.
 
     Raises:
         Unreachable: No joint configuration reaches the goal.
     """
-    pairs = find_configuration_pairs(kinematics, goal, length, start.q)
-    durations = compute_min_time(pairs.high - start.q, limits)
-    earlier: list[Array] = []
+    pairs = find_configuration_pairs(kinematics, goal, arrival_length, start.q)
+    durations = compute_min_time(pairs.upper_qs - start.q, limits)
+    previous_qs: list[Array] = []
     for index in np.argsort(durations, kind="stable"):
-        low, branch = pairs.low[index], pairs.branches[index]
-        if any(np.max(np.abs(low - other)) <= MIN_JOINT_DIFFERENCE for other in earlier):
+        goal_q, branch = pairs.lower_qs[index], pairs.branches[index]
+        if any(np.max(np.abs(goal_q - q)) <= MIN_JOINT_DIFFERENCE for q in previous_qs):
             continue
-        earlier.append(low)
-        arrival, entry = None, JointState.at_rest(low)
-        if length > 0:
-            waypoints = solve_vertical_waypoints(kinematics, low, length, WAYPOINT_COUNT, branch)[::-1]
-            arrival = CartesianLine(waypoints, length, limits, goal.guarded_speed, starts_in_motion=True)
+        previous_qs.append(goal_q)
+        arrival, entry = None, JointState.at_rest(goal_q)
+        if arrival_length > 0:
+            waypoints = solve_vertical_waypoints(kinematics, goal_q, arrival_length, WAYPOINT_COUNT, branch)
+            arrival = CartesianLine(
+                waypoints[::-1], arrival_length, limits, goal.guarded_speed, starts_in_motion=True
+            )
             entry = arrival.state_at(0.0)
         yield Candidate(float(durations[index]), entry, arrival, branch)

@@ -2,7 +2,7 @@
 
 The joint path `q(s)` is a spline through inverse-kinematics solutions; its parameter `s` is the distance that
 the tool has moved. `q_s`, `q_ss` and `q_sss` are the derivatives of `q` by `s`. With speed `v`, acceleration
-`a` and jerk `j` of the tool, the chain rule gives
+`a` and jerk `j` of the tool, the chain rule gives velocity, acceleration and jerk of the joints:
 
     q' = q_s v,  q'' = q_s a + q_ss v²,  q''' = q_s j + 3 q_ss v a + q_sss v³.
 
@@ -26,27 +26,28 @@ WAYPOINT_COUNT = 4
 """Number of inverse-kinematics solutions along a line."""
 MAX_CURVATURE_FRACTION = 0.5
 """Maximum fraction of a joint's acceleration and jerk limits that the terms with q_ss and q_sss may use."""
-_LIMIT_FRACTIONS = np.linspace(0.0, 1.0, 33)  # fractions of the length at which joint limits are evaluated
-_EPSILON = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for a joint that does not move
+_CHECKED_FRACTIONS = np.linspace(0.0, 1.0, 33)  # fractions of the length at which joint limits are evaluated
+_MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for a joint that does not move
 
 
 class CartesianLine:
     """A straight motion of the tool; implements `executive.motion.state.MotionPiece`.
 
-    At an end where the tool moves, its speed is the largest from which it can stop within the line.
+    If the tool moves at an end of the line, its speed there is the maximum speed from which the tool can stop
+    within the line.
 
     Args:
         waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line, `N` > 3.
         length: Length of the line [m].
         limits: Joint limits.
-        speed: Maximum speed of the tool [m/s].
-        acceleration: Maximum acceleration of the tool [m/s²].
-        starts_in_motion: True if the tool moves at the start.
-        ends_in_motion: True if the tool moves at the end; at most one of these two arguments may be True.
+        max_speed: Maximum speed of the tool [m/s].
+        max_acceleration: Maximum acceleration of the tool [m/s²].
+        starts_in_motion: True if the tool moves at the start; excludes `ends_in_motion`.
+        ends_in_motion: True if the tool moves at the end; excludes `starts_in_motion`.
 
     Attributes:
         duration: Duration [s].
-        acceleration: Maximum acceleration of the tool [m/s²], also limited by the joints.
+        max_acceleration: Maximum acceleration of the tool [m/s²], also limited by the joints.
     """
 
     def __init__(
@@ -54,22 +55,22 @@ class CartesianLine:
         waypoints: Array,
         length: float,
         limits: JointLimits,
-        speed: float = math.inf,
-        acceleration: float = math.inf,
+        max_speed: float = math.inf,
+        max_acceleration: float = math.inf,
         *,
         starts_in_motion: bool = False,
         ends_in_motion: bool = False,
     ) -> None:
         self._spline = CubicSpline(np.linspace(0.0, length, len(waypoints)), waypoints)
         self._derivatives = [self._spline.derivative(order) for order in (1, 2)]
-        max_speed, joint_acceleration, jerk = self._compute_tool_limits(limits, speed, length)
-        self.acceleration = acceleration = min(acceleration, joint_acceleration)
-        end_speed = _find_max_end_speed(length, max_speed, acceleration, jerk)
+        speed, acceleration, jerk = self._compute_tool_limits(limits, max_speed, length)
+        self.max_acceleration = acceleration = min(max_acceleration, acceleration)
+        end_speed = _find_max_end_speed(length, speed, acceleration, jerk)
         inputs = InputParameter(1)
         inputs.current_position, inputs.target_position = [0.0], [length]
         inputs.current_velocity = [end_speed if starts_in_motion else 0.0]
         inputs.target_velocity = [end_speed if ends_in_motion else 0.0]
-        inputs.max_velocity, inputs.max_acceleration, inputs.max_jerk = [max_speed], [acceleration], [jerk]
+        inputs.max_velocity, inputs.max_acceleration, inputs.max_jerk = [speed], [acceleration], [jerk]
         self._profile = Profile(1)
         Ruckig(1).calculate(inputs, self._profile)
         self.duration: float = self._profile.duration
@@ -88,40 +89,46 @@ class CartesianLine:
         return JointState(self._spline(distance), q_s * speed, q_s * acceleration + q_ss * speed**2)
 
     def _compute_tool_limits(
-        self, limits: JointLimits, speed: float, length: float
+        self, limits: JointLimits, max_speed: float, length: float
     ) -> tuple[float, float, float]:
-        """Return the maximum speed [m/s], acceleration [m/s²] and jerk [m/s³] of the tool on the line."""
+        """Return the maximum speed [m/s], acceleration [m/s²] and jerk [m/s³] of the tool on the line.
+
+        The chain rule in the module docstring is solved for `v`, then for `a`, then for `j`.
+        """
         q_s, q_ss, q_sss = (
-            np.abs(self._spline(_LIMIT_FRACTIONS * length, order)).max(axis=0) for order in (1, 2, 3)
+            np.abs(self._spline(_CHECKED_FRACTIONS * length, order)).max(axis=0) for order in (1, 2, 3)
         )
-        speeds = (
-            limits.velocity / (q_s + _EPSILON),
+        max_speeds = (
+            limits.velocity / (q_s + _MIN_DIVISOR),
             # Speed that the tool reaches with its maximum acceleration on the whole line.
-            math.sqrt(2 * length * np.min(limits.acceleration / (q_s + _EPSILON))),
-            np.sqrt(MAX_CURVATURE_FRACTION * limits.acceleration / (q_ss + _EPSILON)),
-            np.cbrt(MAX_CURVATURE_FRACTION / 2 * limits.jerk / (q_sss + _EPSILON)),
+            math.sqrt(2 * length * np.min(limits.acceleration / (q_s + _MIN_DIVISOR))),
+            np.sqrt(MAX_CURVATURE_FRACTION * limits.acceleration / (q_ss + _MIN_DIVISOR)),
+            np.cbrt(MAX_CURVATURE_FRACTION / 2 * limits.jerk / (q_sss + _MIN_DIVISOR)),
         )
-        max_speed = min(speed, *(float(np.min(values)) for values in speeds))
-        accelerations = (
-            (limits.acceleration - q_ss * max_speed**2) / (q_s + _EPSILON),
-            MAX_CURVATURE_FRACTION / 2 * limits.jerk / (3 * q_ss * max_speed + _EPSILON),
+        speed = min(max_speed, *(float(np.min(values)) for values in max_speeds))
+        max_accelerations = (
+            (limits.acceleration - q_ss * speed**2) / (q_s + _MIN_DIVISOR),
+            MAX_CURVATURE_FRACTION / 2 * limits.jerk / (3 * q_ss * speed + _MIN_DIVISOR),
         )
-        acceleration = float(np.min(accelerations))
-        jerks = limits.jerk - 3 * q_ss * max_speed * acceleration - q_sss * max_speed**3
-        return max_speed, acceleration, float(np.min(jerks / (q_s + _EPSILON)))
+        acceleration = float(np.min(max_accelerations))
+        remaining_jerks = limits.jerk - 3 * q_ss * speed * acceleration - q_sss * speed**3
+        return speed, acceleration, float(np.min(remaining_jerks / (q_s + _MIN_DIVISOR)))
 
 
 def _find_max_end_speed(length: float, max_speed: float, acceleration: float, jerk: float) -> float:
     """Return the largest speed [m/s], up to `max_speed`, from which the tool can stop within `length` [m]."""
 
     def compute_stopping_distance(speed: float) -> float:
-        ramp = speed / acceleration + acceleration / jerk
-        return speed / 2 * (ramp if speed >= acceleration**2 / jerk else 2 * math.sqrt(speed / jerk))
+        if speed >= acceleration**2 / jerk:
+            stopping_time = speed / acceleration + acceleration / jerk
+        else:  # The deceleration does not reach its maximum.
+            stopping_time = 2 * math.sqrt(speed / jerk)
+        return speed / 2 * stopping_time
 
-    low, high = 0.0, max_speed
-    if compute_stopping_distance(high) <= length:
-        return high
+    lower, upper = 0.0, max_speed
+    if compute_stopping_distance(upper) <= length:
+        return upper
     for _ in range(40):
-        middle = (low + high) / 2
-        low, high = (middle, high) if compute_stopping_distance(middle) <= length else (low, middle)
-    return low
+        middle = (lower + upper) / 2
+        lower, upper = (middle, upper) if compute_stopping_distance(middle) <= length else (lower, middle)
+    return lower

@@ -1,10 +1,10 @@
 """Distance model of the cell for planning: obstacles as upright prisms, tool and load as discs.
 
 The model gives the distances between all states of a motion and all obstacles in a few array operations. The
-planner can check the found motion in a more exact model.
+planner can check the planned motion in a more exact model.
 
-The workspace counts as an obstacle, because undetected objects may lie in it. Near the two ends of a motion,
-where detectors have found all objects, only known obstacles count.
+The workspace counts as an obstacle, because undetected objects may lie in the workspace. Near the two ends of
+a motion, detectors have found all objects; only known obstacles count there.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ TILT_DISTANCE = 0.1
 """Factor that converts the cosine of the tool's tilt to an equivalent distance [m]."""
 MAX_EXTRA_TILT = 0.003
 """Maximum tilt of the tool beyond its limit during a motion, as an equivalent distance [m]."""
-MIN_COSINE_DOWN = 0.5
+MIN_COSINE_UNLOADED = 0.5
 """Minimum cosine between the tool axis and straight down without a load."""
-MIN_COSINE_DOWN_LOADED = 0.8
+MIN_COSINE_LOADED = 0.8
 """Minimum cosine between the tool axis and straight down with a load."""
 
 
@@ -60,32 +60,32 @@ def make_tool_discs(config: CellConfig, load: Load | None) -> Discs:
     """Return the discs of the tool and its load."""
     if load is None:
         radii = np.array([config.tool.cup_radius, TOOL_RADIUS])
-        return Discs(np.array([0.0, -NECK_LENGTH]), radii, MIN_COSINE_DOWN)
+        return Discs(np.array([0.0, -NECK_LENGTH]), radii, MIN_COSINE_UNLOADED)
     load_radius = load.kind.radius + load.kind.ring + POSITION_TOLERANCE
     # The load has a disc at its bottom and one at its top, because the tool may tilt.
     offsets = np.array([load.kind.height, 0.0, -NECK_LENGTH])
-    return Discs(offsets, np.array([load_radius, load_radius, TOOL_RADIUS]), MIN_COSINE_DOWN_LOADED)
+    return Discs(offsets, np.array([load_radius, load_radius, TOOL_RADIUS]), MIN_COSINE_LOADED)
 
 
 class Prisms(NamedTuple):
-    """`K` upright obstacles: the base of each is a rectangle or a point, enlarged by a radius.
+    """`K` upright obstacles; each base is a rectangle or a point, enlarged by a radius.
 
     Attributes:
-        low: Corners of the rectangles with the smallest coordinates `(K, 2)` [m].
-        high: Corners of the rectangles with the largest coordinates `(K, 2)` [m].
+        min_corners: Corners of the rectangles with the smallest coordinates `(K, 2)` [m].
+        max_corners: Corners of the rectangles with the largest coordinates `(K, 2)` [m].
         radii: Enlargement of the bases `(K,)` [m].
         tops: Height of the upper sides above the world's origin `(K,)` [m].
-        undetected: True for undetected objects, which do not count near the ends of a motion `(K,)`.
-        supports: True for surfaces on which a load may lie `(K,)`.
+        is_undetected: True for undetected objects, which do not count near the ends of a motion `(K,)`.
+        is_support: True for surfaces on which a load may lie `(K,)`.
         names: Name of each obstacle in messages.
     """
 
-    low: Array
-    high: Array
+    min_corners: Array
+    max_corners: Array
     radii: Array
     tops: Array
-    undetected: NDArray[np.bool_]
-    supports: NDArray[np.bool_]
+    is_undetected: NDArray[np.bool_]
+    is_support: NDArray[np.bool_]
     names: tuple[str, ...]
 
 
@@ -95,115 +95,127 @@ class ClearanceModel:
     Args:
         config: Content of the cell file.
         obstacles: Obstacles that the cell file does not declare.
-        ends: Horizontal positions of the start and the end of the motion `(E, 2)` [m].
+        end_positions: Horizontal positions of the start and the end of the motion `(E, 2)` [m].
     """
 
-    def __init__(self, config: CellConfig, obstacles: Sequence[Obstacle], ends: Array) -> None:
+    def __init__(self, config: CellConfig, obstacles: Sequence[Obstacle], end_positions: Array) -> None:
         self._margin = config.motion.margin + SAMPLING_MARGIN
         self._prisms = _build_prisms(config, obstacles)
-        self._ends = ends
+        self._end_positions = end_positions
         self._end_margins = np.full(len(self._prisms.names), self._margin)
 
-    def relax_end_margins(self, tips: Array, axes: Array, discs: Discs) -> None:
-        """Reduce the required distances near the ends of the motion to the distances at the ends.
+    def relax_end_margins(self, tcps: Array, axes: Array, discs: Discs) -> None:
+        """Reduce the required distance near the ends of the motion to the smallest distance at an end.
 
-        `tips` `(E, 3)` [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
+        An arm that starts or ends near an obstacle can thus leave or approach the obstacle. `tcps` `(E, 3)`
+        [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
         """
-        end_distances = self._compute_distances(tips, axes, discs).min(axis=(0, 1))
+        end_distances = self._compute_all_distances(tcps, axes, discs).min(axis=(0, 1))
         self._end_margins = np.minimum(end_distances, self._margin)
 
-    def compute_slack(self, tips: Array, axes: Array, discs: Discs) -> Array:
+    def compute_slack(self, tcps: Array, axes: Array, discs: Discs) -> Array:
         """Return the smallest difference between distance and required distance in each state `(N,)` [m].
 
         Args:
-            tips: Tool centre points `(N, 3)` [m].
+            tcps: Tool centre points `(N, 3)` [m].
             axes: Tool axes `(N, 3)`.
             discs: Tool and load.
         """
-        slack = self._compute_distances(tips, axes, discs) - self._find_required_distances(tips)[:, None]
+        slack = self._compute_all_distances(tcps, axes, discs) - self._find_required_distances(tcps)[:, None]
         return np.minimum(slack.min(axis=(1, 2)), _compute_tilt_slack(axes, discs))
 
     def compute_slack_changes(
-        self, tips: Array, axes: Array, discs: Discs, displaced: tuple[Array, Array]
+        self, tcps: Array, axes: Array, discs: Discs, displaced: tuple[Array, Array]
     ) -> Array:
         """Return the change of the slack of each state for each of `M` small displacements `(N, M)` [m].
 
         For each state, only the pair of disc and prism with the smallest slack counts.
 
         Args:
-            tips: Tool centre points `(N, 3)` [m].
+            tcps: Tool centre points `(N, 3)` [m].
             axes: Tool axes `(N, 3)`.
             discs: Tool and load.
             displaced: Tool centre points and axes of the displaced states, `(N, M, 3)` each.
         """
-        required = self._find_required_distances(tips)
-        slack = self._compute_distances(tips, axes, discs) - required[:, None]
-        state, prism_count = np.arange(len(tips)), slack.shape[2]
-        pairs = slack.reshape(len(tips), slack.shape[1] * prism_count)
-        disc, prism = np.divmod(pairs.argmin(axis=1), prism_count)
-        before, required = slack[state, disc, prism], required[state, prism]
-        nearest_disc = Discs(discs.offsets[disc, None], discs.radii[disc, None], discs.min_cosine)
-        columns = [values[prism, None] for values in self._prisms[:-1]]
-        nearest_prism = Prisms._make([*columns, self._prisms.names])
-        after = _compute_distance(*displaced, nearest_disc, nearest_prism, self._ends) - required[:, None]
-        tilt_before, tilt_after = (_compute_tilt_slack(values, discs) for values in (axes, displaced[1]))
-        is_tilt_nearer = (tilt_before < before)[:, None]
-        return np.where(is_tilt_nearer, tilt_after - tilt_before[:, None], after - before[:, None])
+        required = self._find_required_distances(tcps)
+        slack = self._compute_all_distances(tcps, axes, discs) - required[:, None]
+        states, prism_count = np.arange(len(tcps)), slack.shape[2]
+        pair_slack = slack.reshape(len(tcps), slack.shape[1] * prism_count)
+        nearest_discs, nearest_prisms = np.divmod(pair_slack.argmin(axis=1), prism_count)
+        old_slack = slack[states, nearest_discs, nearest_prisms]
+        offsets, radii = discs.offsets[nearest_discs, None], discs.radii[nearest_discs, None]
+        prism_fields = [values[nearest_prisms, None] for values in self._prisms[:-1]]
+        new_distances = _broadcast_distances(
+            *displaced,
+            Discs(offsets, radii, discs.min_cosine),
+            Prisms._make([*prism_fields, self._prisms.names]),
+            self._end_positions,
+        )
+        new_slack = new_distances - required[states, nearest_prisms][:, None]
+        old_tilt_slack, new_tilt_slack = (_compute_tilt_slack(each, discs) for each in (axes, displaced[1]))
+        is_tilt_critical = (old_tilt_slack < old_slack)[:, None]
+        tilt_changes = new_tilt_slack - old_tilt_slack[:, None]
+        return np.where(is_tilt_critical, tilt_changes, new_slack - old_slack[:, None])
 
-    def require_clearance(self, tips: Array, axes: Array, discs: Discs) -> None:
-        """Check the distances of tool and load from the obstacles at tips `(N, 3)` [m] and axes `(N, 3)`.
+    def require_clearance(self, tcps: Array, axes: Array, discs: Discs) -> None:
+        """Check the distances from the obstacles at tool centre points `(N, 3)` [m] and axes `(N, 3)`.
 
         Raises:
             Blocked: A state is too near to an obstacle; the message names the obstacle and the tool position.
         """
         tilt_slack = _compute_tilt_slack(axes, discs)
         if tilt_slack.min() < -MAX_EXTRA_TILT:
-            tip = tips[np.argmin(tilt_slack)]
-            raise Blocked(f"the motion would tilt the tool too far{_describe_tip(tip)}")
-        # Undetected objects need no margin; the load must not be pressed into the table or a floor.
-        tolerances = np.where(self._prisms.undetected, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
-        tolerances = np.where(self._prisms.supports, MAX_PENETRATION, tolerances)
-        required = self._find_required_distances(tips)[:, None]
-        slack = self._compute_distances(tips, axes, discs) - required + tolerances
+            tcp = tcps[np.argmin(tilt_slack)]
+            raise Blocked(f"the motion would tilt the tool too far{_describe_tcp(tcp)}")
+        # Undetected objects need no margin. The load must not be pressed into the table or a floor.
+        tolerances = np.where(self._prisms.is_undetected, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
+        tolerances = np.where(self._prisms.is_support, MAX_PENETRATION, tolerances)
+        required = self._find_required_distances(tcps)[:, None]
+        slack = self._compute_all_distances(tcps, axes, discs) - required + tolerances
         slack = slack.min(axis=1)
         state, prism = np.unravel_index(np.argmin(slack), slack.shape)
         if slack[state, prism] < 0:
             shortfall = (tolerances[prism] - slack[state, prism]) * 1000
             raise Blocked(
                 f"the motion would bring tool or load {shortfall:.0f} mm too near to "
-                f"{self._prisms.names[prism]}{_describe_tip(tips[state])}"
+                f"{self._prisms.names[prism]}{_describe_tcp(tcps[state])}"
             )
 
-    def _find_required_distances(self, tips: Array) -> Array:
+    def _find_required_distances(self, tcps: Array) -> Array:
         """Return the required distance of each state from each prism `(N, K)` [m]."""
-        end_distances = np.linalg.norm(tips[:, None, :2] - self._ends, axis=-1).min(axis=1)
+        end_distances = np.linalg.norm(tcps[:, None, :2] - self._end_positions, axis=-1).min(axis=1)
         return np.where((end_distances < OBSERVED_RADIUS)[:, None], self._end_margins, self._margin)
 
-    def _compute_distances(self, tips: Array, axes: Array, discs: Discs) -> Array:
+    def _compute_all_distances(self, tcps: Array, axes: Array, discs: Discs) -> Array:
         """Return the distance of each disc from each prism in each state `(N, P, K)` [m], negative inside."""
-        columns = Discs(discs.offsets[:, None], discs.radii[:, None], discs.min_cosine)
-        return _compute_distance(tips[:, None, None], axes[:, None, None], columns, self._prisms, self._ends)
+        disc_columns = Discs(discs.offsets[:, None], discs.radii[:, None], discs.min_cosine)
+        tcps, axes = tcps[:, None, None], axes[:, None, None]
+        return _broadcast_distances(tcps, axes, disc_columns, self._prisms, self._end_positions)
 
 
-def _compute_distance(tips: Array, axes: Array, discs: Discs, prisms: Prisms, ends: Array) -> Array:
-    """Return the distance between discs and prisms [m], negative inside; the shapes broadcast."""
-    low, high = prisms.low, prisms.high
-    centres = tips + discs.offsets[..., None] * axes
+def _broadcast_distances(
+    tcps: Array, axes: Array, discs: Discs, prisms: Prisms, end_positions: Array
+) -> Array:
+    """Return the distances between discs and prisms [m], negative inside; the shapes broadcast."""
+    centres = tcps + discs.offsets[..., None] * axes
     x, y = centres[..., 0], centres[..., 1]
-    end_distance = np.sqrt(np.min([(x - ex) ** 2 + (y - ey) ** 2 for ex, ey in ends], axis=0))
+    squares = [(x - end_x) ** 2 + (y - end_y) ** 2 for end_x, end_y in end_positions]
+    end_distance = np.sqrt(np.min(squares, axis=0))
     undetected_top = np.clip(UNDETECTED_HEIGHT_SLOPE * (end_distance - OBSERVED_RADIUS), 0.0, prisms.tops)
-    top = np.where(prisms.undetected, undetected_top, prisms.tops)
+    top = np.where(prisms.is_undetected, undetected_top, prisms.tops)
     sine_of_tilt = np.sqrt(np.maximum(0.0, 1 - axes[..., 2] ** 2))
     vertical = centres[..., 2] - discs.radii * sine_of_tilt - top
-    dx = np.maximum(np.maximum(low[..., 0] - x, x - high[..., 0]), 0.0)
-    dy = np.maximum(np.maximum(low[..., 1] - y, y - high[..., 1]), 0.0)
+    (x_min, y_min), (x_max, y_max) = (np.moveaxis(corners, -1, 0) for corners in prisms[:2])
+    dx = np.maximum(np.maximum(x_min - x, x - x_max), 0.0)
+    dy = np.maximum(np.maximum(y_min - y, y - y_max), 0.0)
     horizontal = np.sqrt(dx**2 + dy**2) - prisms.radii - discs.radii
     outside = np.sqrt(np.maximum(horizontal, 0.0) ** 2 + np.maximum(vertical, 0.0) ** 2)
     return np.where(outside > 0, outside, np.maximum(horizontal, vertical))
 
 
-def _describe_tip(tip: Array) -> str:
-    x, y, z = tip
+def _describe_tcp(tcp: Array) -> str:
+    """Return the end of a message about the tool centre point `(3,)` [m]."""
+    x, y, z = tcp
     return f", with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
 
 
@@ -215,23 +227,30 @@ def _compute_tilt_slack(axes: Array, discs: Discs) -> Array:
 def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
     """Return the obstacles that the cell file declares, and the other obstacles, as prisms."""
     max_radius = max(kind.radius for kind in config.objects.values())
-    # Columns: x range, y range, radius, top [m]; is undetected; is a support; name.
-    rows: list[tuple[float, float, float, float, float, float, bool, bool, str]] = [
-        (*config.table.x, *config.table.y, max_radius, compute_max_pile_height(config), True, False,
-         "the space for undetected objects"),
-        (-2.0, 2.0, -2.0, 2.0, 0.0, 0.0, False, True, "the table"),
+    # Each row: smallest corner, largest corner, radius, top [m]; is undetected; is a support; name.
+    rows: list[tuple[tuple[float, float], tuple[float, float], float, float, bool, bool, str]] = [
+        ((config.table.x[0], config.table.y[0]), (config.table.x[1], config.table.y[1]), max_radius,
+         compute_max_pile_height(config), True, False, "the space for undetected objects"),
+        ((-2.0, -2.0), (2.0, 2.0), 0.0, 0.0, False, True, "the table"),
     ]  # fmt: skip
     for name, bin in config.bins.items():
-        (x, y, floor), (length, width, height), t = bin.position, bin.size, BIN_THICKNESS
+        (x, y, bottom), (length, width, height) = bin.position, bin.size
         left, right, front, back = x - length / 2, x + length / 2, y - width / 2, y + width / 2
+        # Outer faces of the walls.
+        far_left, far_right = left - BIN_THICKNESS, right + BIN_THICKNESS
+        far_front, far_back = front - BIN_THICKNESS, back + BIN_THICKNESS
         for wall in (
-            (left - t, left, front - t, back + t), (right, right + t, front - t, back + t),
-            (left, right, front - t, front), (left, right, back, back + t),
+            ((far_left, far_front), (left, far_back)), ((right, far_front), (far_right, far_back)),
+            ((left, far_front), (right, front)), ((left, back), (right, far_back)),
         ):  # fmt: skip
-            rows.append((*wall, 0.0, floor + height, False, False, name))
-        rows.append((left, right, front, back, 0.0, floor + t, False, True, f"the floor of {name}"))
-    for o in obstacles:
-        rows.append((o.x, o.x, o.y, o.y, o.radius + POSITION_TOLERANCE, o.top, False, False, o.name))
-    table, names = np.array([row[:8] for row in rows]), tuple(row[8] for row in rows)
-    corners = table[:, [0, 2]], table[:, [1, 3]]
-    return Prisms(*corners, table[:, 4], table[:, 5], table[:, 6] > 0, table[:, 7] > 0, names)
+            rows.append((*wall, 0.0, bottom + height, False, False, name))
+        floor = ((left, front), (right, back), 0.0, bottom + BIN_THICKNESS)
+        rows.append((*floor, False, True, f"the floor of {name}"))
+    for obstacle in obstacles:
+        centre, radius = (obstacle.x, obstacle.y), obstacle.radius + POSITION_TOLERANCE
+        rows.append((centre, centre, radius, obstacle.top, False, False, obstacle.name))
+    min_corners, max_corners, radii, tops, is_undetected, is_support = (
+        np.array([row[column] for row in rows]) for column in range(6)
+    )
+    names = tuple(row[-1] for row in rows)
+    return Prisms(min_corners, max_corners, radii, tops, is_undetected, is_support, names)

@@ -11,33 +11,32 @@ from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose, make_tool_down_pose
 from executive.motion.arm_model import BranchKey, Kinematics, Solutions, wrap_angles
+from executive.motion.limits import JointRange
 
 PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""
-COARSE_SPACING = math.radians(5.0)
+COARSE_ANGLE_STEP = math.radians(5.0)
 """Distance between the redundancy angles in the first search for configurations [rad]."""
-FINE_SPACING = math.radians(0.25)
+FINE_ANGLE_STEP = math.radians(0.25)
 """Distance between the redundancy angles in the second search, if the first search finds nothing [rad]."""
-MIN_COSINE_DOWN = 0.9998
-"""Minimum cosine between the tool axis and straight down for a tool that points down."""
+MIN_COSINE_ON_LINE = 0.9998
+"""Minimum cosine between the tool axis and straight down at the start of a vertical line."""
+_MAX_SOLUTION_ERROR = 1e-6  # [rad]
 
 
 @dataclass(frozen=True, eq=False)
 class ConfigurationPairs:
-    """Joint configurations at both ends of a vertical line of the tool, `N` pairs.
+    """`N` pairs of joint configurations at the two ends of a vertical line of the tool.
 
     Attributes:
-        high: Joint positions at the upper end `(N, n)` [rad].
-        low: Joint positions at the lower end `(N, n)` [rad].
+        upper_qs: Joint positions at the upper end `(N, n)` [rad].
+        lower_qs: Joint positions at the lower end `(N, n)` [rad].
         branches: Branch of the inverse kinematics of each pair.
     """
 
-    high: Array
-    low: Array
+    upper_qs: Array
+    lower_qs: Array
     branches: tuple[BranchKey, ...]
-
-    def __len__(self) -> int:
-        return len(self.low)
 
 
 def find_configuration_pairs(
@@ -52,33 +51,32 @@ def find_configuration_pairs(
     """
     x, y, z = goal.position
     poses = [make_tool_down_pose((x, y, z + length)), make_tool_down_pose((x, y, z))]
-    for spacing, margin in ((COARSE_SPACING, PREFERRED_LIMIT_DISTANCE), (FINE_SPACING, 0.0)):
-        upper, lower = (kinematics.solve_all(pose, q_start, spacing) for pose in poses)
-        high, low = upper.qs, lower.qs
-        allowed = kinematics.joint_range.shrink(margin)
-        _turn_last_joint(high, low, (allowed.lower[-1], allowed.upper[-1]), goal.yaw, float(q_start[-1]))
-        inside = allowed.contains(high) & allowed.contains(low)
-        if inside.any():
-            branches = tuple(lower.branches[index] for index in np.flatnonzero(inside))
-            return ConfigurationPairs(high[inside], low[inside], branches)
+    for angle_step, margin in ((COARSE_ANGLE_STEP, PREFERRED_LIMIT_DISTANCE), (FINE_ANGLE_STEP, 0.0)):
+        upper, lower = (kinematics.solve_all(pose, q_start, angle_step) for pose in poses)
+        joint_range = kinematics.joint_range.shrink(margin)
+        _turn_last_joint(upper.qs, lower.qs, joint_range, goal.yaw, float(q_start[-1]))
+        is_inside = joint_range.contains(upper.qs) & joint_range.contains(lower.qs)
+        if is_inside.any():
+            branches = tuple(lower.branches[index] for index in np.flatnonzero(is_inside))
+            return ConfigurationPairs(upper.qs[is_inside], lower.qs[is_inside], branches)
     raise _make_unreachable_error(kinematics, poses, (upper, lower))
 
 
 def find_vertical_waypoints(kinematics: Kinematics, q: Array, length: float, count: int) -> Array | None:
     """Return evenly spaced waypoints `(count, n)` [rad] on a vertical line of the tool, or None.
 
-    The line leads from the tool at `q` `(n,)` [rad] upwards, has the length `length` [m], and stays in the
-    branch of `q`. The result is None if the tool does not point down, or if a joint would leave its range.
+    The line leads from the tool at `q` `(n,)` [rad] upwards, is `length` [m] long, and stays in the branch of
+    `q`. The result is None if the tool does not point down, or if a joint would leave its range.
     """
     X_WT = kinematics.compute_tool_pose(q)
-    if -X_WT.rotation[2, 2] < MIN_COSINE_DOWN:
+    if -X_WT.rotation[2, 2] < MIN_COSINE_ON_LINE:
         return None
     try:
         waypoints = _solve_waypoints(kinematics, X_WT, length, count, kinematics.find_branch(q))
     except Unreachable:
         return None
     is_inside = kinematics.joint_range.contains(waypoints).all()
-    return waypoints if is_inside and np.max(np.abs(waypoints[0] - q)) < 1e-6 else None
+    return waypoints if is_inside and np.max(np.abs(waypoints[0] - q)) < _MAX_SOLUTION_ERROR else None
 
 
 def solve_vertical_waypoints(
@@ -86,8 +84,8 @@ def solve_vertical_waypoints(
 ) -> Array:
     """Return evenly spaced waypoints `(count, n)` [rad] on a vertical line of the tool in one branch.
 
-    The line leads from the tool at `q` `(n,)` [rad] upwards, and has the length `length` [m]. The function
-    checks neither the tool axis nor the joint range.
+    The line leads from the tool at `q` `(n,)` [rad] upwards, and is `length` [m] long. The function checks
+    neither the tool axis nor the joint range.
 
     Raises:
         Unreachable: A point of the line is too far from the arm or too near to the arm.
@@ -111,26 +109,28 @@ def _solve_waypoints(
 
 
 def _turn_last_joint(
-    high: Array, low: Array, joint_range: tuple[float, float], yaw: float | None, start: float
+    upper_qs: Array, lower_qs: Array, joint_range: JointRange, yaw: float | None, q_start: float
 ) -> None:
     """Turn the last joint of pairs `(N, n)` [rad] in place, from the yaw 0 of the tool to `yaw` [rad].
 
-    If `yaw` is None, the last joint gets the position in its range that is nearest to `start` [rad].
+    If `yaw` is None, the last joint gets the position in its range that is nearest to `q_start` [rad].
     """
-    change = wrap_angles(high[:, -1] - low[:, -1])
+    change = wrap_angles(upper_qs[:, -1] - lower_qs[:, -1])
     if yaw is not None:
-        low[:, -1] = wrap_angles(low[:, -1] - yaw)
+        lower_qs[:, -1] = wrap_angles(lower_qs[:, -1] - yaw)
     else:
-        smallest, largest = joint_range
-        low[:, -1] = np.clip(start, smallest - np.minimum(change, 0.0), largest - np.maximum(change, 0.0))
-    high[:, -1] = low[:, -1] + change
+        # Both ends of the line must be in the range.
+        smallest = joint_range.lower[-1] - np.minimum(change, 0.0)
+        largest = joint_range.upper[-1] - np.maximum(change, 0.0)
+        lower_qs[:, -1] = np.clip(q_start, smallest, largest)
+    upper_qs[:, -1] = lower_qs[:, -1] + change
 
 
 def _make_unreachable_error(
-    kinematics: Kinematics, poses: list[Pose], rejected: tuple[Solutions, Solutions]
+    kinematics: Kinematics, poses: list[Pose], end_solutions: tuple[Solutions, Solutions]
 ) -> Unreachable:
     """Return the error for the first pose without a solution in the joint range, or for both poses."""
-    for pose, solutions in zip(poses, rejected, strict=True):
+    for pose, solutions in zip(poses, end_solutions, strict=True):
         if not np.any(kinematics.joint_range.contains(solutions.qs)):
             return _make_range_error(kinematics, pose, solutions.qs)
     (x, y, top), bottom = poses[0].position, poses[1].position[2]
@@ -143,11 +143,11 @@ def _make_unreachable_error(
 def _make_range_error(kinematics: Kinematics, X_WT: Pose, qs: Array) -> Unreachable:
     """Return the error for a pose whose solutions `(N, n)` [rad] all exceed the joint range."""
     excess = kinematics.joint_range.compute_excess(qs)
-    best = excess[np.nanargmin(np.max(excess, axis=1))]
-    joint = int(np.argmax(best))
+    min_excess = excess[np.nanargmin(np.max(excess, axis=1))]
+    joint = int(np.argmax(min_excess))
     x, y, z = X_WT.position
     return Unreachable(
         f"the tool cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m: no configuration of the arm keeps every joint "
-        f"inside its limits; the best one leaves joint {joint + 1} {math.degrees(best[joint]):.1f}° outside "
-        f"{kinematics.joint_range.describe(joint)}"
+        f"inside its limits; the best configuration leaves joint {joint + 1} "
+        f"{math.degrees(min_excess[joint]):.1f}° outside {kinematics.joint_range.describe(joint)}"
     )

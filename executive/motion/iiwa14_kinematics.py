@@ -48,7 +48,7 @@ _TURNS_ABOUT_Z = (True, False, True, False, True, False, True)
 _ROUNDING_ERROR = 1e-9  # [m]
 
 
-def find_max_wrist_angle(min_link_distance: float) -> float:
+def interpolate_max_joint_6_angle(min_link_distance: float) -> float:
     """Return the maximum angle of joint 6 [rad] at which links 5 and 7 keep a minimum distance [m].
 
     The distance of these links depends only on joint 6, with an error of up to 0.3 mm. The table was measured
@@ -74,7 +74,7 @@ class Iiwa14:
     ) -> None:
         lower, upper = joint_range.lower.copy(), joint_range.upper.copy()
         if min_link_distance is not None:
-            max_angle = find_max_wrist_angle(min_link_distance)
+            max_angle = interpolate_max_joint_6_angle(min_link_distance)
             lower[5], upper[5] = max(lower[5], -max_angle), min(upper[5], max_angle)
         self.joint_range = JointRange(lower, upper)
         self._tool_length = tool_length
@@ -96,7 +96,7 @@ class Iiwa14:
         """Return the frame of each joint at `q` `(7,)` [rad]: origin in the joint, z along the next link."""
         return tuple(self._compute_frames(q)[:-1])
 
-    def compute_tips_and_axes(self, qs: Array) -> tuple[Array, Array]:
+    def compute_tcps_and_axes(self, qs: Array) -> tuple[Array, Array]:
         """Return tool centre points `(N, 3)` [m] and tool axes `(N, 3)` at joint positions `(N, 7)` [rad].
 
         The function rotates two vectors from joint to joint, from the wrist to the base, which takes a fifth
@@ -106,9 +106,9 @@ class Iiwa14:
         zero = np.zeros(len(qs))
         axis = np.array([sines[5], zero, cosines[5]])
         axis = np.array([cosines[4] * axis[0], sines[4] * axis[0], axis[2]])
-        tip = self._wrist_to_tool * axis
-        tip[2] += FOREARM
-        vectors = np.stack([tip, axis], axis=1)  # (3, 2, N)
+        tcp = self._wrist_to_tool * axis
+        tcp[2] += FOREARM
+        vectors = np.stack([tcp, axis], axis=1)  # (3, 2, N)
         vectors = _rotate_about_y(vectors, cosines[3], -sines[3])
         vectors[2, 0] += UPPER_ARM
         for joint in (2, 1, 0):
@@ -134,14 +134,14 @@ class Iiwa14:
         flip, angle = branch
         return self._solve_angles(X_WT, np.array([angle]))[int(flip), 0]
 
-    def solve_all(self, X_WT: Pose, q_near: ArrayLike, spacing: float) -> Solutions:
+    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, spacing: float) -> Solutions:
         """Return the solutions of a tool pose for all flips and evenly spaced redundancy angles.
 
-        The first redundancy angle is that of the joint positions `q_near` `(7,)` [rad]. The function raises
+        The first redundancy angle is that of the joint positions `q_seed` `(7,)` [rad]. The function raises
         Unreachable if there is no solution.
         """
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(spacing)))
-        angles = self.compute_redundancy_angle(q_near) + offsets
+        angles = self.compute_redundancy_angle(q_seed) + offsets
         solutions = self._solve_angles(X_WT, angles).reshape(-1, IIWA14_JOINT_COUNT)
         return Solutions(solutions, list(product(range(len(FLIPS)), angles.tolist())))
 

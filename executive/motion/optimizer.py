@@ -68,18 +68,20 @@ class OptimizationProblem:
         The slack is the smallest of these margins: each clearance minus the required clearance [m], and the
         distance of each joint from its range limits [rad].
         """
-        tips, axes = self.kinematics.compute_tips_and_axes(qs)
-        distance_slack = self.clearance.compute_slack(tips, axes, self.discs)
+        tcps, axes = self.kinematics.compute_tcps_and_axes(qs)
+        distance_slack = self.clearance.compute_slack(tcps, axes, self.discs)
         return np.minimum(distance_slack, self._compute_range_slack(qs).min(axis=1))
 
     def compute_gradients(self, qs: Array, slack: Array) -> Array:
         """Return the gradients `(N, n)` [m/rad] of the slack `(N,)` at joint positions `(N, n)` [rad]."""
-        tips, axes = self.kinematics.compute_tips_and_axes(qs)
+        tcps, axes = self.kinematics.compute_tcps_and_axes(qs)
         count = qs.shape[1]
         displaced_qs = (qs[:, None] + _FINITE_DIFFERENCE_STEP * np.eye(count)).reshape(-1, count)
-        displaced = self.kinematics.compute_tips_and_axes(displaced_qs)
-        new_tips, new_axes = (values.reshape(-1, count, 3) for values in displaced)
-        changes = self.clearance.compute_slack_changes(tips, axes, self.discs, (new_tips, new_axes))
+        displaced = self.kinematics.compute_tcps_and_axes(displaced_qs)
+        displaced_tcps, displaced_axes = (values.reshape(-1, count, 3) for values in displaced)
+        changes = self.clearance.compute_slack_changes(
+            tcps, axes, self.discs, (displaced_tcps, displaced_axes)
+        )
         gradients = changes / _FINITE_DIFFERENCE_STEP
         range_slack = self._compute_range_slack(qs)
         row, joint = np.arange(len(qs)), np.argmin(range_slack, axis=1)

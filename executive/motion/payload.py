@@ -95,8 +95,8 @@ class PayloadLimit:
 
     def _locate_load(self, qs: Array) -> Array:
         """Return the centre of the load `(N, 3)` [m] at joint positions `(N, n)` [rad]."""
-        tips, axes = self._kinematics.compute_tips_and_axes(qs)
-        return np.asarray(tips + self._centre_offset * axes)
+        tcps, axes = self._kinematics.compute_tcps_and_axes(qs)
+        return np.asarray(tcps + self._centre_offset * axes)
 
 
 def _find_acceleration_fractions(accelerations: Array, max_specific_force: float) -> Array:

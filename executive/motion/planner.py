@@ -27,7 +27,7 @@ from executive.motion.limits import JointLimits
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import JointLimitError
 from executive.motion.search import MotionSearch
-from executive.motion.trajectory import Trajectory, thin_out_path
+from executive.motion.trajectory import Trajectory, downsample_path
 
 CollisionCheck = Callable[[Array, Task], None]
 """Function that raises Blocked if a path `(N, n)` [rad] collides, given load and obstacles of a task."""
@@ -107,9 +107,9 @@ class Planner:
         free_qs = qs[: math.ceil(motion.guarded_start_time / STEP)] if is_guarded else qs
         search.require_clearance(free_qs)
         if self._check is not None:
-            self._check(thin_out_path(free_qs, MAX_CHECK_SPACING), _make_free_part_task(task))
+            self._check(downsample_path(free_qs, MAX_CHECK_SPACING), _make_free_part_task(task))
             if is_guarded:
-                self._check(thin_out_path(qs[len(free_qs) - 1 :], MAX_CHECK_SPACING), task)
+                self._check(downsample_path(qs[len(free_qs) - 1 :], MAX_CHECK_SPACING), task)
 
 
 def _make_free_part_task(task: Task) -> Task:

@@ -76,12 +76,12 @@ class MotionSearch:
             # Without a load, the tool may tilt: the arm must reach named poses from any configuration.
             self._discs = self._discs._replace(min_cosine=-1.0)
         self._payload = PayloadLimit(task.load, kinematics) if task.load else None
-        ends = kinematics.compute_tips_and_axes(start[None]), self._find_free_end()
-        tips, axes = map(np.concatenate, zip(*ends, strict=True))
-        self._clearance = ClearanceModel(config, task.obstacles, tips[:, :2])
-        self._clearance.relax_end_margins(tips, axes, self._discs)
+        ends = kinematics.compute_tcps_and_axes(start[None]), self._find_free_end()
+        tcps, axes = map(np.concatenate, zip(*ends, strict=True))
+        self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2])
+        self._clearance.relax_end_margins(tcps, axes, self._discs)
         self._rises: dict[tuple[float, bool], tuple[list[MotionPiece], JointState]] = {}
-        self._departure = departure = self._plan_departure(start, float(tips[0, 2]))
+        self._departure = departure = self._plan_departure(start, float(tcps[0, 2]))
         self._start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
 
     def list_motions(self) -> Iterator[Trajectory]:
@@ -100,12 +100,12 @@ class MotionSearch:
         Raises:
             Blocked: A distance is too small.
         """
-        self._clearance.require_clearance(*self._kinematics.compute_tips_and_axes(qs), self._discs)
+        self._clearance.require_clearance(*self._kinematics.compute_tcps_and_axes(qs), self._discs)
 
     def _find_free_end(self) -> tuple[Array, Array]:
         """Return tool centre point [m] and tool axis, `(1, 3)` each, at the end of the free part."""
         if not isinstance(self._end, Goal):
-            return self._kinematics.compute_tips_and_axes(self._end[None])
+            return self._kinematics.compute_tcps_and_axes(self._end[None])
         x, y, z = self._end.position
         return np.array([[x, y, z + self._end.guarded_length]]), np.array([[0.0, 0.0, -1.0]])
 
@@ -198,7 +198,7 @@ class MotionSearch:
         if (height, is_straight) not in self._rises:
             self._rises[height, is_straight] = self._plan_rise(height, is_straight)
         rise, corner = self._rises[height, is_straight]
-        (x, y, z), _ = self._find_tip(candidate.entry.q)
+        (x, y, z), _ = self._find_tcp(candidate.entry.q)
         if candidate.branch is None or z >= height:
             return [*rise, connect(corner, candidate.entry)]
         if is_straight and candidate.arrival is None:
@@ -212,7 +212,7 @@ class MotionSearch:
 
     def _plan_rise(self, height: float, is_straight: bool) -> tuple[list[MotionPiece], JointState]:
         """Return the motion from the start up to a corner at a height [m], and the state at the corner."""
-        q, ((x, y, z), points_down) = self._start.q, self._find_tip(self._start.q)
+        q, ((x, y, z), points_down) = self._start.q, self._find_tcp(self._start.q)
         if not points_down or z >= height:
             return [], self._start
         if is_straight and self._departure is None:
@@ -223,17 +223,17 @@ class MotionSearch:
         corner = self._solve_corner((x, y, height), self._kinematics.find_branch(q), q)
         return [self._connector.connect(self._start, corner)], corner
 
-    def _find_tip(self, q: Array) -> tuple[Array, bool]:
+    def _find_tcp(self, q: Array) -> tuple[Array, bool]:
         """Return the tool centre point `(3,)` [m], and whether the tool points down."""
-        tips, axes = self._kinematics.compute_tips_and_axes(q[None])
-        return tips[0], bool(-axes[0, 2] > MIN_COSINE_DOWN)
+        tcps, axes = self._kinematics.compute_tcps_and_axes(q[None])
+        return tcps[0], bool(-axes[0, 2] > MIN_COSINE_DOWN)
 
     def _solve_corner(
-        self, position: tuple[float, float, float], branch: BranchKey, q_near: Array
+        self, position: tuple[float, float, float], branch: BranchKey, q_seed: Array
     ) -> JointState:
-        """Return the state of rest at a tool position [m], with the last joint of `q_near` `(n,)` [rad]."""
+        """Return the state of rest at a tool position [m], with the last joint of `q_seed` `(n,)` [rad]."""
         q = self._kinematics.solve(make_tool_down_pose(position), branch)
-        q[-1] = q_near[-1]
+        q[-1] = q_seed[-1]
         return JointState.at_rest(q)
 
     def _plan_departure(self, start: Array, height: float) -> CartesianLine | None:
@@ -249,8 +249,10 @@ class MotionSearch:
         if waypoints is None:
             return None
         acceleration = self._payload.max_lift_acceleration if self._payload else math.inf
-        line = CartesianLine(waypoints, length, self._limits, acceleration=acceleration, ends_in_motion=True)
-        return line if self._straight_length or line.acceleration >= acceleration else None
+        line = CartesianLine(
+            waypoints, length, self._limits, max_acceleration=acceleration, ends_in_motion=True
+        )
+        return line if self._straight_length or line.max_acceleration >= acceleration else None
 
 
 def _compute_total_cost(candidate: Candidate, optimizer: Optimizer) -> float:

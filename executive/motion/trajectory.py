@@ -126,7 +126,7 @@ class _SlowPiece:
         return JointState(state.q, self.speed_factor * state.qd, self.speed_factor**2 * state.qdd)
 
 
-def thin_out_path(qs: Array, spacing: float) -> Array:
+def downsample_path(qs: Array, spacing: float) -> Array:
     """Return waypoints of a path `(N, n)` [rad]; no joint moves by more than `spacing` [rad] between them."""
     kept = [0]
     for index in range(1, len(qs) - 1):

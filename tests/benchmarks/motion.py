@@ -120,7 +120,7 @@ class _MethodComparison:
         """
         planner = self._planner
         approach = self._call_timed("ours", planner.plan, start, scene.approach, scene.fetch_task)
-        tips, _ = planner.kinematics.compute_tips_and_axes(approach.samples.q)
+        tips, _ = planner.kinematics.compute_tcps_and_axes(approach.samples.q)
         above = int(np.flatnonzero(tips[:, 2] > scene.contact_height)[-1])
         touched = min((above + 1) * STEP, approach.duration)
         stop = plan_braking(approach, touched, planner.limits, STEP)

@@ -56,15 +56,15 @@ def find_waypoints(
     up = reach(kinematics, (x, y, height), start) if line is None else line[-1]
     fetch = find_configuration_pairs(kinematics, touch, height - touch.position[2], start)
     carry = find_configuration_pairs(kinematics, drop, height - drop.position[2], start)
-    fetching = compute_min_time(fetch.high - up, limits) + 2 * compute_min_time(
-        fetch.high - fetch.low, limits
+    fetching = compute_min_time(fetch.upper_qs - up, limits) + 2 * compute_min_time(
+        fetch.upper_qs - fetch.lower_qs, limits
     )
-    carrying = compute_min_time(carry.high - fetch.high[:, None], limits)
-    carrying += compute_min_time(carry.low - carry.high, limits)
+    carrying = compute_min_time(carry.upper_qs - fetch.upper_qs[:, None], limits)
+    carrying += compute_min_time(carry.lower_qs - carry.upper_qs, limits)
     i, j = np.unravel_index(np.argmin(fetching[:, None] + carrying), carrying.shape)
     return (
-        np.array([start, up, fetch.high[i], fetch.low[i]]),
-        np.array([fetch.low[i], fetch.high[i], carry.high[j], carry.low[j]]),
+        np.array([start, up, fetch.upper_qs[i], fetch.lower_qs[i]]),
+        np.array([fetch.lower_qs[i], fetch.upper_qs[i], carry.upper_qs[j], carry.lower_qs[j]]),
     )
 
 
@@ -107,7 +107,7 @@ def find_lower_bound(
     and swivel are those with the least total time.
     """
     touching, dropping = (
-        find_configuration_pairs(kinematics, goal, 0.0, start).low for goal in (touch, drop)
+        find_configuration_pairs(kinematics, goal, 0.0, start).lower_qs for goal in (touch, drop)
     )
     there = compute_min_time(touching - start, limits)
     back = compute_min_time(touching[:, None] - dropping, limits)

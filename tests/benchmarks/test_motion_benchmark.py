@@ -57,10 +57,10 @@ def test_the_methods_are_in_order_and_pass_the_waypoints(cell: CellConfig) -> No
     planner = build_planner(cell)
     arm, limits = planner.kinematics, planner.limits
     touch, drop = Goal((0.5, 0.1, 0.051)), Goal((0.24, -0.48, 0.065))
-    start = find_configuration_pairs(arm, Goal((0.24, 0.48, 0.065)), 0.1, np.zeros(7)).low[0]
+    start = find_configuration_pairs(arm, Goal((0.24, 0.48, 0.065)), 0.1, np.zeros(7)).lower_qs[0]
     height = compute_travel_height(cell)
     chains = baselines.find_waypoints(arm, limits, start, touch, drop, height)
-    tips, _ = arm.compute_tips_and_axes(np.concatenate(chains))
+    tips, _ = arm.compute_tcps_and_axes(np.concatenate(chains))
     high_object, high_bin = (0.5, 0.1, height), (0.24, -0.48, height)
     fetch = [(0.24, 0.48, 0.065), (0.24, 0.48, height), high_object, touch.position]
     assert tips == pytest.approx(np.array([*fetch, touch.position, high_object, high_bin, drop.position]))

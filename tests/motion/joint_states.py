@@ -60,12 +60,12 @@ def peaks(states: JointState, limits: JointLimits, spacing: float = SOONER) -> t
 def tool_velocities(kinematics: Kinematics, states: JointState) -> Array:
     """The tool centre point's velocities `(N, 3)` [m/s] in states, each array of shape `(N, 7)`."""
     h = 1e-6
-    ahead, behind = (kinematics.compute_tips_and_axes(states.q + step * states.qd)[0] for step in (h, -h))
+    ahead, behind = (kinematics.compute_tcps_and_axes(states.q + step * states.qd)[0] for step in (h, -h))
     return (ahead - behind) / (2 * h)
 
 
 def reach(kinematics: Kinematics, place: ArrayLike, q: Array) -> Array:
     """The joint positions `(7,)` nearest to `q` with the tool straight down at a place `(3,)` [m]."""
     x, y, z = np.asarray(place, dtype=float).tolist()
-    found = find_configuration_pairs(kinematics, Goal((x, y, z)), 0.0, q).low
+    found = find_configuration_pairs(kinematics, Goal((x, y, z)), 0.0, q).lower_qs
     return found[np.argmin(np.max(np.abs(found - q), axis=1))]

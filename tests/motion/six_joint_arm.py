@@ -48,7 +48,7 @@ class SixJointArm:
             frames.append(Pose(R, p))
         return tuple(frames)
 
-    def compute_tips_and_axes(self, qs: Array) -> tuple[Array, Array]:
+    def compute_tcps_and_axes(self, qs: Array) -> tuple[Array, Array]:
         axis = np.tile([0.0, 0.0, 1.0], (len(qs), 1))
         for joint in (4, 3):
             axis = rotated(axis, AXES[joint], qs[:, joint])
@@ -66,7 +66,7 @@ class SixJointArm:
         (index,) = branch
         return self.solve_all(X_WT, np.zeros(6), 0.0).qs[int(index)]
 
-    def solve_all(self, X_WT: Pose, q_near: ArrayLike, spacing: float) -> Solutions:
+    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
         x, y, z = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2] - (0.0, 0.0, HEIGHT)
         radius = math.hypot(x, y)
         cos3 = (radius**2 + z**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)

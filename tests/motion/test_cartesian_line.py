@@ -32,9 +32,9 @@ def descents(draw: st.DrawFn) -> Descent:
     place = draw(st.tuples(st.floats(0.42, 0.64), st.floats(-0.22, 0.22), st.floats(0.03, 0.1)))
     length = draw(st.floats(0.005, 0.2))
     postures = find_configuration_pairs(ARM, Goal(place), length, np.zeros(7))
-    number = draw(st.integers(0, len(postures) - 1))
+    number = draw(st.integers(0, len(postures.lower_qs) - 1))
     branch = postures.branches[number]
-    chain = solve_vertical_waypoints(ARM, postures.low[number], length, WAYPOINT_COUNT, branch)[::-1]
+    chain = solve_vertical_waypoints(ARM, postures.lower_qs[number], length, WAYPOINT_COUNT, branch)[::-1]
     return Descent(chain, length, draw(st.sampled_from([0.03, 0.2, math.inf])))
 
 
@@ -43,7 +43,7 @@ def descents(draw: st.DrawFn) -> Descent:
 def test_the_tool_goes_straight_down_inside_all_limits(descent: Descent, enters: bool) -> None:
     line = CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, starts_in_motion=enters)
     states = passed(line)
-    tips, axes = ARM.compute_tips_and_axes(states.q)
+    tips, axes = ARM.compute_tcps_and_axes(states.q)
     assert np.max(np.linalg.norm(tips[:, :2] - tips[-1, :2], axis=1)) < 1e-4
     assert axes[:, 2].max() < -1 + 1e-6
     assert np.all(np.diff(tips[:, 2]) < 1e-9)
@@ -79,9 +79,11 @@ def test_leaving_it_is_the_same_way_mirrored_in_time(descent: Descent) -> None:
     down = CartesianLine(descent.chain, descent.length, LIMITS, descent.speed, starts_in_motion=True)
     up = CartesianLine(descent.chain[::-1], descent.length, LIMITS, descent.speed, ends_in_motion=True)
     assert up.duration == pytest.approx(down.duration, abs=1e-6)
-    gentle = CartesianLine(descent.chain[::-1], descent.length, LIMITS, acceleration=0.5, ends_in_motion=True)
-    assert gentle.acceleration == 0.5 < up.acceleration
-    heights = ARM.compute_tips_and_axes(passed(gentle).q)[0][:-1, 2]
+    gentle = CartesianLine(
+        descent.chain[::-1], descent.length, LIMITS, max_acceleration=0.5, ends_in_motion=True
+    )
+    assert gentle.max_acceleration == 0.5 < up.max_acceleration
+    heights = ARM.compute_tcps_and_axes(passed(gentle).q)[0][:-1, 2]
     # The spline through four places advances up to 5 % faster than its parameter.
     assert np.diff(heights, n=2).max() / SOONER**2 <= 0.5 * 1.06
     for s in np.linspace(0, down.duration, 7):

@@ -30,8 +30,8 @@ def arm_within(limit: Array) -> Iiwa14:
 @settings(max_examples=40)
 def test_every_posture_points_down_over_the_goal_inside_the_limits(place, yaw, length: float) -> None:
     found = find_configuration_pairs(ARM, Goal(place, yaw), length, START)
-    for qs, height in ((found.low, 0.0), (found.high, length)):
-        tips, axes = ARM.compute_tips_and_axes(qs)
+    for qs, height in ((found.lower_qs, 0.0), (found.upper_qs, length)):
+        tips, axes = ARM.compute_tcps_and_axes(qs)
         assert np.allclose(tips, np.add(place, (0, 0, height)), atol=1e-7)
         assert np.allclose(axes, [0, 0, -1], atol=1e-7)
         assert np.all(LIMITS.position.shrink(-1e-9).contains(qs))
@@ -45,9 +45,9 @@ def test_a_free_yaw_turns_joint_7_no_more_than_the_way_down_asks_for() -> None:
     start = START.copy()
     start[6] = LIMITS.position.upper[6]
     found = find_configuration_pairs(ARM, Goal((0.5, 0.1, 0.05)), 0.1, start)
-    drift = found.high[:, 6] - found.low[:, 6]
+    drift = found.upper_qs[:, 6] - found.lower_qs[:, 6]
     last = LIMITS.position.upper[6] - math.radians(1)
-    assert np.allclose(np.maximum(found.low[:, 6], found.high[:, 6]), last, atol=1e-9)
+    assert np.allclose(np.maximum(found.lower_qs[:, 6], found.upper_qs[:, 6]), last, atol=1e-9)
     assert np.ptp(drift) > 0.01
 
 
@@ -73,7 +73,7 @@ def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leave
             r"(0.300, 0.000, 0.114) m: .* 0\.110 m nearer than joint 4 permits",
         ),
         ((0.5, 0.0, 0.05), 0.9, r"(0.500, 0.000, 0.950) m: .* farther than the arm"),
-        ((0.5, 0.0, 0.1), 0.0, r"(0.500, 0.000, 0.100) m: .* best one leaves joint 6 14\.1° outside ±20°"),
+        ((0.5, 0.0, 0.1), 0.0, r"(0.500, 0.000, 0.100) m: .* best configuration leaves joint 6 14\.1° outside ±20°"),
     ],
 )
 def test_what_cannot_be_reached_says_at_which_height_and_why(place, length: float, text: str) -> None:
@@ -87,7 +87,7 @@ def test_heights_that_only_different_postures_reach_are_unreachable_together() -
     narrow = arm_within(np.radians([15, 120, 18, 120, 170, 120, 175]))
     x, y, low, high = 0.42, 0.18, 0.05, 0.25
     for height in (low, high):
-        assert len(find_configuration_pairs(narrow, Goal((x, y, height), 0.0), 0.0, START))
+        assert len(find_configuration_pairs(narrow, Goal((x, y, height), 0.0), 0.0, START).lower_qs)
     text = (
         "the heights 0.250 and 0.050 m above (0.420, 0.180) m, "
         "but not without a change of the configuration of the arm in between"

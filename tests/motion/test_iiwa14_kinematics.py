@@ -55,7 +55,7 @@ def test_forward_kinematics_agree_with_pybullet() -> None:
 
 def test_tips_are_where_the_tool_is_and_where_it_points() -> None:
     qs = np.random.default_rng(4).uniform(-LIMIT, LIMIT, (200, 7))
-    tips, axes = ARM.compute_tips_and_axes(qs)
+    tips, axes = ARM.compute_tcps_and_axes(qs)
     for q, tip, axis in zip(qs, tips, axes, strict=True):
         X_WT = ARM.compute_tool_pose(q)
         assert np.allclose(tip, X_WT.position, atol=1e-12)

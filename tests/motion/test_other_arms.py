@@ -48,7 +48,7 @@ def arm(six: CellConfig) -> Kinematics:
 def test_the_kinematics_of_the_test_arm_are_consistent(arm: Kinematics) -> None:
     rng, limits = np.random.default_rng(1), JointLimits.from_config(LIMITS).position
     qs = rng.uniform(limits.lower, limits.upper, (100, 6))
-    tips, axes = arm.compute_tips_and_axes(qs)
+    tips, axes = arm.compute_tcps_and_axes(qs)
     for q, tip, axis in zip(qs, tips, axes, strict=True):
         X_WT = arm.compute_tool_pose(q)
         assert np.allclose(tip, X_WT.position)
@@ -95,8 +95,8 @@ def test_the_yaw_of_a_goal_is_that_of_the_tool(six: CellConfig, arm: Kinematics)
 
 def test_only_configurations_within_asymmetric_limits_are_found(arm: Kinematics) -> None:
     found = find_configuration_pairs(arm, Goal((0.5, 0.1, 0.05)), 0.1, HOME)
-    assert len(found)
-    assert (found.low[:, 2] >= math.radians(20)).all()
+    assert len(found.lower_qs)
+    assert (found.lower_qs[:, 2] >= math.radians(20)).all()
 
 
 def test_errors_state_both_limits_of_a_joint(six: CellConfig, arm: Kinematics) -> None:

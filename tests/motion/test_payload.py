@@ -49,7 +49,7 @@ def sway(home):
 
 def strongest(trajectory: Trajectory, kinematics) -> float:
     """The largest acceleration of the tool by the textbook: along the circle, and to its middle [m/s²]."""
-    tips, _ = kinematics.compute_tips_and_axes(trajectory.start[None])
+    tips, _ = kinematics.compute_tcps_and_axes(trajectory.start[None])
     radius = math.hypot(*tips[0, :2])
     _, qd, qdd = trajectory.samples
     return float(np.max(radius * np.hypot(qdd[:, 0], qd[:, 0] ** 2)))
@@ -94,7 +94,7 @@ def test_a_demand_is_what_the_seal_bears_beyond_weight_and_hold(sway, kinematics
     assert np.array_equal(np.diff(middle), np.full(len(middle) - 1, SAMPLE_STRIDE))
     assert middle[0] < 2 * SAMPLE_STRIDE
     assert middle[-1] > len(qs) - 2 * SAMPLE_STRIDE
-    radius = math.hypot(*kinematics.compute_tips_and_axes(qs[:1])[0][0, :2])
+    radius = math.hypot(*kinematics.compute_tcps_and_axes(qs[:1])[0][0, :2])
     states = [sway.state_at(place) for place in SAMPLE_FRACTIONS[middle]]
     level = radius * np.array([math.hypot(state.qdd[0], state.qd[0] ** 2) for state in states])
     wanted = DISTANCE_PER_ACCELERATION * (bears / SAFETY_FACTOR / KIND.mass - np.hypot(level, GRAVITY))

@@ -14,7 +14,7 @@ from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.arms import build_planner
-from executive.motion.iiwa14_kinematics import find_max_wrist_angle
+from executive.motion.iiwa14_kinematics import interpolate_max_joint_6_angle
 from executive.motion.payload import GRAVITY
 from executive.motion.planner import MAX_CHECK_SPACING, Planner
 from executive.motion.trajectory import Trajectory
@@ -31,7 +31,7 @@ def pick(x: float, y: float, z: float = 0.053) -> Goal:
 
 def tips_of(planner: Planner, motion: Trajectory) -> Array:
     """Where the tool is every millisecond `(N, 3)` [m]."""
-    return planner.kinematics.compute_tips_and_axes(passed(motion).q)[0]
+    return planner.kinematics.compute_tcps_and_axes(passed(motion).q)[0]
 
 
 def question(name: str, planner: Planner, config: CellConfig, home: Array) -> Trajectory:
@@ -93,7 +93,7 @@ def test_the_guarded_part_is_straight_even_and_no_faster_than_asked(
 ) -> None:
     motion = planner.plan(home, Goal(place, guarded_length=guarded, guarded_speed=speed))
     states = passed(motion)
-    tips, axes = planner.kinematics.compute_tips_and_axes(states.q)
+    tips, axes = planner.kinematics.compute_tcps_and_axes(states.q)
     low = tips[:, 2] < place[2] + guarded
     speeds = np.linalg.norm(tool_velocities(planner.kinematics, states), axis=1)[low]
     assert np.max(np.linalg.norm(tips[low, :2] - place[:2], axis=1)) < 5e-5
@@ -138,7 +138,7 @@ def test_what_is_to_be_touched_is_in_the_way_until_the_guarded_part(config, home
     assert np.array_equal(free[0], motion.start)
     assert np.array_equal(guarded[-1], motion.end)
     assert np.array_equal(free[-1], guarded[0]), "nothing is left out between"
-    border = planner.kinematics.compute_tips_and_axes(free[-1][None])[0][0]
+    border = planner.kinematics.compute_tcps_and_axes(free[-1][None])[0][0]
     assert border == pytest.approx((0.5, 0.0, 0.055), abs=5e-4)
 
 
@@ -172,7 +172,7 @@ def test_when_all_ways_are_blocked_the_error_is_the_first_ones_and_counts(config
 
 def pull(planner: Planner, motion: Trajectory, kind: ObjectClass) -> float:
     """Largest `m |a + g|` of a load on the way [N]."""
-    tips, axes = planner.kinematics.compute_tips_and_axes(passed(motion).q)
+    tips, axes = planner.kinematics.compute_tcps_and_axes(passed(motion).q)
     middle = tips + kind.height / 2 * axes
     acceleration = np.diff(middle[:-1], 2, axis=0) / SOONER**2
     return float(kind.mass * np.linalg.norm(acceleration + np.array([0, 0, GRAVITY]), axis=1).max())
@@ -195,7 +195,7 @@ def test_a_seal_bears_twice_what_is_asked_of_it(planner, home, mass, bears, x, y
 
 def test_the_wrist_folds_no_farther_than_links_5_and_7_keep_the_margin(planner, config, limits, home) -> None:
     """The data sheet would let joint 6 bend by 120 degrees."""
-    most = find_max_wrist_angle(config.motion.margin)
+    most = interpolate_max_joint_6_angle(config.motion.margin)
     motion = planner.plan(home, Goal((0.3, 0.0, 0.6)))
     assert math.radians(95) < np.abs(motion.samples.q[:, 5]).max() <= most < limits.position.upper[5]
     with pytest.raises(Unreachable, match=r"0\.900, 0\.000, 0\.160\) m: .* 0\.081 m farther than the arm"):

@@ -15,7 +15,7 @@ from executive.cells.sim.rebuild import to_trajectory
 from executive.errors import Fault, Unreachable
 from executive.motion.point_to_point import Connector, JointLimitError
 from executive.motion.state import JointState
-from executive.motion.trajectory import Trajectory, compute_peak_fractions, thin_out_path
+from executive.motion.trajectory import Trajectory, compute_peak_fractions, downsample_path
 
 CONNECTOR = Connector(LIMITS)
 A, B, C = np.radians([[0, 20, 0, -90, 0, 70, 0], [40, 40, 20, -60, 10, 60, 90], [40, 45, 20, -60, 0, 60, 90]])
@@ -117,7 +117,7 @@ def test_a_motion_outside_a_limit_cannot_be_flown_and_the_text_names_the_joint(l
 @settings(max_examples=30)
 def test_a_thinned_path_has_no_gaps_and_no_more_points_than_it_needs(end, spacing: float) -> None:
     qs = Trajectory([CONNECTOR.connect(JointState.at_rest(A), JointState.at_rest(end))]).samples.q
-    kept = thin_out_path(qs, spacing)
+    kept = downsample_path(qs, spacing)
     step = np.max(np.abs(np.diff(qs, axis=0)), initial=0.0)
     assert np.array_equal(kept[[0, -1]], qs[[0, -1]])
     assert np.max(np.abs(np.diff(kept, axis=0))) <= max(spacing, step) + 1e-12

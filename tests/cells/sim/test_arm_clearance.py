@@ -12,7 +12,7 @@ from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.cells.sim.collision import ClearanceChecker
 from executive.errors import Blocked
 from executive.motion.arms import build_kinematics
-from executive.motion.iiwa14_kinematics import Iiwa14, find_max_wrist_angle
+from executive.motion.iiwa14_kinematics import Iiwa14, interpolate_max_joint_6_angle
 from tests.motion.joint_states import reach
 
 DUCK = Task(Load(ObjectClass("duck", 0.05, 0.04)))
@@ -134,7 +134,7 @@ def test_the_wrist_may_fold_as_far_as_links_5_and_7_stay_apart(clearance, distan
     world, rng = clearance.world, np.random.default_rng(6)
     for side in (-1, 1):
         q = rng.uniform(-2, 2, 7)
-        q[5] = side * find_max_wrist_angle(distance)
+        q[5] = side * interpolate_max_joint_6_angle(distance)
         world.set_joint_positions(q)
         points = world.client.getClosestPoints(world.arm, world.arm, 0.05, linkIndexA=4, linkIndexB=6)
         assert min(point[8] for point in points) == pytest.approx(distance, abs=5e-4)
