@@ -137,25 +137,20 @@ class ClearanceModel:
             discs: Tool and load.
             displaced: Tool centre points and axes of the displaced states, `(N, M, 3)` each.
         """
-        required = self._find_required_distances(tcps)
-        slack = self._compute_all_distances(tcps, axes, discs) - required[:, None]
-        states, prism_count = np.arange(len(tcps)), slack.shape[2]
+        required_distances = self._find_required_distances(tcps)
+        slack = self._compute_all_distances(tcps, axes, discs) - required_distances[:, None]
+        state, prism_count = np.arange(len(tcps)), slack.shape[2]
         pair_slack = slack.reshape(len(tcps), slack.shape[1] * prism_count)
-        nearest_discs, nearest_prisms = np.divmod(pair_slack.argmin(axis=1), prism_count)
-        old_slack = slack[states, nearest_discs, nearest_prisms]
-        offsets, radii = discs.offsets[nearest_discs, None], discs.radii[nearest_discs, None]
-        prism_fields = [values[nearest_prisms, None] for values in self._prisms[:-1]]
-        new_distances = _broadcast_distances(
-            *displaced,
-            Discs(offsets, radii, discs.min_cosine),
-            Prisms._make([*prism_fields, self._prisms.names]),
-            self._end_positions,
-        )
-        new_slack = new_distances - required[states, nearest_prisms][:, None]
-        old_tilt_slack, new_tilt_slack = (_compute_tilt_slack(each, discs) for each in (axes, displaced[1]))
-        is_tilt_critical = (old_tilt_slack < old_slack)[:, None]
-        tilt_changes = new_tilt_slack - old_tilt_slack[:, None]
-        return np.where(is_tilt_critical, tilt_changes, new_slack - old_slack[:, None])
+        disc, prism = np.divmod(pair_slack.argmin(axis=1), prism_count)
+        old_slack, required_distances = slack[state, disc, prism], required_distances[state, prism]
+        nearest_disc = Discs(discs.offsets[disc, None], discs.radii[disc, None], discs.min_cosine)
+        prism_fields = [values[prism, None] for values in self._prisms[:-1]]
+        nearest_prism = Prisms._make([*prism_fields, self._prisms.names])
+        new_distance = self._compute_distances(*displaced, nearest_disc, nearest_prism)
+        slack_change = new_distance - required_distances[:, None] - old_slack[:, None]
+        old_tilt_slack = _compute_tilt_slack(axes, discs)
+        tilt_change = _compute_tilt_slack(displaced[1], discs) - old_tilt_slack[:, None]
+        return np.where((old_tilt_slack < old_slack)[:, None], tilt_change, slack_change)
 
     def require_clearance(self, tcps: Array, axes: Array, discs: Discs) -> None:
         """Check the distances from the obstacles at tool centre points `(N, 3)` [m] and axes `(N, 3)`.
@@ -170,8 +165,8 @@ class ClearanceModel:
         # Undetected objects need no margin. The load must not be pressed into the table or a floor.
         tolerances = np.where(self._prisms.is_undetected, self._margin, POSITION_TOLERANCE + SAMPLING_MARGIN)
         tolerances = np.where(self._prisms.is_support, MAX_PENETRATION, tolerances)
-        required = self._find_required_distances(tcps)[:, None]
-        slack = self._compute_all_distances(tcps, axes, discs) - required + tolerances
+        required_distances = self._find_required_distances(tcps)[:, None]
+        slack = self._compute_all_distances(tcps, axes, discs) - required_distances + tolerances
         slack = slack.min(axis=1)
         state, prism = np.unravel_index(np.argmin(slack), slack.shape)
         if slack[state, prism] < 0:
@@ -190,27 +185,24 @@ class ClearanceModel:
         """Return the distance of each disc from each prism in each state `(N, P, K)` [m], negative inside."""
         disc_columns = Discs(discs.offsets[:, None], discs.radii[:, None], discs.min_cosine)
         tcps, axes = tcps[:, None, None], axes[:, None, None]
-        return _broadcast_distances(tcps, axes, disc_columns, self._prisms, self._end_positions)
+        return self._compute_distances(tcps, axes, disc_columns, self._prisms)
 
-
-def _broadcast_distances(
-    tcps: Array, axes: Array, discs: Discs, prisms: Prisms, end_positions: Array
-) -> Array:
-    """Return the distances between discs and prisms [m], negative inside; the shapes broadcast."""
-    centres = tcps + discs.offsets[..., None] * axes
-    x, y = centres[..., 0], centres[..., 1]
-    squares = [(x - end_x) ** 2 + (y - end_y) ** 2 for end_x, end_y in end_positions]
-    end_distance = np.sqrt(np.min(squares, axis=0))
-    undetected_top = np.clip(UNDETECTED_HEIGHT_SLOPE * (end_distance - OBSERVED_RADIUS), 0.0, prisms.tops)
-    top = np.where(prisms.is_undetected, undetected_top, prisms.tops)
-    sine_of_tilt = np.sqrt(np.maximum(0.0, 1 - axes[..., 2] ** 2))
-    vertical = centres[..., 2] - discs.radii * sine_of_tilt - top
-    (x_min, y_min), (x_max, y_max) = (np.moveaxis(corners, -1, 0) for corners in prisms[:2])
-    dx = np.maximum(np.maximum(x_min - x, x - x_max), 0.0)
-    dy = np.maximum(np.maximum(y_min - y, y - y_max), 0.0)
-    horizontal = np.sqrt(dx**2 + dy**2) - prisms.radii - discs.radii
-    outside = np.sqrt(np.maximum(horizontal, 0.0) ** 2 + np.maximum(vertical, 0.0) ** 2)
-    return np.where(outside > 0, outside, np.maximum(horizontal, vertical))
+    def _compute_distances(self, tcps: Array, axes: Array, discs: Discs, prisms: Prisms) -> Array:
+        """Return the distances between discs and prisms [m], negative inside; all arrays broadcast."""
+        centres = tcps + discs.offsets[..., None] * axes
+        x, y = centres[..., 0], centres[..., 1]
+        squares = [(x - end_x) ** 2 + (y - end_y) ** 2 for end_x, end_y in self._end_positions]
+        end_distance = np.sqrt(np.min(squares, axis=0))
+        undetected_top = np.clip(UNDETECTED_HEIGHT_SLOPE * (end_distance - OBSERVED_RADIUS), 0.0, prisms.tops)
+        top = np.where(prisms.is_undetected, undetected_top, prisms.tops)
+        sine_of_tilt = np.sqrt(np.maximum(0.0, 1 - axes[..., 2] ** 2))
+        vertical = centres[..., 2] - discs.radii * sine_of_tilt - top
+        (x_min, y_min), (x_max, y_max) = (np.moveaxis(corners, -1, 0) for corners in prisms[:2])
+        dx = np.maximum(np.maximum(x_min - x, x - x_max), 0.0)
+        dy = np.maximum(np.maximum(y_min - y, y - y_max), 0.0)
+        horizontal = np.sqrt(dx**2 + dy**2) - prisms.radii - discs.radii
+        outside = np.sqrt(np.maximum(horizontal, 0.0) ** 2 + np.maximum(vertical, 0.0) ** 2)
+        return np.where(outside > 0, outside, np.maximum(horizontal, vertical))
 
 
 def _describe_tcp(tcp: Array) -> str:
@@ -249,8 +241,5 @@ def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:
     for obstacle in obstacles:
         centre, radius = (obstacle.x, obstacle.y), obstacle.radius + POSITION_TOLERANCE
         rows.append((centre, centre, radius, obstacle.top, False, False, obstacle.name))
-    min_corners, max_corners, radii, tops, is_undetected, is_support = (
-        np.array([row[column] for row in rows]) for column in range(6)
-    )
-    names = tuple(row[-1] for row in rows)
-    return Prisms(min_corners, max_corners, radii, tops, is_undetected, is_support, names)
+    *columns, names = zip(*rows, strict=True)
+    return Prisms._make([*map(np.array, columns), names])

@@ -1,14 +1,17 @@
 """Direct transcription of a motion as a quadratic program: each of `N` equal time steps has a constant jerk.
 
-With steps of `h` seconds and accelerations `a_0 ... a_N` that change linearly within the steps, velocities,
-positions and jerks are linear in `y = a h²` and in `h` times the initial velocity:
+The steps take `h` seconds. The accelerations `a_0 ... a_N` at the ends of the steps change linearly within
+the steps. With the scaled accelerations `y = a h²`, integration gives position `q`, velocity `v` and jerk `j`
+of step `k`:
 
-    v_k h = v_0 h + sum of (y_i + y_i+1) / 2,   q_k = q_0 + k v_0 h + double sum of y,   j_k h³ = y_k+1 - y_k
+    v_k+1 h = v_k h + (y_k + y_k+1) / 2
+    q_k+1 = q_k + v_k h + y_k / 3 + y_k+1 / 6
+    j_k h³ = y_k+1 - y_k
 
-So dynamics and final state are exact. The acceleration limits `A h²` and jerk limits `J h³` are convex in
-`h`. Their tangents, which are lower bounds, replace the limits, so that no solution exceeds a limit.
-Distances from obstacles are linearized in the joint positions. The solution is the fastest motion near the
-last motion.
+All terms are linear in `y` and `h`, so that the dynamics are exact. The maximum acceleration `A` and the
+maximum jerk `J` limit `y` to `A h²` and its differences to `J h³`. Both limits are convex in `h`; their
+tangents replace them as lower bounds, so that no solution exceeds a limit. Distances from obstacles are
+linearized in the joint positions. The solution is the fastest motion near the last motion.
 """
 
 from __future__ import annotations
@@ -34,7 +37,7 @@ SAMPLE_FRACTIONS = np.arange(1, STEP_COUNT * SAMPLES_PER_STEP) / (STEP_COUNT * S
 USED_LIMIT_FRACTIONS = 0.98, 0.995, 0.995
 """Used fractions of the velocity, acceleration and jerk limits.
 
-Velocities are limited at every half step; between them, a velocity may be higher by `j (h / 2)² / 8`.
+Velocities are limited at the half steps; between two half steps, a velocity may rise by `j (h / 2)² / 8`.
 """
 VIOLATION_COST = 20.0
 """Cost of a violated constraint, as a duration per distance [s/m]."""
@@ -46,9 +49,9 @@ MIN_STEP_FACTOR = 0.8
 """Minimum factor on the duration of the motion in one program."""
 MAX_STEP_FACTOR = 1.6
 """Maximum factor on the duration of the motion in one program."""
-_DISTANCE_UNIT = 0.01  # [m]
-_UNBOUNDED = 1e30
-_SOLVED, _EQUALITY = 1, 5  # constants of daqp
+_VIOLATION_UNIT = 0.01  # [m]
+_UNBOUNDED = 1e30  # bound that daqp treats as infinite
+_STATUS_SOLVED, _EQUALITY_CONSTRAINT = 1, 5  # constants of daqp
 
 
 class DiscreteMotion(NamedTuple):
@@ -75,13 +78,13 @@ class LinearizedConstraints(NamedTuple):
 
     Attributes:
         slack: Slack of each constraint in the motion `(R,)` [m].
-        rows: Indices of the `K` samples on which each constraint depends `(R, K)`.
-        gradients: Derivatives of the slack by the joint positions at these samples `(R, K, n)` [m/rad].
-        step_derivatives: Derivatives by the duration of a time step at constant positions `(R,)` [m/s].
+        samples: Indices of the `K` samples on which each constraint depends `(R, K)`.
+        gradients: Derivatives of the slack by the joint positions at the samples `(R, K, n)` [m/rad].
+        step_derivatives: Derivatives of the slack by the duration of a time step `(R,)` [m/s].
     """
 
     slack: Array
-    rows: NDArray[np.intp]
+    samples: NDArray[np.intp]
     gradients: Array
     step_derivatives: Array
 
@@ -89,11 +92,13 @@ class LinearizedConstraints(NamedTuple):
 class Transcription:
     """Quadratic programs for motions between two states.
 
-    The variables are the values `y` of all joints without start and end (in units of their limits), the
-    duration `h` of a time step (in units of its last value), and the violation [_DISTANCE_UNIT].
+    The variables are the inner values `y_1 ... y_N-1` of all joints (in units of their limits), the duration
+    `h` of a time step (in units of its last value), and the largest violation of a constraint
+    (`_VIOLATION_UNIT`). The values `y_0` and `y_N` are given by the states.
 
     Args:
-        start, end: States at both ends of the motion.
+        start: State at the start of the motion.
+        end: State at the end of the motion.
         limits: Joint limits.
     """
 
@@ -101,21 +106,20 @@ class Transcription:
         self._start, self._end = start, end
         self._grid = grid = _build_grid(limits.joint_count)
         self._inner_count = limits.joint_count * (STEP_COUNT - 1)
-        velocity, self._acceleration, jerk = (
+        max_velocity, self._max_acceleration, max_jerk = (
             fraction * limit
             for fraction, limit in zip(
                 USED_LIMIT_FRACTIONS, (limits.velocity, limits.acceleration, limits.jerk), strict=True
             )
         )
-        velocity_count, acceleration_count = len(grid.half_velocity), len(grid.accelerations)
-        jerk_count = len(grid.jerks)
+        half_velocity, velocity_count = grid.half_velocity, len(grid.half_velocity)
+        acceleration_count, jerk_count = self._inner_count, limits.joint_count * STEP_COUNT
         jerk_ends = np.zeros((limits.joint_count, STEP_COUNT))
         jerk_ends[:, 0] -= start.qdd
         jerk_ends[:, -1] += end.qdd
-        half_velocity = grid.half_velocity
         velocity_ends = np.outer(start.qdd, half_velocity[:, 0]) + np.outer(end.qdd, half_velocity[:, -1])
         # Each row limits the absolute value of `row y + linear h + quadratic h²` to
-        # `bound[0] h + bound[1] h² + bound[2] h³`.
+        # `bound[0] h + bound[1] h² + bound[2] h³`. The rows limit accelerations, velocities, and jerks.
         self._linear = np.concatenate(
             [np.zeros(acceleration_count), np.repeat(start.qd, velocity_count), np.zeros(jerk_count)]
         )
@@ -123,31 +127,31 @@ class Transcription:
             [np.zeros(acceleration_count), velocity_ends.ravel(), jerk_ends.ravel()]
         )
         self._bound = np.zeros((3, len(self._linear)))
-        self._bound[1, :acceleration_count] = np.repeat(self._acceleration, STEP_COUNT - 1)
-        self._bound[0, acceleration_count:-jerk_count] = np.repeat(velocity, velocity_count)
-        self._bound[2, -jerk_count:] = np.repeat(jerk, STEP_COUNT)
+        self._bound[1, :acceleration_count] = np.repeat(self._max_acceleration, STEP_COUNT - 1)
+        self._bound[0, acceleration_count:-jerk_count] = np.repeat(max_velocity, velocity_count)
+        self._bound[2, -jerk_count:] = np.repeat(max_jerk, STEP_COUNT)
 
     def compute_states(self, motion: DiscreteMotion) -> list[JointState]:
         """Return the states at all half steps, including the start and the end."""
-        h, grid, start = motion.step, self._grid, self._start
+        h, start = motion.step, self._start
         y = motion.accelerations * h**2
-        qd = start.qd + (grid.half_velocity @ y.T) / h
+        qd = start.qd + (self._grid.half_velocity @ y.T) / h
         qdd = np.empty((2 * STEP_COUNT - 1, len(y)))
-        qdd[::2], qdd[1::2] = ((y[:, :-1] + y[:, 1:]) / 2).T / h**2, motion.accelerations[:, 1:-1].T
+        qdd[::2] = ((y[:, :-1] + y[:, 1:]) / 2).T / h**2  # middle of the steps
+        qdd[1::2] = motion.accelerations[:, 1:-1].T
         half_steps = slice(SAMPLES_PER_STEP // 2 - 1, None, SAMPLES_PER_STEP // 2)
         return [start, *map(JointState, motion.qs[half_steps], qd, qdd), self._end]
 
     def fit(self, step: float, qs: Array) -> DiscreteMotion | None:
         """Return the motion with time steps of `step` [s] that is nearest to `qs` `(M, n)` [rad], or None."""
         program, inner_count = self._build_program(step), self._inner_count
-        inner = self._grid.sample_position[:, 1:-1]
+        position_map = self._grid.sample_position[:, 1:-1]
         residual = qs - self._start.q - self._compute_end_terms(step)
         scale = program.scale[:inner_count]
-        program.hessian[:inner_count, :inner_count] += (
-            scale[:, None] * np.kron(np.eye(len(self._acceleration)), inner.T @ inner) * scale
-        )
-        program.gradient[:inner_count] = -(inner.T @ residual).T.ravel() * scale
-        program.low[inner_count] = program.high[inner_count] = 1.0
+        squares = np.kron(np.eye(len(self._max_acceleration)), position_map.T @ position_map)
+        program.hessian[:inner_count, :inner_count] += scale[:, None] * squares * scale
+        program.gradient[:inner_count] = -(position_map.T @ residual).T.ravel() * scale
+        program.lower[inner_count] = program.upper[inner_count] = 1.0
         return self._solve(step, program)
 
     def shorten(
@@ -157,30 +161,32 @@ class Transcription:
 
         Args:
             last: Motion about which the constraints are linearized.
-            constraints: Constraints, whose violation has the cost `VIOLATION_COST`.
+            constraints: Groups of constraints; a violation has the cost `VIOLATION_COST`.
             trust_radius: Maximum change of an acceleration as a fraction of its limit.
         """
         step, start, inner_count = last.step, self._start, self._inner_count
         program = self._build_program(step)
-        program.gradient[inner_count:] = STEP_COUNT * step, VIOLATION_COST * _DISTANCE_UNIT
-        before = (last.accelerations[:, 1:-1] / self._acceleration[:, None]).ravel()
-        program.low[:inner_count], program.high[:inner_count] = before - trust_radius, before + trust_radius
-        ends = np.stack([start.qdd, self._end.qdd])
-        rows, upper_bounds = [], []
+        program.gradient[inner_count:] = STEP_COUNT * step, VIOLATION_COST * _VIOLATION_UNIT
+        last_values = (last.accelerations[:, 1:-1] / self._max_acceleration[:, None]).ravel()
+        program.lower[:inner_count] = last_values - trust_radius
+        program.upper[:inner_count] = last_values + trust_radius
+        end_accelerations = np.stack([start.qdd, self._end.qdd])
+        row_groups, row_uppers = [], []
+        # Axes of the arrays: r constraint, k sample, j joint, i inner value, e start or end.
         for group in constraints:
-            position, gradients = self._grid.sample_position[group.rows], group.gradients
-            quadratic = np.einsum("rke,rkj,ej->r", position[:, :, [0, -1]], gradients, ends)
-            linear = np.einsum("rkj,j,rk->r", gradients, start.qd, self._grid.sample_times[group.rows])
-            block = np.empty((len(gradients), inner_count + 2))
-            inner = np.einsum("rkj,rki->rji", gradients, position[:, :, 1:-1])
-            block[:, :inner_count] = -inner.reshape(-1, inner_count)
-            block[:, inner_count] = -linear - 2 * step * quadratic - group.step_derivatives
-            block[:, inner_count + 1] = -1.0
-            rows.append(block)
-            offset = np.einsum("rkj,rkj->r", gradients, start.q - last.qs[group.rows])
+            position_map, gradients = self._grid.sample_position[group.samples], group.gradients
+            quadratic = np.einsum("rke,rkj,ej->r", position_map[:, :, [0, -1]], gradients, end_accelerations)
+            linear = np.einsum("rkj,j,rk->r", gradients, start.qd, self._grid.sample_times[group.samples])
+            rows = np.empty((len(gradients), inner_count + 2))
+            value_gradients = np.einsum("rkj,rki->rji", gradients, position_map[:, :, 1:-1])
+            rows[:, :inner_count] = -value_gradients.reshape(-1, inner_count)
+            rows[:, inner_count] = -linear - 2 * step * quadratic - group.step_derivatives
+            rows[:, inner_count + 1] = -1.0
+            row_groups.append(rows)
+            offset = np.einsum("rkj,rkj->r", gradients, start.q - last.qs[group.samples])
             slack = group.slack - EXTRA_DISTANCE + offset
-            upper_bounds.append(slack - step**2 * quadratic - step * group.step_derivatives)
-        return self._solve(step, program, np.concatenate(rows), np.concatenate(upper_bounds))
+            row_uppers.append(slack - step**2 * quadratic - step * group.step_derivatives)
+        return self._solve(step, program, np.concatenate(row_groups), np.concatenate(row_uppers))
 
     def _build_program(self, step: float) -> _Program:
         """Return the program without distance constraints, linearized about time steps of `step` [s]."""
@@ -197,50 +203,55 @@ class Transcription:
         position_change = (grid.position[-1, [0, -1]][:, None] * end_accelerations).sum(axis=0)
         rows[2 * limit_count : -joint_count, h_column] = start.qd - end.qd + 2 * step * velocity_change
         rows[-joint_count:, h_column] = STEP_COUNT * start.qd + 2 * step * position_change
-        row_low = np.full(len(rows), -_UNBOUNDED)
-        row_high = np.concatenate(
+        row_lower = np.full(len(rows), -_UNBOUNDED)
+        row_upper = np.concatenate(
             [
                 bound_offset + offset, bound_offset - offset, step**2 * velocity_change,
                 end.q - start.q + step**2 * position_change,
             ]
         )  # fmt: skip
-        row_low[2 * limit_count :] = row_high[2 * limit_count :]
-        low, high = np.full(h_column + 2, -_UNBOUNDED), np.full(h_column + 2, _UNBOUNDED)
-        low[h_column:], high[h_column] = (MIN_STEP_FACTOR, 0.0), MAX_STEP_FACTOR
+        row_lower[2 * limit_count :] = row_upper[2 * limit_count :]
+        lower, upper = np.full(h_column + 2, -_UNBOUNDED), np.full(h_column + 2, _UNBOUNDED)
+        lower[h_column:], upper[h_column] = (MIN_STEP_FACTOR, 0.0), MAX_STEP_FACTOR
         scale = np.concatenate(
-            [np.repeat(self._acceleration * step**2, STEP_COUNT - 1), [step, _DISTANCE_UNIT]]
+            [np.repeat(self._max_acceleration * step**2, STEP_COUNT - 1), [step, _VIOLATION_UNIT]]
         )
         hessian, gradient = SMOOTHNESS_WEIGHT * np.eye(h_column + 2), np.zeros(h_column + 2)
-        return _Program(scale, hessian, gradient, rows, low, high, row_low, row_high, 2 * joint_count)
+        return _Program(scale, hessian, gradient, rows, lower, upper, row_lower, row_upper, 2 * joint_count)
 
     def _compute_end_terms(self, step: float) -> Array:
-        """Return the terms of all samples `(M, n)` [rad] due to the states at start and end."""
-        position, start, end = self._grid.sample_position, self._start, self._end
-        quadratic = np.outer(position[:, 0], start.qdd) + np.outer(position[:, -1], end.qdd)
+        """Return the terms of `v_0`, `y_0` and `y_N` in the sampled positions `(M, n)` [rad]."""
+        position_map, start, end = self._grid.sample_position, self._start, self._end
+        quadratic = np.outer(position_map[:, 0], start.qdd) + np.outer(position_map[:, -1], end.qdd)
         return np.outer(self._grid.sample_times, start.qd * step) + step**2 * quadratic
 
     def _solve(
-        self, step: float, program: _Program, rows: Array | None = None, upper_bounds: Array | None = None
+        self, step: float, program: _Program, rows: Array | None = None, row_upper: Array | None = None
     ) -> DiscreteMotion | None:
-        """Return the solution of a program with additional rows, or None if there is none."""
-        solution = program.solve(rows, upper_bounds)
+        """Return the motion that solves a program with additional rows, or None if there is no solution."""
+        solution = program.solve(rows, row_upper)
         if solution is None:
             return None
         h = step * float(solution[self._inner_count])
-        inner = (solution * program.scale)[: self._inner_count].reshape(-1, STEP_COUNT - 1)
-        y = np.column_stack([self._start.qdd * h**2, inner, self._end.qdd * h**2])
+        inner_values = (solution * program.scale)[: self._inner_count].reshape(-1, STEP_COUNT - 1)
+        y = np.column_stack([self._start.qdd * h**2, inner_values, self._end.qdd * h**2])
         grid = self._grid
         qs = self._start.q + np.outer(grid.sample_times, self._start.qd * h) + grid.sample_position @ y.T
         return DiscreteMotion(h, y / h**2, qs)
 
 
 class _Program(NamedTuple):
-    """A quadratic program: minimize `x hessian x / 2 + gradient x`.
+    """A quadratic program with `V` variables and `R` rows: minimize `x hessian x / 2 + gradient x`.
 
-    The constraints are `low <= x <= high` and `row_low <= rows (scale x) <= row_high`.
+    The constraints are `lower <= x <= upper` and `row_lower <= rows (scale x) <= row_upper`.
 
     Attributes:
-        scale: Units of the variables `x`.
+        scale: Units of the variables `x` `(V,)`.
+        hessian: Quadratic cost `(V, V)`.
+        gradient: Linear cost `(V,)`.
+        rows: Coefficients of the constraints `(R, V)`.
+        lower, upper: Bounds of the variables `(V,)`.
+        row_lower, row_upper: Bounds of the rows `(R,)`.
         equality_count: Number of equality constraints, which are the last rows.
     """
 
@@ -248,37 +259,38 @@ class _Program(NamedTuple):
     hessian: Array
     gradient: Array
     rows: Array
-    low: Array
-    high: Array
-    row_low: Array
-    row_high: Array
+    lower: Array
+    upper: Array
+    row_lower: Array
+    row_upper: Array
     equality_count: int
 
-    def solve(self, more_rows: Array | None, upper_bounds: Array | None) -> Array | None:
-        """Return the solution, or None if there is none; `upper_bounds` limit the values of `more_rows`."""
-        rows, row_low, row_high = self.rows, self.row_low, self.row_high
-        if more_rows is not None and upper_bounds is not None:
-            rows = np.concatenate([more_rows, rows])
-            row_low = np.concatenate([np.full(len(upper_bounds), -_UNBOUNDED), row_low])
-            row_high = np.concatenate([upper_bounds, row_high])
-        senses = np.zeros(len(self.low) + len(rows), dtype=np.int32)
-        senses[-self.equality_count :] = _EQUALITY
+    def solve(self, extra_rows: Array | None, extra_upper: Array | None) -> Array | None:
+        """Return the solution `(V,)`, also with `extra_rows x <= extra_upper`, or None if there is none."""
+        rows, row_lower, row_upper = self.rows, self.row_lower, self.row_upper
+        if extra_rows is not None and extra_upper is not None:
+            rows = np.concatenate([extra_rows, rows])
+            row_lower = np.concatenate([np.full(len(extra_upper), -_UNBOUNDED), row_lower])
+            row_upper = np.concatenate([extra_upper, row_upper])
+        constraint_types = np.zeros(len(self.lower) + len(rows), dtype=np.int32)
+        constraint_types[-self.equality_count :] = _EQUALITY_CONSTRAINT
         solution, _, status, _ = daqp.solve(
             self.hessian, self.gradient, np.ascontiguousarray(rows * self.scale),
-            np.concatenate([self.high, row_high]), np.concatenate([self.low, row_low]), senses,
+            np.concatenate([self.upper, row_upper]), np.concatenate([self.lower, row_lower]),
+            constraint_types,
         )  # fmt: skip
-        return np.asarray(solution) if status == _SOLVED else None
+        return np.asarray(solution) if status == _STATUS_SOLVED else None
 
 
 class _Grid(NamedTuple):
     """Linear maps from the `STEP_COUNT + 1` values `y` of a joint to its states, and the rows of a program.
 
     Attributes:
-        velocity, position: Maps to these states at the ends of the steps `(STEP_COUNT + 1, STEP_COUNT + 1)`.
+        velocity: Map to the velocities at the ends of the steps `(STEP_COUNT + 1, STEP_COUNT + 1)`.
+        position: Map to the positions at the ends of the steps `(STEP_COUNT + 1, STEP_COUNT + 1)`.
         half_velocity: Map to the velocities at the inner half steps `(2 STEP_COUNT - 1, STEP_COUNT + 1)`.
         sample_position: Map to the positions at `SAMPLE_FRACTIONS` `(M, STEP_COUNT + 1)`.
         sample_times: Times of the samples [steps] `(M,)`.
-        accelerations, jerks: Maps from the inner values of all joints to accelerations and jerks.
         rows: Rows of all limits, of the negated limits, and of the final state; the last two columns, for
             step and violation, are 0.
     """
@@ -288,13 +300,16 @@ class _Grid(NamedTuple):
     half_velocity: Array
     sample_position: Array
     sample_times: Array
-    accelerations: Array
-    jerks: Array
     rows: Array
 
 
 @lru_cache(maxsize=4)
 def _build_grid(joint_count: int) -> _Grid:
+    """Return the grid, with the factors of the integrals in the module docstring over steps of time 1.
+
+    Over a part `f` of a step, `v f`, `y_k (f² / 2 - f³ / 6)` and `y_k+1 f³ / 6` add up to the position, and
+    `y_k (f - f² / 2)` and `y_k+1 f² / 2` to the velocity.
+    """
     velocity, position = np.zeros((2, STEP_COUNT + 1, STEP_COUNT + 1))
     for k in range(STEP_COUNT):
         velocity[k + 1], position[k + 1] = velocity[k], position[k] + velocity[k]
@@ -302,20 +317,20 @@ def _build_grid(joint_count: int) -> _Grid:
         position[k + 1, k : k + 2] += 1 / 3, 1 / 6
     sample_times = np.asarray(STEP_COUNT * SAMPLE_FRACTIONS)
     step = sample_times.astype(int)
-    fraction = sample_times - step
-    sample_position = position[step] + fraction[:, None] * velocity[step]
+    f = sample_times - step
+    sample_position = position[step] + f[:, None] * velocity[step]
     sample = np.arange(len(sample_times))
-    sample_position[sample, step] += fraction**2 / 2 - fraction**3 / 6
-    sample_position[sample, step + 1] += fraction**3 / 6
+    sample_position[sample, step] += f**2 / 2 - f**3 / 6
+    sample_position[sample, step + 1] += f**3 / 6
     half_velocity = np.empty((2 * STEP_COUNT - 1, STEP_COUNT + 1))
     half_velocity[1::2] = velocity[1:-1]
     half_velocity[::2] = velocity[:-1]
     for k in range(STEP_COUNT):
         half_velocity[2 * k, k : k + 2] += 3 / 8, 1 / 8
     joints = np.eye(joint_count)
-    accelerations = np.asarray(np.kron(joints, np.eye(STEP_COUNT - 1)), dtype=np.float64)
-    jerks = np.asarray(np.kron(joints, np.diff(np.eye(STEP_COUNT + 1), axis=0)[:, 1:-1]), dtype=np.float64)
-    limits = np.concatenate([accelerations, np.kron(joints, half_velocity[:, 1:-1]), jerks])
-    final_state = [np.kron(joints, velocity[-1, 1:-1]), np.kron(joints, position[-1, 1:-1])]
-    rows = np.pad(np.concatenate([limits, -limits, *final_state]), ((0, 0), (0, 2)))
-    return _Grid(velocity, position, half_velocity, sample_position, sample_times, accelerations, jerks, rows)
+    accelerations, jerks = np.eye(STEP_COUNT + 1)[1:-1], np.diff(np.eye(STEP_COUNT + 1), axis=0)
+    limits = [np.kron(joints, rows[:, 1:-1]) for rows in (accelerations, half_velocity, jerks)]
+    final_state = [np.kron(joints, row[-1, 1:-1]) for row in (velocity, position)]
+    rows = np.concatenate([*limits, *(-limit for limit in limits), *final_state])
+    rows = np.pad(rows, ((0, 0), (0, 2)))
+    return _Grid(velocity, position, half_velocity, sample_position, sample_times, rows)

@@ -73,7 +73,7 @@ def test_there_is_no_line_up_where_the_tool_does_not_point_down_or_a_joint_leave
             r"(0.300, 0.000, 0.114) m: .* 0\.110 m nearer than joint 4 permits",
         ),
         ((0.5, 0.0, 0.05), 0.9, r"(0.500, 0.000, 0.950) m: .* farther than the arm"),
-        ((0.5, 0.0, 0.1), 0.0, r"(0.500, 0.000, 0.100) m: .* best configuration leaves joint 6 14\.1° outside ±20°"),
+        ((0.5, 0.0, 0.1), 0.0, r"(0.500, 0.000, 0.100) m: .* leaves joint 6 14\.1° outside ±20°"),
     ],
 )
 def test_what_cannot_be_reached_says_at_which_height_and_why(place, length: float, text: str) -> None:

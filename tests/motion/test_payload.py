@@ -90,7 +90,7 @@ def test_a_demand_is_what_the_seal_bears_beyond_weight_and_hold(sway, kinematics
     bears = 3.0
     qs = np.array([sway.state_at(place).q for place in SAMPLE_FRACTIONS])
     demand = PayloadLimit(Load(KIND, bears), kinematics).linearize(qs, LENGTH / SAMPLES_PER_STEP, math.inf)
-    middle = demand.rows[:, 1]
+    middle = demand.samples[:, 1]
     assert np.array_equal(np.diff(middle), np.full(len(middle) - 1, SAMPLE_STRIDE))
     assert middle[0] < 2 * SAMPLE_STRIDE
     assert middle[-1] > len(qs) - 2 * SAMPLE_STRIDE
@@ -113,7 +113,7 @@ def test_slopes_are_the_derivatives_of_a_demand_by_the_positions(sway, kinematic
         for k, joint in np.ndindex(3, 7):
             there = [qs.copy(), qs.copy()]
             for moved, sign in zip(there, (1, -1), strict=True):
-                moved[demand.rows[row, k], joint] += sign * h
+                moved[demand.samples[row, k], joint] += sign * h
             after, before = (
                 payload.linearize(moved, LENGTH / SAMPLES_PER_STEP, math.inf).slack[row] for moved in there
             )
