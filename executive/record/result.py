@@ -21,7 +21,7 @@ from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import PlanningTotals, Timeline
 
 QUIT_REQUEST = "quit"
-"""Request that ends the requests of the operator."""
+"""Request of the operator to end the run."""
 
 RESULT_VERSION = 3
 """Version of the schema of `result.json`; versions before 3 had other keys."""
@@ -31,15 +31,18 @@ MISTAKE_DESCRIPTIONS = {
     "fell_in_wrong_bin": "fallen into a wrong bin",
     "unseen": "never seen",
 }
-"""Description of each count of an audit that is a mistake, by its key in `AUDIT_KEYS`."""
+"""Text for each audit count that must be 0, by key of the audit."""
 
 FINAL_STATUSES = ("SUCCESS", "FAILURE")
-"""Statuses of a run that cannot be resumed: its tree has ended, and no item was rejected."""
+"""Statuses of a run that cannot be resumed."""
 
 
 @dataclass(frozen=True)
 class ItemCounts:
-    """Number of items by final state; `seen` is the sum of placed, rejected, skipped and lost items."""
+    """Number of items by final state.
+
+    The sum of placed, rejected, skipped and lost items is `seen`; a phantom is an item that does not exist.
+    """
 
     seen: int = 0
     placed: int = 0
@@ -51,10 +54,13 @@ class ItemCounts:
 
 @dataclass(frozen=True)
 class Audit:
-    """Number of objects by true place, as in `executive.cell.workcell.AUDIT_KEYS`.
+    """Number of objects by true place, in a cell with ground truth.
 
     Attributes:
         agrees: True if the true places confirm the counts of the ledger.
+        right, wrong_bin, left, elsewhere: Number of objects in permitted bins, in other bins, on the table,
+            and at other places.
+        fell_in_wrong_bin, unseen: Number of objects that fell into a wrong bin, and that no look detected.
     """
 
     agrees: bool = True
@@ -73,18 +79,17 @@ class Result:
     Attributes:
         version: Version of the schema.
         mission: Name of the mission.
-        status, reason, message, node, is_table_empty, held_item, ticks: As in `RunEnded`.
+        status, reason, message, node, is_table_empty, held_item, ticks: Fields of the event `RunEnded`.
         seed: Seed of all random numbers.
         items: Number of items by final state, from the ledger.
-        unknown_labels: Largest number of boxes in a look for each label that the cell file does not declare.
+        unknown_labels: Maximum number of boxes in one look, by label that the cell file does not declare.
         assumption_reasons: Reasons for which error rates of detectors were assumed.
-        audit: Comparison with the true places of the objects; None in a cell without ground truth.
-        planning: Number of planned motions, and time spent waiting for them.
+        audit: True places of the objects, compared with `items`; None in a cell without ground truth.
+        planning: Number of planned motions and waiting time for plans.
         requests: Requests with which a scripted operator repeats the run.
-        robot_time_s: Time on the clock of the run [s].
-        wall_time_s: Wall time of the run [s].
+        robot_time_s, wall_time_s: Duration on the clock of the run and on a wall clock [s].
         trace: Hash of all decisions.
-        run: The run directory, or "".
+        run: Path of the run directory, or "".
         diagnosis: Diagnosis of a run that did not succeed, or None.
     """
 
@@ -117,18 +122,15 @@ def write_result(path: Path, result: Result) -> None:
     Raises:
         ExecutiveError: The file cannot be written.
     """
-    hint = "the journal in the same folder and the output of --json contain the end of the run"
-    with explain_os_errors(ExecutiveError, f'cannot write the result "{path}"', hint):
+    advice = "the journal in the same folder and the output of --json contain the end of the run"
+    with explain_os_errors(ExecutiveError, f'cannot write the result "{path}"', advice):
         write_atomically(
             path, json.dumps(to_json(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
         )
 
 
 def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result | None:
-    """Return the result of a run, or None if the file is missing, damaged or older than the end of the run.
-
-    A resumed run may still have the result file of an earlier end.
-    """
+    """Return the result of a run; None if the file is missing, damaged, or older than a resumption."""
     try:
         result = TypeAdapter(Result).validate_json(directory.result.read_bytes())
     except (OSError, ValueError):
@@ -136,16 +138,15 @@ def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result
     end = find_run_end(events)
     if end is not None:
         return result if (result.status, result.ticks) == (end.status, end.ticks) else None
-    # If writing the end to the journal failed, only the result contains the end.
+    # A full disk may prevent the event of the end; the result is then valid without this event.
     is_resumed = any(isinstance(timed.event, RunResumed) for timed in events)
     return result if result.status in ExitCode.__members__ and not is_resumed else None
 
 
 def list_requests(timeline: Timeline) -> list[str]:
-    """Return the requests with which a scripted operator repeats the requests of the run.
+    """Return the requests with which a scripted operator repeats the run.
 
-    Requests to quit at the end are omitted, because a scripted operator quits at the end of its list. If all
-    requests are requests to quit, the first one is kept.
+    Final requests to quit are redundant after another request: the operator quits after the last request.
     """
     requests = [request or QUIT_REQUEST for request in timeline.requests]
     while len(requests) > 1 and requests[-1] == QUIT_REQUEST:
@@ -153,33 +154,32 @@ def list_requests(timeline: Timeline) -> list[str]:
     return requests
 
 
-def make_audit(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> Audit:
+def make_audit(items: Mapping[str, int], audit: Mapping[str, int], is_table_empty: bool) -> Audit:
     """Return the true counts `audit`, compared with the counts `items` of the ledger."""
-    return Audit(
-        is_confirmed_by_audit(items, audit, empty), **{place: int(audit[place]) for place in AUDIT_KEYS}
-    )
+    is_confirmed = is_confirmed_by_audit(items, audit, is_table_empty)
+    return Audit(is_confirmed, **{place: int(audit[place]) for place in AUDIT_KEYS})
 
 
-def is_confirmed_by_audit(items: Mapping[str, int], audit: Mapping[str, int], empty: bool) -> bool:
+def is_confirmed_by_audit(items: Mapping[str, int], audit: Mapping[str, int], is_table_empty: bool) -> bool:
     """Return True if the true places of the objects confirm the counts of the ledger.
 
     Args:
         items: Number of items by final state.
         audit: Number of objects by true place.
-        empty: True if the run reported an empty table, so that no object may be unseen.
+        is_table_empty: True if the run reported an empty table; then no object may be unseen.
     """
-    left = items["rejected"] + items["skipped"]
+    unsorted_count = items["rejected"] + items["skipped"]
     return bool(
         audit["wrong_bin"] == audit["fell_in_wrong_bin"] == 0
         and items["placed"] == audit["right"]
         and items["lost"] == audit["elsewhere"]
-        and left <= audit["left"] <= left + audit["unseen"]
-        and not (empty and audit["unseen"])
+        and unsorted_count <= audit["left"] <= unsorted_count + audit["unseen"]
+        and not (is_table_empty and audit["unseen"])
     )
 
 
 def describe_disagreement(result: Result) -> str:
-    """Return a message with the counts of audit and ledger if they differ, else ""."""
+    """Return a message with the counts of audit and ledger if they disagree, else ""."""
     audit, items = result.audit, result.items
     if audit is None or audit.agrees:
         return ""
@@ -194,7 +194,7 @@ def describe_disagreement(result: Result) -> str:
 
 
 def find_exit_code(result: Result) -> ExitCode:
-    """Return the exit code of a run: FAILURE replaces SUCCESS and INCOMPLETE if the audit disagrees."""
+    """Return the exit code of a run; if the audit disagrees, FAILURE replaces SUCCESS and INCOMPLETE."""
     code = ExitCode[result.status]
-    has_unnoticed_error = code in (ExitCode.SUCCESS, ExitCode.INCOMPLETE) and describe_disagreement(result)
-    return ExitCode.FAILURE if has_unnoticed_error else code
+    is_failure = code in (ExitCode.SUCCESS, ExitCode.INCOMPLETE) and describe_disagreement(result) != ""
+    return ExitCode.FAILURE if is_failure else code

@@ -18,28 +18,28 @@ from executive.tree.node_registry import load_control_nodes
 REMEDY_BY_REASON: Mapping[str, str] = {
     "camera_moved": "mount camera and bins as the cell file says, or measure the pose again"
 }
-"""Advice by the reason of a failure that makes all positions from the camera wrong."""
+"""Advice by reason of a failure that no change of the mission prevents."""
 
 
-def list_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[str]:
-    """Yield advice in sentences, the most urgent first.
+def list_advice(run: FailedRun, arm_state: str, readings: Sequence[Reading]) -> Iterator[str]:
+    """Yield sentences with advice, the most urgent first.
 
     Args:
-        run: The run.
-        arm: State of the arm as text, `at rest` if it is at rest.
-        reads: Inputs that the failed skill read from the cell.
+        run: The failed run.
+        arm_state: `at rest`, or a text about the state of the arm.
+        readings: Inputs that the failed skill read from the cell.
     """
-    if arm != "at rest":
-        yield f"keep away from the arm until you have seen it stand still: {arm}"
+    if arm_state != "at rest":
+        yield f"keep away from the arm until you have seen it stand still: {arm_state}"
     if run.end.held_item:
-        content = "the object" if run.end.held_item == "something" else run.end.held_item
+        object_name = "the object" if run.end.held_item == "something" else run.end.held_item
         can_resume = run.end.status != "FAILURE"
-        resumption = f"to resume this run, leave {content} in the tool; " if can_resume else ""
-        yield f"{resumption}take {content} out of the tool before a new run"
+        resume_advice = f"to resume this run, leave {object_name} in the tool; " if can_resume else ""
+        yield f"{resume_advice}take {object_name} out of the tool before a new run"
     else:
         for name in run.timeline.items.find_items_in_states("held"):
             yield f"find {name} in the cell: the tool released it at the end of the run"
-    for reading in reads:
+    for reading in readings:
         if reading.raised == Unavailable.__name__:
             yield f"make sure that {reading.name} answers again"
         elif reading.name == "arm.met":
@@ -57,6 +57,7 @@ def list_advice(run: FailedRun, arm: str, reads: Sequence[Reading]) -> Iterator[
 
 
 def _describe_position(item: ItemHistory) -> str:
+    """Return the probable place of a lost item as text."""
     if item.drop_time is not None and (item.sighting is None or item.sighting.clock < item.drop_time):
         return "below the place where it was dropped"
     return "around ({:.2f}, {:.2f}) m".format(*item.last_change.position)
@@ -66,21 +67,25 @@ def _list_changes(run: FailedRun) -> Iterator[str]:
     """Yield changes of the mission after which the failure would not end the run."""
     if not run.failure_path:
         return
-    advice = [
-        (entry, change)
+    changes = [
+        (entry, advice)
         for entry in reversed(run.failure_path)
-        if entry.model
-        for change in entry.model.advise(entry.failure)
+        if entry.control_node
+        for advice in entry.control_node.advise(entry.failure)
     ]
-    handlers = [(entry, change) for entry, change in advice if entry.model and entry.model.remedy]
-    if handlers:
-        yield _format_advice(run, *handlers[0])
+    # A control node with a `remedy` can handle failures, for instance `try`.
+    handler_changes = [
+        (entry, advice) for entry, advice in changes if entry.control_node and entry.control_node.remedy
+    ]
+    if handler_changes:
+        yield _format_advice(run, *handler_changes[0])
     else:
-        remedy = next(kind.remedy for kind in load_control_nodes().values() if kind.remedy)
+        remedy = next(node.remedy for node in load_control_nodes().values() if node.remedy)
         yield f"{remedy} {run.format_place(run.failure_path[-1].node)}"
-    for entry, change in advice:
-        if (entry, change) not in handlers:
-            yield _format_advice(run, entry, change)
+    for entry, advice in changes:
+        if (entry, advice) not in handler_changes:
+            yield _format_advice(run, entry, advice)
+            # The author changes the innermost node with attempts before the ancestors of this node.
             if entry.attempt:
                 return
 
@@ -90,5 +95,6 @@ def _format_advice(run: FailedRun, entry: FailurePathNode, advice: Advice) -> st
     changed_node = get_mission_node(advice.child) if advice.child else entry.node
     value = entry.node.values.get(advice.key) if isinstance(entry.node, InnerNode) else None
     params = run.loaded.mission.params.items() if isinstance(value, Literal) else ()
+    # A value from a param has the span of this param in the mission file.
     name = next((name for name, param in params if param.value.span == getattr(value, "span", None)), "")
     return f"{advice.text} {f'with --set {name}=...' if name else f'at {run.format_place(changed_node)}'}"

@@ -1,4 +1,4 @@
-"""Creation of the diagnosis of a run from its timeline, its mission and its end."""
+"""Creation of a diagnosis from timeline, mission and end of a run."""
 
 from __future__ import annotations
 
@@ -30,11 +30,16 @@ DECIDING_INPUTS: Mapping[str, tuple[str, ...]] = {
     "tool": ("tool.holding", "tool.touching", "tool.bears"),
     "camera": ("camera.sees_table",),
 }
-"""Inputs that show whether a skill succeeded, by the part of the cell that the skill `uses`."""
+"""Inputs that decide whether a skill succeeds, by the part of the cell that the skill `uses`."""
 
 _TRACEBACK_LINE = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+), in (?P<function>\S+)')
+"""Place of a function call in a Python traceback."""
+
 _SKILL_MODULE = "executive/skill.py"
+"""End of the path of the module that defines `Skill`."""
+
 _CAUSE_SEPARATOR = "\nThe above exception was the direct cause"
+"""Text that Python prints between an exception and the exception that it caused."""
 
 
 def diagnose(
@@ -50,21 +55,20 @@ def diagnose(
     Args:
         timeline: Timeline of the run.
         end: End of the run.
-        loaded: The mission.
+        loaded: Mission of the run.
         skills: Installed skills by name.
-        run_folder: The run directory, with all pictures of the run.
-        is_at_rest: Function that returns True if the arm is at rest; called only after a fault, because the
-            arm is at rest after any other end.
+        run_folder: Run directory with all pictures of the run.
+        is_at_rest: Function that returns True if the arm is at rest, which is uncertain only after a fault.
     """
     if end.status in ("SUCCESS", "INCOMPLETE"):
         return None
     run = FailedRun(loaded, timeline, end)
-    arm = _describe_arm(is_at_rest) if end.status == "FAULT" else "at rest"
-    reads = list(_list_deciding_readings(run, skills))
+    arm_state = _describe_arm(is_at_rest) if end.status == "FAULT" else "at rest"
+    readings = list(_list_deciding_readings(run, skills))
     journal = RunDirectory(run_folder).journal
-    has_begun = journal.exists() and journal.stat().st_size > 0
-    unfinished = timeline.items.find_items_in_states("seen", "dropped", "held")
-    left = {name: item for name, item in unfinished.items() if name not in run.lost_items}
+    has_journal = journal.exists() and journal.stat().st_size > 0
+    items = timeline.items.find_items_in_states("seen", "dropped", "held")
+    labels = {name: item.last_change.label for name, item in items.items() if name not in run.lost_items}
     return Diagnosis(
         status=end.status,
         reason=end.reason,
@@ -78,29 +82,33 @@ def diagnose(
             for entry in run.failure_path
             if entry.explanation or entry is run.failure_path[-1]
         ],
-        readings=reads,
+        readings=readings,
         last_look=_find_last_look(run),
         lost_items=[_make_lost_item(name, item) for name, item in run.lost_items.items()],
         halted_skills=[run.format_skill_name(path) for path in run.halted_skills],
-        unsorted_items=[name for name, item in left.items() if item.last_change.label in loaded.routes],
-        arm_state=arm,
+        unsorted_items=[name for name, label in labels.items() if label in loaded.routes],
+        arm_state=arm_state,
         held_item=end.held_item,
         raised_at=_find_exception_place(timeline.traceback),
         is_recorded=not run.is_record_lost,
-        can_resume=end.status not in FINAL_STATUSES and (not run.is_record_lost or has_begun),
+        can_resume=end.status not in FINAL_STATUSES and (not run.is_record_lost or has_journal),
         picture=_find_picture_file(run, run_folder),
-        advice=list(list_advice(run, arm, reads)),
+        advice=list(list_advice(run, arm_state, readings)),
     )
 
 
 def _list_deciding_readings(run: FailedRun, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
-    """Yield exceptions of the cell in the failed skill, or else its deciding inputs, the latest first."""
-    node, last = run.deciding_node, run.deciding_activation
-    if last is None or not isinstance(node, SkillNode):
+    """Yield the inputs that explain the failure of a skill, the latest first.
+
+    The exceptions of the cell in the last control step explain the failure better than `DECIDING_INPUTS`.
+    """
+    node, skill_end = run.deciding_node, run.deciding_activation
+    if skill_end is None or not isinstance(node, SkillNode):
         return
-    exceptions = [reading for reading in last.readings if reading.raised and reading.tick == last.end_tick]
+    readings, end_tick = skill_end.readings, skill_end.end_tick
+    exceptions = [reading for reading in readings if reading.raised and reading.tick == end_tick]
     names = [name for part in skills[node.skill].uses for name in DECIDING_INPUTS.get(part, ())]
-    values = [reading for reading in last.readings if reading.name in names and not reading.raised]
+    values = [reading for reading in readings if reading.name in names and not reading.raised]
     yield from reversed(exceptions or values)
 
 
@@ -113,10 +121,12 @@ def _make_deciding_node(run: FailedRun) -> DecidingNode | None:
 
 
 def _format_place(node: Node) -> str:
+    """Return file and line of a node: `missions/sort.yaml:12`."""
     return f"{node.span.source.path}:{node.span.line}"
 
 
 def _find_last_look(run: FailedRun) -> Sighting | Look | None:
+    """Return the last look in which the item of the run was detected, or else the last look."""
     item = run.timeline.items.by_name.get(run.item)
     if item is None or item.sighting is None:
         return run.timeline.items.look
@@ -124,19 +134,19 @@ def _find_last_look(run: FailedRun) -> Sighting | Look | None:
 
 
 def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
-    failure, failed = item.failure, None
-    if failure is not None:
-        failed = ItemFailure(f"{get_skill_name(failure.node)}.{failure.reason}", failure.message, failure.end)
-    return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failed)
+    last, failure = item.failure, None
+    if last is not None:
+        failure = ItemFailure(f"{get_skill_name(last.node)}.{last.reason}", last.message, last.end)
+    return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failure)
 
 
 def _find_picture_file(run: FailedRun, run_folder: Path) -> str:
-    """Return the path of the picture of the failure, or else of the last selection of the item, or ""."""
+    """Return the picture of the failure, or of the last selection of the item, or "" without a picture."""
     reason = run.end.reason.rpartition(".")[2] if run.end.status == "FAILURE" else ""
     item = run.timeline.items.by_name.get(run.item)
     if run.lost_items and item is not None and item.failure is not None:
         reason = item.failure.reason
-    for picture_reason in dict.fromkeys([reason, ""]):
+    for picture_reason in (reason, ""):
         file = find_picture(run_folder / "frames", run.item, picture_reason)
         if file is not None:
             return file.relative_to(run_folder).as_posix()
@@ -153,10 +163,8 @@ def _describe_arm(is_at_rest: Callable[[], bool]) -> str:
 
 def _find_exception_place(traceback: str) -> str:
     """Return the place where the first exception was raised: `skills/grasp.py:45, in run`; "" if unknown."""
-    cause, _, last_part = traceback.rpartition(_CAUSE_SEPARATOR)
-    places = [
-        place.group("file", "line", "function") for place in _TRACEBACK_LINE.finditer(cause or last_part)
-    ]
+    cause = traceback.rpartition(_CAUSE_SEPARATOR)[0] or traceback
+    places = [place.group("file", "line", "function") for place in _TRACEBACK_LINE.finditer(cause)]
     if len(places) > 1 and places[-1][0].endswith(_SKILL_MODULE) and places[-1][2] == Skill.failure.__name__:
         places.pop()  # The caller of `Skill.failure` is more informative.
     if not places:

@@ -1,4 +1,4 @@
-"""Diagnosis of a run that did not succeed: causes with measured values, and advice."""
+"""Diagnosis of a run that did not succeed: cause, measured values and advice."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class DecidingNode:
 
 @dataclass(frozen=True)
 class PassedNode:
-    """Control node that did not handle a failure, or the origin of the failure.
+    """Control node that did not handle a failure, or node in which the failure began (origin).
 
     Attributes:
-        path, name, place: As in `DecidingNode`.
+        path, name, place: Path in the tree; name with item or subtree; file and line.
         explanation: Reason why the node did not handle the failure; "" for the origin.
     """
 
@@ -44,7 +44,7 @@ class ItemFailure:
     """Last failure of a skill that worked on an item.
 
     Attributes:
-        failure: Name of the failure, which consists of skill and reason: `Transit.dropped`.
+        failure: Name of the failure: `Transit.dropped`.
         message: Message of the failure.
         clock: Time of the failure [s].
     """
@@ -60,9 +60,9 @@ class LostItem:
 
     Attributes:
         item: Name of the item.
-        look: Last look (image with its detections) in which the item was detected, or None.
+        look: Last look (search of an image) in which the item was detected, or None.
         later_looks: Number of looks after `look`.
-        held_at, dropped_at: Last times at which the tool picked and dropped the item [s], or None.
+        held_at, dropped_at: Times of the last pick and the last drop of the item [s], or None.
         last_failure: Last failure of a skill that worked on the item, or None.
     """
 
@@ -82,23 +82,23 @@ class Diagnosis:
         status: `FAILURE`, `FAULT` or `HALTED`.
         reason: Name of the failure.
         clock: Time of the end of the run [s].
-        mission: The mission file.
-        verdict: The cause in one sentence.
+        mission: Path of the mission file.
+        verdict: Sentence with the cause.
         node: Node that determined the status, or None.
-        item: Item that this node worked on, or "".
-        passed_nodes: Nodes that did not handle the failure, from the root on, and the origin of the failure.
+        item: Item on which the skill in `node` worked, or "".
+        passed_nodes: Nodes that did not handle the failure, from the root down, and the origin.
         readings: Inputs that the failed skill read from the cell, the latest first.
         last_look: Last look in which the item was detected, or else the last look; None without a look.
-        lost_items: Lost items.
-        halted_skills: Names of the skills that were halted, with their items.
-        unsorted_items: Names of the items that the mission had to sort and did not sort.
+        lost_items: Items whose loss made the run fail.
+        halted_skills: Names of the halted skills with their items: `Grasp of cube-1`.
+        unsorted_items: Names of the items that have a route and were not sorted.
         arm_state: `at rest`, or a text about the state of the arm.
         held_item: Item that the tool holds, `something` for an unknown object, or "".
         raised_at: File, line and function in which the exception of a fault was raised, or "".
         is_recorded: True if the journal contains the whole run.
         can_resume: True if the run can be resumed.
         picture: File of the picture of the failure, relative to the run directory, or "".
-        advice: Advice in sentences, the most urgent first.
+        advice: Sentences with advice, the most urgent first.
     """
 
     status: str

@@ -1,4 +1,4 @@
-"""Text of a diagnosis for the terminal and the report."""
+"""Text of a diagnosis in the terminal and in the report."""
 
 from __future__ import annotations
 
@@ -17,11 +17,17 @@ MAX_LINE_WIDTH = 110
 MAX_SHOWN_NODES = 5
 """Maximum number of control nodes in the text; the nodes nearest to the root are omitted."""
 
-_MAX_READINGS = 3
-_MAX_LOST_ITEMS = 3
+_MAX_READINGS = _MAX_LOST_ITEMS = 3
+"""Maximum number of readings, and maximum number of lost items, in the text."""
+
 _LABEL_WIDTH = 12
+"""Width of the column of labels [characters]."""
+
 _SPACE_BEFORE_UNIT = re.compile(r"(?<=[0-9)]) (?=(?:s|m)\b)")
+"""Space between a number or a closing parenthesis and the unit s or m."""
+
 _NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
+"""Space at which `textwrap` does not break a line."""
 
 
 def make_resume_command(run: str) -> str:
@@ -29,14 +35,10 @@ def make_resume_command(run: str) -> str:
     return shlex.join(["executive", "run", "--resume", run])
 
 
-def format_diagnosis(diagnosis: Diagnosis, run: str, repeat: str, report: str = "") -> list[str]:
-    """Return the lines of a diagnosis, the most important first; commands are not wrapped.
+def format_diagnosis(diagnosis: Diagnosis, folder: str, repeat_command: str, report: str = "") -> list[str]:
+    """Return the lines of a diagnosis, then the unwrapped lines with paths and commands.
 
-    Args:
-        diagnosis: The diagnosis.
-        run: Path of the run directory.
-        repeat: Command that repeats the run.
-        report: Path of the report of the run, or "".
+    The run directory is `folder`; `report` is the path of the report, or "".
     """
     lines = wrap_lines(
         f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}", "", "  ", max_lines=3
@@ -44,26 +46,26 @@ def format_diagnosis(diagnosis: Diagnosis, run: str, repeat: str, report: str = 
     lines += _format_failure_path(diagnosis)
     for label, text in list_labelled_sentences(diagnosis):
         lines += wrap_lines(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, max_lines=3)
-    commands = {"record": run, "report": report, "repeat": repeat}
+    commands = {"record": folder, "report": report, "repeat": repeat_command}
     if diagnosis.can_resume:
-        commands["resume"] = make_resume_command(run)
+        commands["resume"] = make_resume_command(folder)
     return lines + [f"{label:{_LABEL_WIDTH}}{command}" for label, command in commands.items() if command]
 
 
 def list_labelled_sentences(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
-    """Yield label and sentence of each fact, except the verdict and the failure path."""
+    """Yield label and sentence of each part of a diagnosis, except the verdict and the failure path."""
     node = diagnosis.node
-    if node is not None and not any(passed.explanation for passed in diagnosis.passed_nodes):
+    if node is not None and not any(entry.explanation for entry in diagnosis.passed_nodes):
         yield "where", f"{node.path} ({node.place})"
     if diagnosis.raised_at:
-        hint = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.is_recorded else ""
-        yield "raised at", diagnosis.raised_at + hint
+        note = '; the whole traceback is in the journal, event "FaultRaised"' if diagnosis.is_recorded else ""
+        yield "raised at", diagnosis.raised_at + note
     if diagnosis.readings:
-        reads = diagnosis.readings[:_MAX_READINGS]
-        yield "the cell", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in reads)
-    for lost in diagnosis.lost_items[:_MAX_LOST_ITEMS]:
-        yield "lost", _format_lost_item(lost)
-    # The sentence about a lost item contains its last look.
+        readings = diagnosis.readings[:_MAX_READINGS]
+        yield "the cell", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in readings)
+    for item in diagnosis.lost_items[:_MAX_LOST_ITEMS]:
+        yield "lost", _format_lost_item(item)
+    # The text of a lost item already contains its last look.
     if not diagnosis.lost_items:
         yield "last look", _format_look(diagnosis.last_look)
     if diagnosis.picture:
@@ -80,17 +82,17 @@ def list_labelled_sentences(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
 def _format_failure_path(diagnosis: Diagnosis) -> list[str]:
     """Return a line for each node that did not handle the failure, and for the origin of the failure."""
     mission_prefix = f"{diagnosis.mission}:"
-    passed = [
+    rows = [
         (entry.name, entry.explanation, entry.place) for entry in diagnosis.passed_nodes if entry.explanation
     ]
     node = diagnosis.node
-    if not passed or node is None:
+    if not rows or node is None:
         return []
-    omitted = f", {len(passed) - MAX_SHOWN_NODES} nodes omitted" if len(passed) > MAX_SHOWN_NODES else ""
-    shown = [*passed[-MAX_SHOWN_NODES:], (node.name, node.path, node.place)]
-    width = max(len(name) for name, _, _ in shown)
+    omitted = f", {len(rows) - MAX_SHOWN_NODES} nodes omitted" if len(rows) > MAX_SHOWN_NODES else ""
+    rows = [*rows[-MAX_SHOWN_NODES:], (node.name, node.path, node.place)]
+    width = max(len(name) for name, _, _ in rows)
     lines = [f"why no node in {diagnosis.mission} handled it, from the root down{omitted}:"]
-    for name, explanation, place in shown:
+    for name, explanation, place in rows:
         line = f"line {place.removeprefix(mission_prefix)}" if place.startswith(mission_prefix) else place
         lines += wrap_lines(f"{explanation} ({line})", f"  {name:{width}}  ", " " * (width + 4))
     return lines
@@ -107,7 +109,7 @@ def wrap_lines(text: str, first_indent: str, other_indent: str, *, max_lines: in
 
 
 def _format_reading(reading: Reading, verdict: str) -> str:
-    """Return an input of the run as text, without a message that the verdict contains."""
+    """Return a reading as text; the message of an exception is omitted if the verdict contains it."""
     name, value, time_text = reading.name, reading.value, f"({reading.clock:.2f} s)"
     if reading.raised:
         text = "" if str(value) in verdict else f": {value}"
@@ -116,6 +118,7 @@ def _format_reading(reading: Reading, verdict: str) -> str:
 
 
 def _format_look(look: Sighting | Look | None) -> str:
+    """Return image, detection and counts of the last look as text."""
     if look is None:
         return "none so far"
     image = f"frame {look.frame}, camera {look.camera}, by {look.detector}, at {look.clock:.2f} s"
@@ -126,17 +129,18 @@ def _format_look(look: Sighting | Look | None) -> str:
     return f"{look.item}{detection}{_format_position(look.position)}: {image}; {counts}"
 
 
-def _format_lost_item(lost: LostItem) -> str:
-    look, failed, dropped = lost.look, lost.last_failure, lost.dropped_at
-    facts = [lost.item]
+def _format_lost_item(item: LostItem) -> str:
+    """Return last look, drop and last failure of a lost item as text."""
+    look, failure, drop_time = item.look, item.last_failure, item.dropped_at
+    clauses = [item.item]
     if look is not None:
-        facts[0] += f" seen last{_format_position(look.position)} at {look.clock:.2f} s"
-        facts[0] += f", not in the {_format_count(lost.later_looks, 'look')} since"
-    if dropped is not None and (failed is None or failed.clock != dropped):
-        facts.append(f"dropped at {dropped:.2f} s")
-    if failed is not None:
-        facts.append(f"{failed.failure} at {failed.clock:.2f} s: {failed.message}")
-    return "; ".join(facts)
+        clauses[0] += f" seen last{_format_position(look.position)} at {look.clock:.2f} s"
+        clauses[0] += f", not in the {_format_count(item.later_looks, 'look')} since"
+    if drop_time is not None and (failure is None or failure.clock != drop_time):
+        clauses.append(f"dropped at {drop_time:.2f} s")
+    if failure is not None:
+        clauses.append(f"{failure.failure} at {failure.clock:.2f} s: {failure.message}")
+    return "; ".join(clauses)
 
 
 def _format_position(position: Sequence[float] | None) -> str:

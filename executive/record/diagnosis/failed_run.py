@@ -1,4 +1,4 @@
-"""Run that did not succeed: its failure, the deciding node of its mission, and the cause of its end."""
+"""Run that did not succeed: failure path, deciding node, lost items and cause of the end."""
 
 from __future__ import annotations
 
@@ -19,15 +19,10 @@ MAX_NAMED_ITEMS = 5
 
 
 class FailedRun:
-    """Run that did not succeed, with its mission.
-
-    Args:
-        loaded: The mission.
-        timeline: Timeline of the run.
-        end: End of the run.
+    """Mission, timeline and end of a run that did not succeed.
 
     Attributes:
-        failure_path: Nodes that the failure passed, from the root to its origin; empty without a failure.
+        failure_path: Nodes through which the failure propagated, from the root to the origin; else empty.
         lost_items: History of the items whose loss made the run fail, by name of the item.
         deciding_activation: Last activation of the node that determined the status, or None.
         deciding_node: Node of the mission that determined the status, or None.
@@ -38,22 +33,23 @@ class FailedRun:
 
     def __init__(self, loaded: LoadedMission, timeline: Timeline, end: RunEnded) -> None:
         self.loaded, self.timeline, self.end = loaded, timeline, end
-        failed = end.status == "FAILURE"
-        self.failure_path = find_failure_path(loaded.tree, timeline, end.node, end.reason) if failed else ()
+        is_failure, tree = end.status == "FAILURE", loaded.tree
+        self.failure_path = find_failure_path(tree, timeline, end.node, end.reason) if is_failure else ()
+        # Lost items make a run fail after its tree has succeeded; then no node determined the status.
         self.lost_items = {
             name: item
             for name, item in timeline.items.by_name.items()
-            if failed and not end.node and item.last_change.state == "lost"
+            if is_failure and not end.node and item.last_change.state == "lost"
         }
         self.deciding_activation = timeline.activation_by_path.get(end.node)
-        self.deciding_node = next(iter(find_nodes_on_path(loaded.tree, end.node)[-1:]), None)
+        self.deciding_node = next(iter(find_nodes_on_path(tree, end.node)[-1:]), None)
         self.halted_skills = timeline.halted_skills
-        deciding = self.deciding_activation
-        if failed:
-            self.halted_skills = deciding.halted_skills if deciding is not None else ()
-        activations = [deciding, *map(timeline.activation_by_path.get, self.halted_skills)]
+        if is_failure:
+            self.halted_skills = self.deciding_activation.halted_skills if self.deciding_activation else ()
+        activations = [self.deciding_activation, *map(timeline.activation_by_path.get, self.halted_skills)]
         items = [activation.item for activation in activations if activation is not None and activation.item]
         self.item = next(iter([*items, *self.lost_items]), "")
+        # The last line of a traceback is `module.RecordLost: message`.
         self.is_record_lost = f".{RecordLost.__name__}: " in timeline.traceback
 
     def format_skill_name(self, path: str) -> str:
@@ -67,26 +63,26 @@ class FailedRun:
 
 
 def describe_cause(run: FailedRun) -> str:
-    """Return the cause of the end of a run in one sentence: skill, item, number of attempts and message."""
+    """Return a sentence with the cause of the end: lost items, or skill, attempt and message."""
     end = run.end
     skills = " and ".join(map(run.format_skill_name, run.halted_skills))
-    during = f" during {skills}" if skills else ""
+    skills_text = f" during {skills}" if skills else ""
     if end.status == "HALTED":
-        return end.message + (" while the operator was asked" if run.timeline.question else during)
+        return end.message + (" while the operator was asked" if run.timeline.question else skills_text)
     if names := list(run.lost_items):
         subject = "object was" if len(names) == 1 else "objects were"
-        more = f" and {len(names) - MAX_NAMED_ITEMS} more" if len(names) > MAX_NAMED_ITEMS else ""
-        return f"{len(names)} {subject} lost: {', '.join(names[:MAX_NAMED_ITEMS])}{more}"
+        omitted = f" and {len(names) - MAX_NAMED_ITEMS} more" if len(names) > MAX_NAMED_ITEMS else ""
+        return f"{len(names)} {subject} lost: {', '.join(names[:MAX_NAMED_ITEMS])}{omitted}"
     if not run.failure_path:
         return end.message
     if isinstance(run.deciding_node, SkillNode):
         reason = end.reason.rpartition(".")[2]
         return f"{run.format_skill_name(end.node)} failed ({reason}){_describe_attempt(run)}: {end.message}"
-    return f"{run.failure_path[-1].name}{_describe_attempt(run)}: {end.message}{during}"
+    return f"{run.failure_path[-1].name}{_describe_attempt(run)}: {end.message}{skills_text}"
 
 
 def _describe_attempt(run: FailedRun) -> str:
-    """Return a text about the failed attempt of the innermost node that counts attempts; "" for attempt 1."""
+    """Return the number of the failed attempt of the innermost retry as text; "" for the first attempt."""
     attempts = next((entry.attempt for entry in reversed(run.failure_path) if entry.attempt), None)
     if attempts is None:
         return ""

@@ -1,4 +1,4 @@
-"""Nodes that a failure passed, with the explanations why control nodes did not handle the failure."""
+"""Failure path: nodes from the root to the origin of a failure, which no control node handled."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from executive.tree.inspection import PropagatedFailure
 from executive.tree.keys import Child
 from executive.tree.node import ControlNode
 
-_NEVER = Activation("", 0, "", "", "INVALID", 0, 0.0, 0, 0.0)
-"""Activation of a node that never started."""
+_NO_ACTIVATION = Activation("", 0, "", "", "INVALID", 0, 0.0, 0, 0.0)
+"""Substitute for the activation of a node that never started."""
 
 
 @dataclass(frozen=True)
 class FailurePathNode:
-    """Node that a failure passed on its way from the origin to the root of the tree.
+    """Node from which a failure propagated to its parent.
 
     Attributes:
-        node: The node of the mission.
+        node: Node of the mission.
         subtree: Name of the subtree that contains the node, or "".
-        model: Instance of the control node for explanations; None for other nodes.
-        failure: The failure that the node got from its child.
+        control_node: Control node that explains its decision; None for other nodes.
+        failure: Failure that the node received from its child.
     """
 
     node: Node
     subtree: str
-    model: ControlNode | None
+    control_node: ControlNode | None
     failure: PropagatedFailure
 
     @property
@@ -43,18 +43,18 @@ class FailurePathNode:
     @property
     def explanation(self) -> str:
         """Reason why the control node did not handle the failure; "" for other nodes."""
-        return self.model.explain(self.failure) if self.model and self.failure.child else ""
+        return self.control_node.explain(self.failure) if self.control_node and self.failure.child else ""
 
     @property
     def attempt(self) -> tuple[int, int] | None:
         """Number of the failed attempt and maximum number of attempts; None if the node has no attempts."""
-        return self.model.count_attempts(self.failure) if self.model else None
+        return self.control_node.count_attempts(self.failure) if self.control_node else None
 
 
 def find_failure_path(
     tree: Node, timeline: Timeline, origin: str, failure: str
 ) -> tuple[FailurePathNode, ...]:
-    """Return the nodes that a failure passed, from the root to the origin.
+    """Return the nodes through which a failure propagated, from the root to the origin.
 
     Args:
         tree: Root node of the mission.
@@ -63,36 +63,39 @@ def find_failure_path(
         failure: Name of the failure: `Grasp.missed`.
     """
     nodes = find_nodes_on_path(tree, origin)
-    source, _, reason = failure.rpartition(".")
-    names = {source}
+    skill_or_label, _, reason = failure.rpartition(".")
+    # Above a node with a label, the mission may use this label in the name of the failure.
+    sources = {skill_or_label}
     failure_path: list[FailurePathNode] = []
     for index in reversed(range(len(nodes))):
         node = nodes[index]
         child = nodes[index + 1] if index + 1 < len(nodes) else None
         subtree = next((use.name for use in reversed(nodes[:index]) if isinstance(use, UseNode)), "")
-        model = make_inspection_instance(node) if isinstance(node, InnerNode) else None
-        reasons = frozenset(Reason(name, reason) for name in names)
-        propagated = _make_propagated_failure(timeline, node, model, child, reasons)
-        failure_path.append(FailurePathNode(node, subtree, model, propagated))
-        names |= {node.label} if node.label else set()
+        control_node = make_inspection_instance(node) if isinstance(node, InnerNode) else None
+        reasons = frozenset(Reason(source, reason) for source in sources)
+        propagated = _make_propagated_failure(timeline, node.path, control_node, child, reasons)
+        failure_path.append(FailurePathNode(node, subtree, control_node, propagated))
+        sources |= {node.label} if node.label else set()
     return tuple(reversed(failure_path))
 
 
 def _make_propagated_failure(
-    timeline: Timeline, node: Node, model: ControlNode | None, child: Node | None, reasons: frozenset[Reason]
+    timeline: Timeline, path: str, control: ControlNode | None, child: Node | None, reasons: frozenset[Reason]
 ) -> PropagatedFailure:
-    """Return the failure that `node` got from its child `child`; `child` is None at the origin."""
-    activation = timeline.activation_by_path.get(node.path) or _NEVER
-    children = [child for key in model.keys for child in model.list_children(key)] if model else []
+    """Return the failure that the node at `path` received from `child`, which is None at the origin."""
+    activation = timeline.activation_by_path.get(path) or _NO_ACTIVATION
+    children = [child for key in control.keys for child in control.list_children(key)] if control else []
 
     def has_failed(child: Child) -> bool:
         last = timeline.activation_by_path.get(get_mission_node(child).path)
         return last is not None and last.number > activation.number and last.status == "FAILURE"
 
     return PropagatedFailure(
-        next((each for each in children if get_mission_node(each) is child), None),
-        activation.reason, reasons, activation.handled_counts, activation.message_by_reason,
-        activation.last_handled_reason, activation.choice, activation.end - activation.start, has_failed,
+        child=next((each for each in children if get_mission_node(each) is child), None),
+        name=activation.reason, reasons=reasons, handled_counts=activation.handled_counts,
+        last_messages=activation.message_by_reason, last_handled_name=activation.last_handled_reason,
+        last_choice=activation.choice, duration=activation.end - activation.start,
+        has_child_failed=has_failed,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from executive.record.pictures.picture_content import PictureContent
 from executive.record.pictures.status_bar import STATUS_BAR_HEIGHT, draw_status_bar
 
 PICTURE_WIDTH = 640
-"""Width of a picture [pixel]; camera images are scaled to this width, at which text is legible."""
+"""Width of a picture and of the camera image in it [pixel]; captions of boxes are legible at this width."""
 
 SHADING_FRACTION = 0.4
 """Fraction of the background colour in occluded pixels, 0 to 1."""
@@ -22,40 +22,40 @@ CLOSE_UP_SCALE = 2.0
 """Side of the square region in the close-up, as a multiple of the longer side of the selected box."""
 
 BOX_WIDTH, SELECTED_BOX_WIDTH, OUTLINE_WIDTH = 2, 3, 1
-"""Line widths of a box, of the selected box, and of the outline on both sides of this line [pixel]."""
+"""Line widths of a box, of the selected box, and of the outline around the selected box [pixel]."""
 
 TEXT_SCALE, TEXT_PADDING = 0.36, 2
 """Font scale of captions in OpenCV, and padding around captions [pixel]."""
 
 
-def draw_picture(scene: PictureContent) -> NDArray[np.uint8]:
-    """Return the picture of a scene `(H, PICTURE_WIDTH, 3)`, RGB."""
+def draw_picture(content: PictureContent) -> NDArray[np.uint8]:
+    """Return a picture `(H, PICTURE_WIDTH, 3)`, RGB."""
     import cv2
 
-    image = scene.image[:, :, ::-1]
-    height, width = image.shape[:2]
+    image_bgr = content.image[:, :, ::-1]
+    height, width = image_bgr.shape[:2]
     scale = PICTURE_WIDTH / width
     size = (PICTURE_WIDTH, round(height * scale))
-    shaded = _shade(image, scene.visible)
-    upper = _draw_boxes(cv2.resize(shaded, size).astype(np.uint8), scene, scale)
-    if scene.selected is None:
-        bar = draw_status_bar(scene, PICTURE_WIDTH)
+    shaded_image = _shade_occlusions(image_bgr, content.visible)
+    image_with_boxes = _draw_boxes(cv2.resize(shaded_image, size).astype(np.uint8), content, scale)
+    if content.selected is None:
+        status_bar = draw_status_bar(content, PICTURE_WIDTH)
     else:
-        bar = draw_status_bar(scene, PICTURE_WIDTH, left=STATUS_BAR_HEIGHT)
-        selected = scene.detections[scene.selected]
-        colour = choose_class_colour(selected.label, scene.classes)
-        bar[:, :STATUS_BAR_HEIGHT] = _draw_close_up(image, selected.box, colour)
-    return np.vstack([upper, bar])[:, :, ::-1]
+        status_bar = draw_status_bar(content, PICTURE_WIDTH, text_start=STATUS_BAR_HEIGHT)
+        selected = content.detections[content.selected]
+        colour = choose_class_colour(selected.label, content.classes)
+        status_bar[:, :STATUS_BAR_HEIGHT] = _draw_close_up(image_bgr, selected.box, colour)
+    return np.vstack([image_with_boxes, status_bar])[:, :, ::-1]
 
 
-def _shade(image: NDArray[np.uint8], visible: NDArray[np.bool_] | None) -> NDArray[np.uint8]:
-    """Return the image `(H, W, 3)` with shaded occluded pixels; `visible` is a mask `(H, W)`."""
+def _shade_occlusions(image: NDArray[np.uint8], visible: NDArray[np.bool_] | None) -> NDArray[np.uint8]:
+    """Return the image `(H, W, 3)` with shaded pixels where the mask `visible` `(H, W)` is False."""
     if visible is None or visible.all():
         return image
-    shaded = image.copy()
+    shaded_image = image.copy()
     background = np.array(to_bgr(BACKGROUND))
-    shaded[~visible] = (1 - SHADING_FRACTION) * image[~visible] + SHADING_FRACTION * background
-    return shaded
+    shaded_image[~visible] = (1 - SHADING_FRACTION) * image[~visible] + SHADING_FRACTION * background
+    return shaded_image
 
 
 def _draw_close_up(image: NDArray[np.uint8], box: Box, colour: str) -> NDArray[np.uint8]:
@@ -66,47 +66,47 @@ def _draw_close_up(image: NDArray[np.uint8], box: Box, colour: str) -> NDArray[n
     side = max(2.0, CLOSE_UP_SCALE * max(right - left, bottom - top))
     zoom = STATUS_BAR_HEIGHT / side
     corner = np.array([(left + right) / 2, (top + bottom) / 2]) - side / 2
-    # The matrix maps the upper left corner of the square to the origin.
+    # The matrix maps the upper left corner of the square to (0, 0).
     matrix = np.array([[zoom, 0.0, -zoom * corner[0]], [0.0, zoom, -zoom * corner[1]]])
     size, border = (STATUS_BAR_HEIGHT, STATUS_BAR_HEIGHT), to_bgr(BACKGROUND)
     close_up = cv2.warpAffine(image, matrix, size, flags=cv2.INTER_CUBIC, borderValue=border)
-    cv2.rectangle(close_up, (1, 1), (STATUS_BAR_HEIGHT - 2, STATUS_BAR_HEIGHT - 2), to_bgr(colour), 3)
+    edge = STATUS_BAR_HEIGHT - 2
+    cv2.rectangle(close_up, (1, 1), (edge, edge), to_bgr(colour), SELECTED_BOX_WIDTH)
     return close_up.astype(np.uint8)
 
 
-def _draw_boxes(image: NDArray[np.uint8], scene: PictureContent, scale: float) -> NDArray[np.uint8]:
-    """Return an image, which was scaled by `scale`, with all boxes; the selected box is drawn last."""
+def _draw_boxes(image: NDArray[np.uint8], content: PictureContent, scale: float) -> NDArray[np.uint8]:
+    """Return `image`, a camera image scaled by `scale`, with all boxes; the selected box is drawn last."""
     import supervision as sv
 
-    if not scene.detections:
+    if not content.detections:
         return image
-    indices = np.arange(len(scene.detections))
+    indices = np.arange(len(content.detections))
+    boxes = np.array([detection.box for detection in content.detections]) * scale
     colours = sv.ColorPalette.from_hex(
-        [choose_class_colour(found.label, scene.classes) for found in scene.detections]
+        [choose_class_colour(detection.label, content.classes) for detection in content.detections]
     )
-    detections = sv.Detections(np.array([found.box for found in scene.detections]) * scale, class_id=indices)
-    others, selected = (
-        cast("sv.Detections", detections[mask])
-        for mask in (indices != scene.selected, indices == scene.selected)
-    )
-    outline = sv.Color.from_hex(OUTLINE)
-    for shown, colour, thickness in (
-        (others, colours, BOX_WIDTH), (selected, outline, SELECTED_BOX_WIDTH + 2 * OUTLINE_WIDTH),
+    detections = sv.Detections(boxes, class_id=indices)
+    unselected = cast("sv.Detections", detections[indices != content.selected])
+    selected = cast("sv.Detections", detections[indices == content.selected])
+    outline_colour = sv.Color.from_hex(OUTLINE)
+    for layer, colour, line_width in (
+        (unselected, colours, BOX_WIDTH), (selected, outline_colour, SELECTED_BOX_WIDTH + 2 * OUTLINE_WIDTH),
         (selected, colours, SELECTED_BOX_WIDTH),
     ):  # fmt: skip
-        image = sv.BoxAnnotator(colour, thickness).annotate(image, shown)
+        image = sv.BoxAnnotator(colour, line_width).annotate(image, layer)
     return sv.LabelAnnotator(
         colours,
         text_color=sv.Color.BLACK,
         text_scale=TEXT_SCALE,
         text_padding=TEXT_PADDING,
         smart_position=True,
-    ).annotate(image, detections, make_captions(scene))
+    ).annotate(image, detections, make_captions(content))
 
 
-def make_captions(scene: PictureContent) -> list[str]:
+def make_captions(content: PictureContent) -> list[str]:
     """Return the caption of each box: name of the item or class, and confidence of the detection."""
-    return [
-        f"{scene.item if index == scene.selected and scene.item else found.label} {found.confidence:.2f}"
-        for index, found in enumerate(scene.detections)
-    ]
+    names = [detection.label for detection in content.detections]
+    if content.selected is not None:
+        names[content.selected] = content.item or names[content.selected]
+    return [f"{name} {box.confidence:.2f}" for name, box in zip(names, content.detections, strict=True)]

@@ -22,38 +22,38 @@ JPEG_QUALITY = 80
 
 
 class PictureDrawer:
-    """Draws pictures to files in a folder, in one thread that starts with the first picture; 8 ms each."""
+    """Draws pictures to files in a folder, in a thread that needs 8 ms per picture."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="pictures")
-        self._pictures: list[Future[None]] = []
+        self._futures: list[Future[None]] = []
         self.problem = ""
         """Message about missing pictures, or ""."""
 
-    def queue(self, name: str, scene: PictureContent) -> bool:
+    def queue(self, name: str, content: PictureContent) -> bool:
         """Queue a picture for the file `name` in the folder; return False if the queue is full."""
-        if sum(not picture.done() for picture in self._pictures) >= MAX_QUEUED_PICTURES:
+        if sum(not future.done() for future in self._futures) >= MAX_QUEUED_PICTURES:
             return False
-        self._pictures.append(self._thread.submit(self._save, self._folder / name, scene))
+        self._futures.append(self._thread.submit(self._save, self._folder / name, content))
         return True
 
     def close(self, *, wait: bool = True) -> None:
-        """Draw all queued pictures; if `wait` is False, only finish the current picture."""
-        unfinished = wait_for(self._pictures, CLOSE_TIMEOUT).not_done if wait else set()
+        """Draw all queued pictures; if `wait` is False, only the current picture is finished."""
+        unfinished = wait_for(self._futures, CLOSE_TIMEOUT).not_done if wait else set()
         if unfinished:
             self.problem = f"{len(unfinished)} pictures were not drawn within {CLOSE_TIMEOUT:.0f} s"
         self._thread.shutdown(wait=False, cancel_futures=True)
 
-    def _save(self, path: Path, scene: PictureContent) -> None:
-        """Save a picture, and store the text of the first error: an exception would keep its scene."""
+    def _save(self, path: Path, content: PictureContent) -> None:
         try:
-            save_picture(path, scene)
+            save_picture(path, content)
         except Exception as error:
+            # Only the text of the first error is stored: an exception would keep all images in memory.
             self.problem = self.problem or f"not every picture was drawn: {error}"
 
 
-def save_picture(path: Path, scene: PictureContent) -> None:
+def save_picture(path: Path, content: PictureContent) -> None:
     """Draw a picture to a file; the suffix of the file determines the image format.
 
     Raises:
@@ -65,10 +65,10 @@ def save_picture(path: Path, scene: PictureContent) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ExecutiveError(f'cannot make the folder "{path.parent}": {error.strerror}') from error
-    image = cv2.cvtColor(draw_picture(scene), cv2.COLOR_RGB2BGR)
-    _, data = cv2.imencode(path.suffix, image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    image_bgr = cv2.cvtColor(draw_picture(content), cv2.COLOR_RGB2BGR)
+    _, data = cv2.imencode(path.suffix, image_bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     with (
         explain_os_errors(ExecutiveError, f'cannot write the picture "{path}"'),
-        replace_atomically(path) as temporary,
+        replace_atomically(path) as temporary_file,
     ):
-        temporary.write_bytes(data.tobytes())
+        temporary_file.write_bytes(data.tobytes())

@@ -22,17 +22,16 @@ class PictureContent:
         selected: Index in `detections` of the detection of `item`, or None.
         mission: Name of the mission.
         clock: Time on the clock of the run [s].
-        camera: Name of the camera.
-        detector: Name of the detector.
+        camera, detector: Names of the camera and of the detector.
         age: Time since the capture of the image [s].
-        phase: Names of the running skills, joined by ` + `.
+        phase: Names of the running skills as text: `Transit + Observe`.
         item: Name of the selected item, or "".
         bin: Name of the destination of the item, or "".
         attempts: Number of failed attempts to pick the item.
         failure: Name of the failed skill and reason of the failure (`Grasp.missed`), or "".
         message: Message of the failure, or "".
-        outcomes: Names of items by their bin, or by their state (`in the tool`, `rejected`, ...).
-        classes: Classes that were detected; the index of a class determines its colour.
+        outcomes: Names of items by bin of placed items or by state (`in the tool`, `rejected`, ...).
+        classes: Detected classes; the index of a class determines its colour.
     """
 
     image: NDArray[np.uint8]
