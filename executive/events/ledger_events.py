@@ -62,8 +62,7 @@ class ItemChanged(Event):
     Attributes:
         item: Name of the item.
         label: Class of the item.
-        state: `seen`, `held`, `dropped`, `placed` (in a bin), `rejected` or `skipped` (stays on the table),
-            `lost` (exists, but not found) or `phantom` (does not exist).
+        state: `seen`, `held`, `dropped`, `placed`, `rejected`, `skipped`, `lost`, or `phantom` (no object).
         position: Position of the item `(3,)` [m].
         looks: Number of frames in which the item was detected.
         attempts: Number of failed attempts to pick the item.

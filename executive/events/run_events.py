@@ -115,8 +115,7 @@ class RunEnded(Event):
         reason: Reason of the failure, for instance `Transit.dropped`; "" on success.
         message: Sentence that explains the status, with measured values, or "".
         node: Path of the node that caused the status, or "".
-        is_table_empty: True if the ledger contains no object with a route, and no frame showed a label that
-            the cell file does not declare.
+        is_table_empty: True if the ledger has no object with a route, and no frame showed an unknown label.
         held_item: Item in the tool; `something` if the item is unknown; "" for an empty tool.
         ticks: Number of control steps.
         robot_time: Time on the clock of the run [s].

@@ -56,8 +56,7 @@ def plan(
 def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] = lambda: False) -> Steps:
     """Yield while the arm executes `motion`, until the arm is at rest again.
 
-    The arm brakes along the path as soon as `until` returns True, after a collision, and if the skill is
-    halted.
+    The arm brakes along the path if `until` returns True, after a collision, and if the skill is halted.
 
     Raises:
         SkillFailed: The arm collided with an obstacle; the reason is `blocked`.

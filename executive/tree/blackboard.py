@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 
 class Blackboard(UserDict[str, object]):
-    """The variables of one run by name; skills read inputs at their start and write outputs on success.
+    """The variables of one run by name; a skill reads inputs at its start and writes outputs on success.
 
     Every run has its own blackboard, so that one process can execute several missions. All subtrees share
-    the blackboard. Arguments of subtrees are not variables: they are substituted before the tree is built.
+    the blackboard. Arguments of subtrees are no variables: values replace them before the tree is built.
     """
 
     def write(self, values: Mapping[str, object]) -> None:

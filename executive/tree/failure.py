@@ -1,4 +1,4 @@
-"""Failures of nodes, and reasons of failures as missions write them: `Skill.reason` and `label.reason`."""
+"""Failures of nodes, and the reasons of failures in missions: `Skill.reason` and `label.reason`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Reason:
-    """Reason of failures as a mission writes it, with the source: `Grasp.missed`.
+    """Reason of a failure with its source, written in a mission as `Grasp.missed`.
 
     Attributes:
         source: Name of a skill, keyword of a control node, or label of a node.
@@ -24,7 +24,7 @@ class Reason:
 
 @dataclass(frozen=True)
 class Failure:
-    """A failure with a declared reason, which is propagated up the tree.
+    """A failure with a declared reason, which nodes pass on to their parents.
 
     Attributes:
         reason: One of the declared reasons of the skill or of the control node.
@@ -49,5 +49,5 @@ class Failure:
         return any(reason.reason == self.reason and reason.source in sources for reason in reasons)
 
     def with_label(self, label: str) -> Failure:
-        """Return the failure with the label of a node that passed it on; `label` "" adds no label."""
+        """Return the failure with one more label, of a node that passed the failure on; "" adds no label."""
         return replace(self, labels=(*self.labels, label)) if label else self

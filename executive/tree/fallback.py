@@ -43,7 +43,7 @@ class Fallback(ControlNode):
             self.report_choice(f"choice {self._child_index + 1} of {len(self.do)}", failure)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; each child is entered after a failure of the previous child."""
+        """Return the possible ends; each child starts in the states after failures of the previous child."""
         success = halted = None
         failures: Mapping[PossibleFailure, FlowState] = {}
         entry: FlowState | None = state
@@ -57,7 +57,7 @@ class Fallback(ControlNode):
         return Flow(success, failures, halted)
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of the fastest child [s]."""
+        """Return the shortest minimum time of a child [s]."""
         return min(map(get_min_time, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
@@ -66,11 +66,11 @@ class Fallback(ControlNode):
         return "an earlier child never fails"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return a text with the failures of all other children."""
+        """Return the cause: all children failed, with the failures of the children before the last."""
         causes = ", ".join(f"{name} ({message})" for name, message in failure.last_messages.items())
         return f"all {len(self.do)} choices failed" + (f"; the others failed with {causes}" if causes else "")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield the name `choice 2` with the second child, and so on to the last child."""
+        """Yield all children except the first, with the names `choice 2`, `choice 3`, …."""
         for number, child in enumerate(self.do[1:], 2):
             yield f"choice {number}", child

@@ -1,4 +1,4 @@
-"""Abstract interpretation of a tree: possible states at the start of a node, and its possible ends."""
+"""Abstract interpretation of a tree: states in which a node may start, and its possible ends."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from executive.tree.failure import Reason
 from executive.tree.keys import Child
 
 UNKNOWN_NAME = "*"
-"""Source or reason of a failure whose source or reason is unknown."""
+"""Placeholder for an unknown source or an unknown reason of a failure."""
 
 
 @dataclass(frozen=True)
 class PossibleToolState:
-    """A possible state of the tool, and the cause of the state.
+    """A possible state of the tool at a point in the tree.
 
     Attributes:
         state: EMPTY or HOLDING.
@@ -41,8 +41,8 @@ class FlowState:
     """State of a run at a point in the tree, as far as the mission determines it.
 
     Attributes:
-        written_variables: Variables that are written on every execution path to the point; None if unknown,
-            so that every variable may be read.
+        written_variables: Variables that every execution path to the point writes; None if unknown, which
+            allows nodes to read every variable.
         tool_states: All possible states of the tool; None if unknown.
     """
 
@@ -50,79 +50,80 @@ class FlowState:
     tool_states: ToolStates
 
     def join(self, other: FlowState) -> FlowState:
-        """Return the state at a point that execution paths through both states reach."""
+        """Return the state at a point where execution paths from both states meet."""
         if self == other:
             return self
-        known = [state.written_variables for state in (self, other) if state.written_variables is not None]
+        name_sets = (self.written_variables, other.written_variables)
+        known_sets = [names for names in name_sets if names is not None]
         tool_states = None
         if self.tool_states is not None and other.tool_states is not None:
             tool_states = self.tool_states | other.tool_states
-        return FlowState(frozenset.intersection(*known) if known else None, tool_states)
+        return FlowState(frozenset.intersection(*known_sets) if known_sets else None, tool_states)
 
     def with_variables(self, names: Iterable[str]) -> FlowState:
-        """Return the state after variables with these names are written."""
-        written = self.written_variables
-        return self if written is None else replace(self, written_variables=written.union(names))
+        """Return the state after a node has written the variables `names`."""
+        variables = self.written_variables
+        return self if variables is None else replace(self, written_variables=variables.union(names))
 
     def without_variable(self, name: str) -> FlowState:
-        """Return the state after the variable `name` is removed."""
-        written = self.written_variables
-        return self if written is None else replace(self, written_variables=written - {name})
+        """Return the state after a node has removed the variable `name`."""
+        variables = self.written_variables
+        return self if variables is None else replace(self, written_variables=variables - {name})
 
     def with_tool_states(self, tool_states: ToolStates) -> FlowState:
-        """Return the state with other possible states of the tool."""
+        """Return the state with `tool_states` as the possible states of the tool."""
         return replace(self, tool_states=tool_states)
 
     def with_handled_failure(self, failure: PossibleFailure) -> FlowState:
-        """Return the state after a control node handled `failure`, which led to this state."""
-        tools = [replace(tool, handled_failure=str(failure)) for tool in self.tool_states or ()]
-        return self if self.tool_states is None else self.with_tool_states(frozenset(tools))
+        """Return the state after a control node handled the failure `failure`."""
+        states = [replace(state, handled_failure=str(failure)) for state in self.tool_states or ()]
+        return self if self.tool_states is None else self.with_tool_states(frozenset(states))
 
     def with_arm_moved(self) -> FlowState:
         """Return the state after a motion of the arm."""
-        tools = [replace(tool, has_arm_moved=True) for tool in self.tool_states or ()]
-        return self if self.tool_states is None else self.with_tool_states(frozenset(tools))
+        states = [replace(state, has_arm_moved=True) for state in self.tool_states or ()]
+        return self if self.tool_states is None else self.with_tool_states(frozenset(states))
 
     def apply_precondition(self, required_state: ToolState, path: str) -> FlowState:
-        """Return the state with the possible states of the tool that fulfil the precondition of a skill.
+        """Return the state at the start of the skill at `path`, which requires a state of the tool.
 
-        `required_state` ANY is no precondition. A precondition that no state fulfils counts as fulfilled, so
-        that later skills cause no further findings.
+        `required_state` ANY is no requirement. If the tool cannot be in the required state, the returned
+        state has the required state nevertheless, so that later skills cause no further findings.
         """
         if required_state is ANY or self.tool_states is None:
             return self
-        fulfilling = frozenset(tool for tool in self.tool_states if tool.state is required_state)
-        return self.with_tool_states(fulfilling or frozenset({PossibleToolState(required_state, path)}))
+        allowed = frozenset(state for state in self.tool_states if state.state is required_state)
+        return self.with_tool_states(allowed or frozenset({PossibleToolState(required_state, path)}))
 
     def apply_success(self, declared_state: ToolState, path: str) -> FlowState:
-        """Return the state after success of a skill that declares a state of the tool; ANY: no change."""
-        tools = self.tool_states
-        if declared_state is ANY or (
-            tools is not None and all(tool.state is declared_state for tool in tools)
-        ):
+        """Return the state after success of the skill at `path`; `declared_state` ANY changes nothing."""
+        # If the tool is in the declared state already, the state keeps its earlier cause.
+        states = {state.state for state in self.tool_states or ()}
+        if declared_state is ANY or (self.tool_states is not None and states <= {declared_state}):
             return self
         return self.with_tool_states(frozenset({PossibleToolState(declared_state, path)}))
 
     def apply_failure(self, declared_state: ToolState | None, path: str) -> FlowState:
-        """Return the state after a failure or halt of a skill that declares a state of the tool for this end.
+        """Return the state after a failure or a halt of the skill at `path`.
 
-        `declared_state` None leaves the states of the tool unchanged; ANY adds EMPTY and HOLDING.
+        `declared_state` None leaves the tool states unchanged; ANY adds EMPTY and HOLDING.
         """
         if declared_state is None or self.tool_states is None:
             return self
         if declared_state is ANY:
-            unknown = {PossibleToolState(state, path) for state in (EMPTY, HOLDING)}
-            return self.with_tool_states(self.tool_states | unknown)
+            both_states = {PossibleToolState(state, path) for state in (EMPTY, HOLDING)}
+            return self.with_tool_states(self.tool_states | both_states)
         return self.with_tool_states(frozenset({PossibleToolState(declared_state, path)}))
 
     def find_tool_state(self, state: ToolState) -> PossibleToolState | None:
         """Return a possible state of the tool that is `state` (EMPTY or HOLDING), or None."""
-        matching = (tool for tool in self.tool_states or () if tool.state is state)
-        return min(matching, key=lambda tool: (tool.cause, tool.handled_failure), default=None)
+        candidates = (candidate for candidate in self.tool_states or () if candidate.state is state)
+        # Sets have no order; `min` makes the findings reproducible.
+        return min(candidates, key=lambda state: (state.cause, state.handled_failure), default=None)
 
 
 INITIAL_STATE = FlowState(frozenset(), frozenset({PossibleToolState(ToolState.EMPTY)}))
-"""State at the start of a run: no variables are written, and the tool is empty."""
+"""State at the start of a run: no node has written a variable, and the tool is empty."""
 
 UNKNOWN_STATE = FlowState(None, None)
 """State after a part of the tree whose effects are unknown."""
@@ -145,7 +146,7 @@ class PossibleFailure:
     labels: frozenset[str] = frozenset()
 
     def may_match(self, reasons: Iterable[Reason]) -> bool:
-        """Return True if one of `reasons` may denote this failure, whose source or reason may be unknown."""
+        """Return True if one of `reasons` may denote the failure; an unknown source or reason may be any."""
         return any(
             self.reason in (reason.reason, UNKNOWN_NAME)
             and (self.source == UNKNOWN_NAME or reason.source in {self.source, *self.labels})
@@ -153,7 +154,7 @@ class PossibleFailure:
         )
 
     def must_match(self, reasons: Iterable[Reason]) -> bool:
-        """Return True if one of `reasons` certainly denotes this failure."""
+        """Return True if one of `reasons` certainly denotes the failure."""
         sources = {self.source, *self.labels}
         return any(reason.reason == self.reason and reason.source in sources for reason in reasons)
 
@@ -176,7 +177,7 @@ class Flow:
     halted: FlowState | None
 
     def with_label(self, label: str) -> Flow:
-        """Return the flow of a node with a label, whose failures carry the label; "" for no label."""
+        """Return the flow with the label of the node added to all failures; "" adds no label."""
         if not label:
             return self
         failures: dict[PossibleFailure, FlowState] = {}
@@ -187,7 +188,7 @@ class Flow:
 
 
 def make_unknown_flow(source: str, path: str) -> Flow:
-    """Return the possible ends of a node whose effects are unknown; `source` fails at the path `path`."""
+    """Return the possible ends of the node `source` at `path`, whose effects are unknown."""
     failure = PossibleFailure(source, UNKNOWN_NAME, path)
     return Flow(UNKNOWN_STATE, {failure: UNKNOWN_STATE}, UNKNOWN_STATE)
 
@@ -197,14 +198,13 @@ FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]
 
 
 def find_fixed_point(
-    get_flow: FlowFunction, child: Child, state: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
+    get_flow: FlowFunction, child: Child, entry: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
 ) -> tuple[Flow, FlowState]:
-    """Return the possible ends of a child that is entered repeatedly, and the joined state of all entries.
+    """Return the possible ends of a child that runs repeatedly, and the joined state of all entries.
 
-    `state` is the state at the first entry. `get_next_entry` returns the state at the next entry, given the
-    possible ends of the child; None if the child is not entered again.
+    `entry` is the state before the first run of the child. `get_next_entry` maps the possible ends of
+    the child to the state before the next run; None if there is no next run.
     """
-    entry = state
     while True:
         flow = get_flow(child, entry)
         # Each iteration removes variables or adds states of the tool, so the loop ends.
@@ -215,28 +215,28 @@ def find_fixed_point(
 
 
 def join_states(states: Iterable[FlowState | None]) -> FlowState | None:
-    """Join the states that can occur; None stands for a state that cannot occur."""
+    """Return the join of the states that can occur; None stands for a state that cannot occur."""
     possible_states = [state for state in states if state is not None]
     return reduce(FlowState.join, possible_states) if possible_states else None
 
 
 def find_end_tool_states(flow: Flow, entry: FlowState, can_be_halted: bool) -> ToolStates:
-    """Return the possible states of the tool at the end of a branch that was entered in the state `entry`."""
+    """Return the possible states of the tool after a branch from the state `entry`, with or without halt."""
     halt_states = (flow.halted, entry) if can_be_halted else ()
     return (join_states((flow.success, *flow.failures.values(), *halt_states)) or entry).tool_states
 
 
 def combine_tool_states(entry: ToolStates, branch_ends: Iterable[ToolStates]) -> ToolStates:
-    """Return the possible states of the tool after parallel branches, at most one of which uses the tool.
+    """Return the possible states of the tool after parallel branches; at most one branch uses the tool.
 
-    `entry` are the states before the branches, `branch_ends` the states at the end of each branch.
+    `entry` are the states before the branches; `branch_ends` are the states after each branch.
     """
-    changed = [states for states in branch_ends if _remove_history(states) != _remove_history(entry)]
-    if any(states is None for states in changed):
+    changed_ends = [states for states in branch_ends if _remove_history(states) != _remove_history(entry)]
+    if any(states is None for states in changed_ends):
         return None
-    return frozenset(tool for states in changed for tool in states or ()) if changed else entry
+    return frozenset(state for states in changed_ends for state in states or ()) if changed_ends else entry
 
 
 def _remove_history(tool_states: ToolStates) -> frozenset[tuple[ToolState, str]] | None:
     """Return the possible states of the tool and their causes, without handled failures and motions."""
-    return None if tool_states is None else frozenset((tool.state, tool.cause) for tool in tool_states)
+    return None if tool_states is None else frozenset((state.state, state.cause) for state in tool_states)

@@ -17,8 +17,8 @@ from executive.tree.loop import Loop
 class ForEach(Loop):
     """Run the body once for every element of a list, in order.
 
-    The node reads the list when it starts; an empty list is success at once. None is an ordinary element. A
-    failure of the body ends the loop and is passed on. The variable `each` is removed at the end.
+    The node reads the list at its start; with an empty list, the node succeeds at once. A failure of the body
+    ends the loop and is passed on. At its end, the node removes the variable `each`.
     """
 
     keyword = "for_each"
@@ -48,7 +48,7 @@ class ForEach(Loop):
             self._write_element()
 
     def step(self) -> Status:
-        """Tick the body; begin the next iteration in the same tick if `begin_iteration` allows it."""
+        """Tick the body; after its end, begin the next iteration, in the same tick if possible."""
         while self._element_index < len(self._elements):
             status = self.tick_in_iteration(self.do)
             if status is Status.RUNNING:
@@ -68,9 +68,10 @@ class ForEach(Loop):
         self.blackboard.remove(self.each)
 
     def _write_element(self) -> None:
-        element, number = self._elements[self._element_index], self._element_index + 1
+        element = self._elements[self._element_index]
         self.blackboard.write({self.each: element})
-        self.report_choice(f"element {number} of {len(self._elements)}: {_describe_element(element)}")
+        position = f"element {self._element_index + 1} of {len(self._elements)}"
+        self.report_choice(f"{position}: {_describe_element(element)}")
 
     def _read_list(self) -> tuple[object, ...]:
         variable = self.in_
@@ -92,18 +93,18 @@ class ForEach(Loop):
         return tuple(value)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; the body is entered again in the state after its success."""
+        """Return the possible ends; each iteration starts in the state after success of the body."""
         if self.in_ == ():
             return Flow(state, {}, None)
         entry = state.with_variables([self.each])
-        body_flow, entry = find_fixed_point(get_flow, self.do, entry, lambda flow: flow.success)
+        body, entry = find_fixed_point(get_flow, self.do, entry, lambda body: body.success)
         # A list in a variable may be empty.
-        success = join_states((body_flow.success, state if isinstance(self.in_, VariableName) else None))
-        # While the loop waits for the next tick before an iteration, it can be halted.
-        halted = join_states((body_flow.halted, entry))
+        success = join_states((body.success, state if isinstance(self.in_, VariableName) else None))
+        # A halt is also possible between two iterations.
+        halted = join_states((body.halted, entry))
         return Flow(
             success and success.without_variable(self.each),
-            {failure: end.without_variable(self.each) for failure, end in body_flow.failures.items()},
+            {failure: end.without_variable(self.each) for failure, end in body.failures.items()},
             halted and halted.without_variable(self.each),
         )
 
@@ -117,7 +118,7 @@ class ForEach(Loop):
         return "the body runs 0 times"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return a text with the element at which the body failed."""
+        """Return the element at which the body failed."""
         return f"failed at {failure.last_choice}"
 
 

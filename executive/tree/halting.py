@@ -1,4 +1,4 @@
-"""Halt of a tree: every running node is stopped once, even if the clean-up of another node fails.
+"""Halt of a tree, which stops every running node once, even if the clean-up of another node fails.
 
 The function `halt` replaces the `stop` of py_trees, because `stop` also calls `terminate` of nodes that have
 ended, and leaves nodes running after the first exception of a `terminate`.
@@ -13,7 +13,7 @@ from executive.errors import Fault
 
 
 def halt(root: Behaviour) -> list[str]:
-    """End every running node of the tree `root`, children first; return the messages of failed clean-ups."""
+    """Stop every running node of the tree `root`, children first; return the messages of failed clean-ups."""
     problems = []
     for node in root.iterate():
         if node.status is Status.RUNNING:

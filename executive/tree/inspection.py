@@ -1,4 +1,4 @@
-"""Types with which control nodes, checker and diagnosis exchange facts, failures, findings and advice."""
+"""Inputs and results of the methods of control nodes for the checker and for the diagnosis."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class NodeFinding:
 
 
 class NodeAnalysis(Protocol):
-    """Facts of the checker about a control node in a mission and about the children of the node."""
+    """Static analysis of a control node in a mission and of the children of the node."""
 
     @property
     def is_halted_by_sibling(self) -> bool:
@@ -47,8 +47,8 @@ class NodeAnalysis(Protocol):
     def get_name(self, child: Child) -> str:
         """Return the name of a child in paths."""
 
-    def describe_place(self, reason: Reason, reported: Reason) -> str:
-        """Return the place of `reason`, as text for a finding at the place of `reported`: `line 12`."""
+    def describe_place(self, reason: Reason, reported_reason: Reason) -> str:
+        """Return the line of `reason` as a text, with the file if `reported_reason` is in another file."""
 
     def is_literal(self, key: str) -> bool:
         """Return True if the value of a key is written at the node, not in a param or an argument."""
@@ -57,23 +57,22 @@ class NodeAnalysis(Protocol):
         """Return a lower bound of the time in which a child can succeed [s]."""
 
     def list_skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
-        """Return the names and minimum times [s] of the skills in and below a child."""
+        """Return the name and the minimum time [s] of each skill in a child."""
 
     def list_skills(self) -> Sequence[type[Skill] | None]:
-        """Return the skills below the node; None stands for a skill that is not installed."""
+        """Return the skills in the node; None stands for a skill that is not installed."""
 
 
 @dataclass(frozen=True)
 class PropagatedFailure:
-    """A failure that ended a run, described for a control node that passed the failure on or caused it.
+    """A failure that ended a run, for a control node that passed the failure on or caused the failure.
 
     Attributes:
         child: The child that passed the failure on; None if the node itself caused the failure.
         name: Name of the failure: `Grasp.missed`.
-        reasons: All reasons that denote the failure at this node: `Skill.reason`, and one `label.reason` per
-            label.
-        handled_counts: Number of failures that the node handled before, by name.
-        last_messages: The last message of each handled failure, by name.
+        reasons: Reasons that denote the failure: `Skill.reason`, and `label.reason` for each label.
+        handled_counts: Number of earlier failures that the node handled, by name of the failure.
+        last_messages: Last message of each handled failure, by name of the failure.
         last_handled_name: Name of the failure that the node handled last, or "".
         last_choice: Last decision of the node as a text: `attempt 2 of 3`.
         duration: Time from the start of the node to its end [s].
@@ -92,7 +91,7 @@ class PropagatedFailure:
 
     def matches(self, reasons: Sequence[Reason]) -> bool:
         """Return True if one of `reasons` denotes the failure."""
-        # The checker uses a subclass with a position; its instances are never equal to a `Reason`.
+        # A `FailureName` of the checker is a `Reason` with a position, and equals no plain `Reason`.
         return any(Reason(reason.source, reason.reason) in self.reasons for reason in reasons)
 
 

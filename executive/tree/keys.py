@@ -1,4 +1,4 @@
-"""Declarations of the keys of control nodes, from which parser, schema, checks and builder are derived."""
+"""Declarations of the keys of control nodes; parser, schema, checks and builder use the declarations."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ class Key:
         doc: Meaning of the key, one sentence.
         default: Value if the key is missing; `...` for a required key.
         ge, gt: Inclusive and exclusive lower bound of a number, or None.
-        max_key: For a number: key with a list of nodes, whose length is the maximum of the number; or "".
+        max_key: For a number: key with a list of nodes; the number is at most the length of the list. Or "".
         max_count: For a list of nodes: maximum number of nodes, or None.
         is_shorthand: True if the key may be omitted and its value written directly under the keyword.
-        is_sibling: True if the key is written at the level of the keyword, as `catch` beside `try`.
+        is_sibling: True if the key is a sibling of the keyword in the mission file: `catch` next to `try`.
         is_in_path: True if the paths of the nodes under the key contain the key.
-        raising_key: For a list of reasons: key with the nodes whose failures the reasons denote.
-        list_key: For a variable that holds the elements of a list in turn: key with the list; or "".
+        raising_key: For a list of reasons: key with the nodes that may fail with the reasons.
+        list_key: For a loop variable: key with the list whose elements the variable holds; or "".
         name: Name of the key in the mission file.
         attribute: Name of the attribute in the class.
         kind: Kind of the value.
@@ -109,7 +109,7 @@ def key(
     raising_key: str = "do",
     list_key: str = "",
 ) -> Any:
-    """Declare a key in the body of a class; the arguments are attributes of `Key`, without `is_`.
+    """Declare a key in the body of a class; `Key` documents the arguments, `is_shorthand` as `shorthand`.
 
     The name of the key is the name of the attribute, without a trailing underscore.
     """
@@ -142,7 +142,7 @@ class KeyOwner:
         cls.keys = keys
 
     def set_key_values(self, values: Mapping[str, object]) -> None:
-        """Set the attributes of all keys to values by attribute, or else to the defaults of the keys.
+        """Set the attribute of each key to its value in `values`, or to the default of the key.
 
         Raises:
             TypeError: A required value is missing, or an attribute in `values` belongs to no key.
@@ -158,7 +158,7 @@ class KeyOwner:
 
 
 class KeySection(KeyOwner):
-    """Base class of the sections (mappings) under a key of a control node; a subclass declares their keys."""
+    """Base class of sections: mappings under a key of a control node; a subclass declares the keys."""
 
     def __init__(self, **values: object) -> None:
         self.set_key_values(values)
@@ -166,6 +166,7 @@ class KeySection(KeyOwner):
 
 def _complete_declaration(declaration: Key, attribute: str, annotation: object) -> Key:
     """Return the declaration with the name, kind and type that its attribute and annotation determine."""
+    # `X | None` declares an optional key of the type `X`.
     if get_origin(annotation) in (Union, types.UnionType) and types.NoneType in get_args(annotation):
         member_types = tuple(member for member in get_args(annotation) if member is not types.NoneType)
         annotation = Union[member_types]  # noqa: UP007
@@ -190,7 +191,7 @@ def _complete_declaration(declaration: Key, attribute: str, annotation: object) 
 def _make_validator(
     value_type: object, ge: float | None, gt: float | None, le: float | None
 ) -> TypeAdapter[object]:
-    """Return the validator of a type whose numbers must be `>= ge`, `> gt` and `<= le`; None: no bound."""
+    """Return the validator of a type with the bounds `>= ge`, `> gt` and `<= le` for numbers, or None."""
     is_union = get_origin(value_type) in (Union, types.UnionType)
     bounds = Field(ge=ge, gt=gt, le=le)
     member_types = tuple(

@@ -9,11 +9,10 @@ from executive.tree.node import ControlNode
 
 
 class Loop(ControlNode):
-    """Base class of loops: runs iterations, and records whether an iteration took at least one tick.
+    """Base class of loops, which decides whether the next iteration may run in the current tick.
 
-    After an iteration that began and ended within one tick, the next iteration waits for the next tick;
-    otherwise a body that always ends at once would keep the tick from ending. After a longer iteration, the
-    next iteration begins in the same tick, so that a loop causes no idle ticks.
+    After an iteration within one tick, the next iteration begins in the next tick, so that the loop never
+    blocks the tick. After a longer iteration, the next iteration begins in the same tick.
 
     Attributes:
         has_tick_passed: True if at least one tick has ended during the current iteration.

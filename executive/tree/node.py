@@ -1,8 +1,8 @@
-"""Base class of control nodes: a py_trees behaviour that ticks its children directly.
+"""Base classes of the nodes of a tree.
 
-A control node is one class in one file, registered by an entry point. The class declares its keys and
-implements `start` and `step` for the run, `compute_flow` and `min_time` for the checker, and `explain` for
-the diagnosis.
+A control node is one class in one file, registered by an entry point. The class declares its keys in the
+mission file, and implements `start` and `step` for the run, `compute_flow` and `min_time` for the checker,
+and `explain` for the diagnosis.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from executive.tree.keys import Child, KeyKind, KeyOwner, KeySection
 
 @dataclass(frozen=True)
 class NodeContext:
-    """Path and label of a node in a tree, and the parts of the run that the node uses.
+    """Path and label of a node, and the parts of the run that the node uses.
 
     Attributes:
         path: Unique path from the root of the tree.
         clock: Clock of the run.
         blackboard: Variables of the run.
         label: Label of the node in the mission, or "".
-        emit: Callback that receives the events of the node.
+        emit: Function that emits the events of the node.
     """
 
     path: str
@@ -46,14 +46,14 @@ class NodeContext:
 
 
 class TreeNode(Behaviour):
-    """Base class of control nodes and of leaves with skills: `tick_once` also serves the ticks of py_trees.
+    """Base class of control nodes and skill leaves: a py_trees behaviour that `tick_once` ticks.
 
     Attributes:
         path: Unique path from the root of the tree.
         label: Label of the node in the mission, or "".
         blackboard: Variables of the run.
         failure: The failure while the status is FAILURE; else None.
-        subtree_names: Names of the subtrees whose root is this node, the outermost first.
+        subtree_names: Names of the subtrees with this node as root, the outermost first.
     """
 
     subtree_names: tuple[str, ...] = ()
@@ -83,9 +83,9 @@ class ControlNode(KeyOwner, TreeNode):
         reasons: Declared reasons of the failures that the node itself causes.
         symbol: Character before the name of the node in drawings.
         shape: Shape of the node in Graphviz drawings.
-        remedy: Advice to put this node around a failing node, so that this node handles the failure; the name
-            of the failing node follows. "" if this node handles no failures.
-        keyword_hints: Hint for each wrong keyword that authors may write instead of `keyword`.
+        remedy: Advice to let this node handle a failure: `add a retry around`; the name of the failing node
+            follows. "" if this node handles no failures.
+        keyword_hints: Hints for authors, by wrong keyword that the authors wrote instead of `keyword`.
         clock: Clock of the run.
     """
 
@@ -111,32 +111,32 @@ class ControlNode(KeyOwner, TreeNode):
 
     @property
     def detail(self) -> str:
-        """The constants of the node that differ from their defaults, as a text for outlines."""
+        """The constants of the node that differ from their defaults, as a text for drawings of the tree."""
         constants = [key for key in self.keys.values() if key.kind is KeyKind.CONSTANT]
         values = [(key, getattr(self, key.attribute)) for key in constants]
         return ", ".join(f"{key.name}: {value}" for key, value in values if value != key.default)
 
     def describe_trigger(self, child: Child) -> str:
-        """Return a text with the failures after which a child runs, such as `on Grasp.missed`, or ""."""
+        """Return the failures after which a child runs: `on Grasp.missed`; "" for other children."""
         del child
         return ""
 
     # Methods for the run.
 
     def start(self) -> None:
-        """Begin an activation; called before the first `step`."""
+        """Begin an activation: the ticks from the start of the node to its end."""
 
     def step(self) -> Status:
         """Continue by one tick; return RUNNING, SUCCESS, or FAILURE after a call of `fail`."""
         raise NotImplementedError
 
     def clean_up(self) -> None:
-        """End an activation; called once, also after a halt or a fault."""
+        """End an activation; called once per activation, also after a halt or a fault."""
 
     # Methods for the checker.
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends of the node that is entered in `state`; `get_flow` does so for a child."""
+        """Return the possible ends of the node from a state; `get_flow` returns those of a child."""
         raise NotImplementedError
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
@@ -150,7 +150,7 @@ class ControlNode(KeyOwner, TreeNode):
         yield from ()
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause if a child can never run; "" if another finding reports the cause."""
+        """Return the cause for which a child never runs; "" if another finding reports the cause."""
         del child
         return ""
 
@@ -166,18 +166,18 @@ class ControlNode(KeyOwner, TreeNode):
 
     @property
     def children_halted_by_sibling(self) -> tuple[Child, ...]:
-        """Children that the node halts when another child has ended; an endless loop is allowed in them."""
+        """Children that the node halts after the end of another child; they may contain endless loops."""
         return ()
 
     # Methods for the diagnosis.
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the reason why the node did not handle a failure; "" if the node never handles failures."""
+        """Return the cause for which the node passed a failure on; "" if the node passes on all failures."""
         del failure
         return ""
 
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int] | None:
-        """Return the number of the failed attempt and the number of allowed attempts, or None."""
+        """Return the number of the failed attempt and the maximum; None if the node has no attempts."""
         del failure
         return None
 
@@ -201,7 +201,7 @@ class ControlNode(KeyOwner, TreeNode):
         return status
 
     def halt_children(self, children: Iterable[Child]) -> None:
-        """Halt the children with all running nodes below them, one child after the other.
+        """Halt the children and all running nodes below the children, one child after the other.
 
         Raises:
             Fault: The clean-up of a node failed; all other nodes were halted nevertheless.
@@ -210,23 +210,23 @@ class ControlNode(KeyOwner, TreeNode):
             raise Fault("; ".join(problems), self.path)
 
     def get_failure(self, child: Child) -> Failure:
-        """Return the failure of a child; for a py_trees behaviour, a failure with the reason `failed`."""
+        """Return the failure of a child; the reason is `failed` for a behaviour that is no `TreeNode`."""
         failure = getattr(child, "failure", None)
         if isinstance(failure, Failure):
             return failure
         return Failure("failed", child.feedback_message, child.name, self.path)
 
     def fail(self, failure: Failure) -> Status:
-        """Pass on a failure of a child: set `failure`, and return FAILURE."""
+        """End with a failure: set `failure` with the label of this node, and return FAILURE."""
         self.failure = failure.with_label(self.label)
         return Status.FAILURE
 
     def fail_with_reason(self, reason: str, message: str) -> Status:
-        """Fail with one of the `reasons` of this class: set `failure`, and return FAILURE."""
+        """End with a failure of this node, with one of the declared `reasons`, and return FAILURE."""
         return self.fail(Failure(reason, message, self.keyword, self.path))
 
     def report_choice(self, choice: str, cause: Failure | None = None) -> None:
-        """Emit an event with a decision of the node, and with the failure that caused it, or None."""
+        """Emit an event with a decision of the node, and with the failure that caused the decision."""
         reason, message = (str(cause), cause.message) if cause else ("", "")
         self._emit(BranchChosen(self.path, choice, reason, message))
 
@@ -259,6 +259,7 @@ class ControlNode(KeyOwner, TreeNode):
                 self._emit(NodeEnded(self.path, new_status.value))
 
     def _end(self, status: Status) -> None:
+        """Set the final status, clean up, and emit the end."""
         self.status = status
         self.clean_up()
         failure = self.failure if status is Status.FAILURE else None
@@ -266,11 +267,7 @@ class ControlNode(KeyOwner, TreeNode):
         self._emit(NodeEnded(self.path, status.value, reason=reason, message=message, origin=origin))
 
     def _check_constants(self) -> None:
-        """Check that all constants have the declared types and bounds.
-
-        Raises:
-            InputError: A constant has another type or is out of bounds.
-        """
+        """Raise an InputError if a constant has another type than declared, or is out of bounds."""
         for key in self.keys.values():
             value = getattr(self, key.attribute)
             if key.kind is KeyKind.CONSTANT and value != key.default:
@@ -278,15 +275,16 @@ class ControlNode(KeyOwner, TreeNode):
                 try:
                     key.make_validator(max_value).validate_python(value, strict=True)
                 except ValidationError as invalid:
-                    # In a union of types, an exceeded bound explains more than the errors of the other types.
-                    errors = sorted(invalid.errors(), key=lambda error: "than" not in error["type"])
+                    # For a union of types, pydantic reports several errors. An exceeded bound, for instance
+                    # `greater_than`, explains more than a wrong type.
+                    error = min(invalid.errors(), key=lambda error: "than" not in error["type"])
                     name = f"{self.keyword}.{key.name}"
-                    message = f"{self.path}: {name} cannot be {value!r}: {errors[0]['msg']}"
+                    message = f"{self.path}: {name} cannot be {value!r}: {error['msg']}"
                     raise InputError(message) from None
 
 
 def _find_nodes(value: object) -> list[Child]:
-    """Return the nodes in the value of a key."""
+    """Return all nodes in the value of a key: a node, a list, a section or a constant."""
     if isinstance(value, KeySection):
         return [node for key in value.keys.values() for node in _find_nodes(getattr(value, key.attribute))]
     if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""Control nodes by their keywords, found through the entry-point group `executive.control_nodes`."""
+"""Registry of control nodes: the classes that packages register as entry points, by keyword."""
 
 from __future__ import annotations
 
@@ -47,13 +47,14 @@ def _find_problem(keyword: str, node_class: object) -> str:
         return "is not a ControlNode subclass"
     class_keyword = node_class.keyword
     if not _KEYWORD_PATTERN.fullmatch(keyword) or class_keyword != keyword:
-        return f'must have the name of its class, in lower case: the class has the keyword "{class_keyword}"'
+        return f'must have the keyword of its class as its name, in lower case: "{class_keyword}"'
     for method in ("step", "compute_flow"):
         if getattr(node_class, method) is getattr(ControlNode, method):
             return f"has no method {method}"
-    # Some attributes of py_trees behaviours exist only on instances.
+    # A behaviour of py_trees sets attributes in `__init__`, so that only an instance has all names.
     instance = ControlNode(NodeContext("", cast("Clock", None), Blackboard()))
     for key in node_class.keys.values():
+        # `as` gives a node its label.
         if key.name == "as" or hasattr(instance, key.attribute):
-            return f'cannot have the key "{key.name}": the name is used already'
+            return f'cannot have the key "{key.name}": the name is reserved'
     return ""

@@ -22,7 +22,7 @@ from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
 
 MAX_CHILDREN = 200
-"""Maximum number of children; limits the time of the checker, which compares every pair of children."""
+"""Maximum number of children; the bound limits the duration of a check of all pairs of children."""
 
 
 class Parallel(ControlNode):
@@ -31,14 +31,14 @@ class Parallel(ControlNode):
     Every running child is ticked once per tick, in order; a child that has ended is not run again. The node
     decides after all running children were ticked:
 
-    * If enough children have succeeded, the node succeeds, even if others failed in the same tick, and halts
-      the running children.
-    * If too many children have failed, the node fails with the first failure; the order of the children
-      decides between failures in the same tick. With `halt`, the node halts the running children at once;
-      without `halt`, the node lets the running children finish, so that a motion is completed.
+    * If enough children have succeeded, the node halts the running children and succeeds, even if other
+      children failed in the same tick.
+    * If too many children have failed, the node fails with the first failure, and of several failures in one
+      tick, with that of the first child. With `halt`, the node halts the running children at once; without
+      `halt`, the running children finish.
 
-    With `wait_for: lead`, the node ends in the tick in which its first child, the lead, ends, with the status
-    of the lead, and halts the others.
+    With `wait_for: lead`, the first child is the lead: the node ends in the same tick as the lead, with the
+    status of the lead, and halts the other children.
     """
 
     keyword = "parallel"
@@ -67,17 +67,17 @@ class Parallel(ControlNode):
 
     @property
     def detail(self) -> str:
-        """The number of children that must succeed, and whether a failure halts the others."""
+        """The number of children that must succeed, and the option `halt`, as a text."""
         if self._has_lead:
             return "wait for the lead"
-        count, required = len(self.do), self._required_count
-        wait = "wait for all" if required == count else f"wait for {required} of {count}"
-        return f"{wait}, halt" if self.halt else wait
+        child_count, required_count = len(self.do), self._required_count
+        counts = "all" if required_count == child_count else f"{required_count} of {child_count}"
+        return f"wait for {counts}, halt" if self.halt else f"wait for {counts}"
 
     def start(self) -> None:
         """Begin with all children."""
         self._running_children = list(self.do)
-        self._missing_count = self._required_count
+        self._missing_successes = self._required_count
         self._first_failure: Failure | None = None
 
     def step(self) -> Status:
@@ -104,18 +104,19 @@ class Parallel(ControlNode):
         return Status.RUNNING if statuses == {Status.RUNNING} else self._decide()
 
     def _decide(self) -> Status:
-        """Count the children that ended in this tick, and return the resulting status of the node."""
+        """Count the children that ended in the current tick, and return the status of the node."""
         ended_children = [child for child in self._running_children if child.status is not Status.RUNNING]
         running_children = [child for child in self._running_children if child.status is Status.RUNNING]
         self._running_children = running_children
         failures = [self.get_failure(child) for child in ended_children if child.status is Status.FAILURE]
-        self._missing_count -= len(ended_children) - len(failures)
+        self._missing_successes -= len(ended_children) - len(failures)
         self._first_failure = self._first_failure or next(iter(failures), None)
-        if self._missing_count <= 0:
+        if self._missing_successes <= 0:
             self.halt_children(running_children)
             self._report_choices("enough others succeeded", failures)
             return Status.SUCCESS
-        has_failed = self._missing_count > len(running_children)
+        # Even the success of all running children is then too little.
+        has_failed = self._missing_successes > len(running_children)
         if running_children and not (has_failed and self.halt):
             choice = "let the others finish, then fail" if has_failed else "go on with the others"
             self._report_choices(choice, failures)
@@ -131,21 +132,21 @@ class Parallel(ControlNode):
             self.report_choice(choice, failure)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: every child is entered in the same state, and the ends are combined."""
+        """Return the possible ends: combinations of the ends of all children, which start in one state."""
         flows = [get_flow(child, state) for child in self.do]
-        ends_with_halt = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
+        halted_ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         halted = join_states(flow.halted for flow in flows)
-        halted = halted and halted.with_tool_states(combine_tool_states(state.tool_states, ends_with_halt))
+        halted = halted and halted.with_tool_states(combine_tool_states(state.tool_states, halted_ends))
         if self._has_lead:
-            lead, siblings = flows[0], ends_with_halt[1:]
-            failures = {failure: _combine(state, end, siblings) for failure, end in lead.failures.items()}
-            return Flow(lead.success and _combine(state, lead.success, siblings), failures, halted)
-        failures, required = {}, self._required_count
-        ends = [find_end_tool_states(flow, state, self.halt or required < len(flows)) for flow in flows]
-        can_fail = sum(bool(flow.failures) for flow in flows) > len(flows) - required
+            lead, siblings = flows[0], halted_ends[1:]
+            failures = {cause: _add_siblings(state, end, siblings) for cause, end in lead.failures.items()}
+            return Flow(lead.success and _add_siblings(state, lead.success, siblings), failures, halted)
+        failures, can_be_halted = {}, self.halt or self._required_count < len(flows)
+        ends = [find_end_tool_states(flow, state, can_be_halted) for flow in flows]
+        can_fail = len([flow for flow in flows if flow.failures]) > len(flows) - self._required_count
         for index, flow in enumerate(flows if can_fail else ()):
             siblings = [*ends[:index], *ends[index + 1 :]]
-            failures |= {failure: _combine(state, end, siblings) for failure, end in flow.failures.items()}
+            failures |= {cause: _add_siblings(state, end, siblings) for cause, end in flow.failures.items()}
         return Flow(self._compute_success_state(flows, state), failures, halted)
 
     def _compute_success_state(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
@@ -164,7 +165,7 @@ class Parallel(ControlNode):
         return success.with_tool_states(combine_tool_states(state.tool_states, ends))
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of the lead, or the n-th shortest if n children must succeed [s]."""
+        """Return the minimum time of the lead; without a lead, of the last required success [s]."""
         if self._has_lead:
             return get_min_time(self.do[0])
         return sorted(map(get_min_time, self.do))[self._required_count - 1]
@@ -180,17 +181,17 @@ class Parallel(ControlNode):
         return self.do[1:] if self._has_lead else ()
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return a text with the number of children that must succeed, and the other failures."""
+        """Return the number of children that must succeed, and the failures of the other children."""
         if self._has_lead:
             return "ends with the status of its first child, the lead"
-        count = len(self.do)
-        required_texts = {"all": f"all {count}", "any": f"one of its {count}"}
-        required = required_texts.get(str(self.wait_for), f"{self.wait_for} of its {count}")
-        # The handled failures may include the passed failure, which was reported while other children ran.
-        others = ", ".join(name for name in failure.handled_counts if name != failure.name)
-        return f"needs {required} branches" + (f"; also failed: {others}" if others else "")
+        child_count = len(self.do)
+        counts = {"all": f"all {child_count}", "any": f"one of its {child_count}"}
+        count = counts.get(str(self.wait_for), f"{self.wait_for} of its {child_count}")
+        # The handled failures may include the first failure, which the node passed on later.
+        other_names = ", ".join(name for name in failure.handled_counts if name != failure.name)
+        return f"needs {count} branches" + (f"; also failed: {other_names}" if other_names else "")
 
 
-def _combine(entry: FlowState, end: FlowState, siblings: Iterable[ToolStates]) -> FlowState:
-    """Return the state `end` after one child, with the states of the tool after all children."""
+def _add_siblings(entry: FlowState, end: FlowState, siblings: Iterable[ToolStates]) -> FlowState:
+    """Return the state `end` after one child, with the effects of all siblings on the tool."""
     return end.with_tool_states(combine_tool_states(entry.tool_states, [end.tool_states, *siblings]))

@@ -15,7 +15,7 @@ from executive.tree.loop import Loop
 class Repeat(Loop):
     """Run the body repeatedly, up to a maximum number of iterations or until an expected failure.
 
-    Both ends of the loop are a success. Any other failure of the body ends the loop and is passed on.
+    The loop succeeds in both cases. Any other failure of the body ends the loop and is passed on.
     """
 
     keyword = "repeat"
@@ -40,7 +40,7 @@ class Repeat(Loop):
         self._completed_count = 0
 
     def step(self) -> Status:
-        """Tick the body; begin the next iteration in the same tick if `begin_iteration` allows it."""
+        """Tick the body; after its end, begin the next iteration, in the same tick if possible."""
         while self._completed_count != self.times:
             status = self.tick_in_iteration(self.do)
             if status is Status.RUNNING:
@@ -57,16 +57,15 @@ class Repeat(Loop):
         return Status.SUCCESS
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: the body is entered again in the state after its success."""
+        """Return the possible ends; each iteration starts in the state after success of the body."""
         if self.times == 0:
             return Flow(state, {}, None)
         body, entry = find_fixed_point(
-            get_flow, self.do, state, lambda flow: None if self.times == 1 else flow.success
+            get_flow, self.do, state, lambda body: None if self.times == 1 else body.success
         )
-        items = body.failures.items()
-        expected_ends = [end for failure, end in items if failure.may_match(self.until)]
+        expected_ends = [end for failure, end in body.failures.items() if failure.may_match(self.until)]
         success = join_states((*expected_ends, None if self.times is None else body.success))
-        failures = {failure: end for failure, end in items if not failure.must_match(self.until)}
+        failures = {cause: end for cause, end in body.failures.items() if not cause.must_match(self.until)}
         return Flow(success, failures, join_states((body.halted, entry)))
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
@@ -79,7 +78,7 @@ class Repeat(Loop):
         return "the body runs 0 times"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return a text with the condition under which the loop would have succeeded."""
+        """Return the condition under which the loop succeeds."""
         del failure
         if self.until:
             return f"succeeds only with {format_reasons(self.until)}"

@@ -1,4 +1,4 @@
-"""Loop that runs its body again after a failure."""
+"""Loop with a maximum number of attempts."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from executive.tree.loop import Loop
 
 
 class Backoff(KeySection):
-    """Delays before further attempts, which grow by a factor from one failure to the next."""
+    """Delays before further attempts, which grow geometrically."""
 
     first: Seconds = key(gt=0, shorthand=True, doc="Delay before the second attempt [s].")
     factor: float = key(default=1.0, ge=1, doc="Ratio of each delay to the previous delay; 1 if not given.")
     max: Seconds = key(default=inf, gt=0, doc="Maximum delay [s].")
 
     def __str__(self) -> str:
-        factor = f", times {self.factor:g} each" if self.factor != 1 else ""
-        limit = f", at most {self.max:g} s" if isfinite(self.max) else ""
-        return f"{self.first:g} s{factor}{limit}"
+        factor_text = f", factor {self.factor:g}" if self.factor != 1 else ""
+        max_text = f", at most {self.max:g} s" if isfinite(self.max) else ""
+        return f"{self.first:g} s{factor_text}{max_text}"
 
     def compute_delay(self, attempt: int) -> float:
-        """Return the delay [s] after a failure of the attempt with the number `attempt`, counted from 1."""
+        """Return the delay [s] after a failure of attempt number `attempt`, counted from 1."""
         try:
             return min(self.first * self.factor ** (attempt - 1), self.max)
         except OverflowError:  # The power exceeds the range of floats.
@@ -64,10 +64,10 @@ class Retry(Loop):
 
     @property
     def detail(self) -> str:
-        """The number of attempts, the failures that are retried, and the delays, as a text."""
-        after = format_reasons(self.on) or "any failure"
-        backoff = "" if self.backoff is None else f", backoff {self.backoff}"
-        return f"up to {self.attempts} attempts, on {after}{backoff}"
+        """The number of attempts, the failures before further attempts, and the delays, as a text."""
+        reasons = format_reasons(self.on) or "any failure"
+        backoff_text = "" if self.backoff is None else f", backoff {self.backoff}"
+        return f"up to {self.attempts} attempts, on {reasons}{backoff_text}"
 
     def start(self) -> None:
         """Begin the first attempt."""
@@ -76,7 +76,7 @@ class Retry(Loop):
         self._pending_failure: Failure | None = None
 
     def step(self) -> Status:
-        """Tick the current child; begin the next attempt in the same tick if `begin_iteration` allows it."""
+        """Tick body or recovery; after the recovery, begin the next attempt, in the same tick if possible."""
         while True:
             if self._pending_failure is None:
                 status = self.tick_in_iteration(self.do)
@@ -94,7 +94,7 @@ class Retry(Loop):
                 return Status.RUNNING
 
     def _begin_delay(self, failure: Failure) -> Steps:
-        """Report the next attempt, and return the steps of the delay before the attempt."""
+        """Report the next attempt, and return a generator that waits for the delay before the attempt."""
         delay = 0.0 if self.backoff is None else self.backoff.compute_delay(self._attempt)
         self._attempt += 1
         delay_text = f" in {delay:g} s" if delay else ""
@@ -116,14 +116,14 @@ class Retry(Loop):
         return status
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: body and recovery are entered in turn until no new state occurs."""
+        """Return the possible ends; body and recovery run in turn until they add no new states."""
 
-        def is_retried(failure: PossibleFailure) -> bool:
+        def can_retry(failure: PossibleFailure) -> bool:
             return not self.on or failure.may_match(self.on)
 
         def compute_retry_state(body: Flow) -> FlowState | None:
-            ends = body.failures.items() if self.attempts != 1 else ()
-            return join_states(end.with_handled_failure(cause) for cause, end in ends if is_retried(cause))
+            failures = body.failures.items() if self.attempts != 1 else ()
+            return join_states(end.with_handled_failure(cause) for cause, end in failures if can_retry(cause))
 
         def compute_recovery_flow(body: Flow) -> Flow:
             retry_state = compute_retry_state(body)
@@ -131,11 +131,11 @@ class Retry(Loop):
                 return Flow(retry_state, {}, None)
             return get_flow(self.recover, retry_state)
 
-        body, _ = find_fixed_point(get_flow, self.do, state, lambda flow: compute_recovery_flow(flow).success)
+        body, _ = find_fixed_point(get_flow, self.do, state, lambda body: compute_recovery_flow(body).success)
         recovery = compute_recovery_flow(body)
-        failed_recovery = join_states(recovery.failures.values())
+        state_after_failed_recovery = join_states(recovery.failures.values())
         failures = {
-            failure: end.join(failed_recovery or end) if is_retried(failure) else end
+            failure: end.join(state_after_failed_recovery or end) if can_retry(failure) else end
             for failure, end in body.failures.items()
         }
         delay_state = compute_retry_state(body) if self.backoff else None
@@ -146,14 +146,14 @@ class Retry(Loop):
         return get_min_time(self.do)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
-        """Yield a warning if nothing changes between the attempts, and if there is only one attempt."""
+        """Yield a warning if nothing changes between the attempts, or if there is only one attempt."""
         skills = analysis.list_skills()
         may_change = any(skill is None or skill.senses or skill.moves for skill in skills)
         if not self.backoff and skills and not may_change:
             message = "this retry changes nothing between its attempts: no node in it looks, moves or waits"
             hint = "Put a look or a motion into do or recover, or wait with backoff."
             yield NodeFinding("", "unchanging-retry", message, hint, is_warning=True)
-        # A number of attempts from a param is no mistake: the param may have another value in another run.
+        # A param with the value 1 is no mistake, because the param may have another value in another run.
         if self.attempts == 1 and analysis.is_literal("attempts"):
             message = "a retry with 1 attempt never runs its body again"
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
@@ -165,7 +165,7 @@ class Retry(Loop):
         return "there is only one attempt" if self.attempts == 1 else "the body never fails"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return a text with the failures of all attempts."""
+        """Return the cause: a failed recovery, a failure that `on` does not list, or no attempts left."""
         counts = Counter(failure.handled_counts)
         if self._has_recovery_failed(failure):
             attempt, _ = self.count_attempts(failure)
@@ -182,7 +182,8 @@ class Retry(Loop):
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int]:
         """Return the number of the failed attempt and the number of allowed attempts."""
         handled_count = sum(failure.handled_counts.values())
-        # The handled failures are all failed attempts but the last, or all failed attempts and the recovery.
+        # The node handled the failures of all attempts except the last; if the recovery failed, the node
+        # handled the failures of all attempts and of the recovery.
         return handled_count + (-1 if self._has_recovery_failed(failure) else 1), self.attempts
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
@@ -191,7 +192,7 @@ class Retry(Loop):
         if self._has_recovery_failed(failure):
             yield Advice(f"handle {failure.last_handled_name} in the recovery", child=self.recover)
         elif attempt == attempts and (not self.on or failure.matches(self.on)):
-            yield Advice(f"allow more than {attempts} attempt{'s' * (attempts > 1)}", "attempts")
+            yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}", "attempts")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
         """Yield the recovery."""

@@ -35,7 +35,7 @@ class Wiring:
 
 
 class SkillLeaf(TreeNode):
-    """Runs one skill: creates an instance at every start, and advances its generator by one step per tick.
+    """Leaf that creates an instance of a skill at every start, and runs one step of the skill per tick.
 
     Attributes:
         skill_name: Name of the skill in the mission.
@@ -50,24 +50,25 @@ class SkillLeaf(TreeNode):
         self.skill_name, self.skill_type, self.wiring, self._cell = name, skill, wiring, cell
         self._run: SkillRun | None = None
         self._item = ""
-        # The skill acts on the item of a required port; an optional item only narrows a choice.
+        # A required port holds the item on which the skill acts; an optional port only limits a choice.
         self._item_ports = tuple(
             name for name, port in skill.ports.items() if port.refers == "item" and port.default is ...
         )
 
     @property
     def detail(self) -> str:
-        """The constants, and the variables whose names differ from their ports, as a text for outlines."""
+        """The constants, and the variables with other names than their ports, as a text for drawings."""
         texts = [self.skill_name] if self.label else []
         texts += [f"{name}: {_format_value(value)}" for name, value in self.wiring.constants.items()]
         for port, variable in {**self.wiring.inputs, **self.wiring.outputs}.items():
-            # The variable of a subtree has the name of the subtree as a prefix: `pick.target`.
+            # A variable of a subtree has the name of the subtree as a prefix: `pick.target`.
             name = variable.rpartition(".")[2]
-            texts += [f"{port}: ${name}"] if name != port else []
+            if name != port:
+                texts.append(f"{port}: ${name}")
         return ", ".join(texts)
 
     def tick_once(self) -> None:
-        """Start the skill, or continue it by one step.
+        """Start the skill, or continue the skill by one step.
 
         Raises:
             Fault: The skill raised an exception that is not a declared failure.
@@ -78,8 +79,8 @@ class SkillLeaf(TreeNode):
         except SkillFailed as error:
             self._fail(error)
         except Exception as error:
-            text = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
-            raise self._end_with_fault(text) from error
+            message = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
+            raise self._end_with_fault(message) from error
         else:
             if has_succeeded:
                 self._succeed(run.read_outputs())
@@ -123,14 +124,14 @@ class SkillLeaf(TreeNode):
         return inputs
 
     def _find_item(self, values: Mapping[str, object]) -> str:
-        """Return the item on which the skill acts, given the values of its ports; "" if there is none."""
+        """Return the item on which the skill acts, from the values of its ports; "" for no item."""
         for value in values.values():
             if isinstance(value, Target):
                 return value.item
         return next((str(values[port]) for port in self._item_ports if values.get(port)), "")
 
-    def _succeed(self, values: Mapping[str, object]) -> None:
-        outputs = {port: values[port] for port in self.wiring.outputs}
+    def _succeed(self, port_values: Mapping[str, object]) -> None:
+        outputs = {port: port_values[port] for port in self.wiring.outputs}
         self.blackboard.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._find_item(outputs) or self._item
         json_outputs = {port: to_json_or_type_name(value) for port, value in outputs.items()}
@@ -142,6 +143,7 @@ class SkillLeaf(TreeNode):
         self._end(Status.FAILURE, error.reason, error.message)
 
     def _end_with_fault(self, message: str) -> Fault:
+        """End the node, and return the fault, which the caller raises."""
         self._end(Status.INVALID, "fault", message)
         return Fault(f"{self.name}: {message}", self.path)
 

@@ -1,4 +1,4 @@
-"""One run of a skill, whose generator is advanced step by step."""
+"""One run of a skill, step by step."""
 
 from __future__ import annotations
 
@@ -16,15 +16,12 @@ class SkillRun:
     """One run of a skill, from its first step until its end or halt.
 
     Args:
-        skill: A new instance with params and inputs.
+        skill: New instance of the skill with params and inputs.
         cell: Cell on which the skill acts.
-
-    Attributes:
-        skill: The instance of the skill.
     """
 
     def __init__(self, skill: Skill, cell: Cell) -> None:
-        self.skill = skill
+        self._skill = skill
         self._cell = cell
         self._generator: Iterator[object] | None = None
 
@@ -38,13 +35,13 @@ class SkillRun:
         try:
             if self._generator is None:
                 # A `run` without `yield` is a plain function: the skill succeeds when the function returns.
-                self._generator = iter(self.skill.run(self._cell) or ())
-            # At the end of the generator, `next` returns `self`, which a skill cannot yield.
+                self._generator = iter(self._skill.run(self._cell) or ())
+            # `self` as the default marks the end of the generator, because a skill cannot yield its run.
             yielded = next(self._generator, self)
         except SkillFailed as failed:
-            if failed.reason in self.skill.reasons:
+            if failed.reason in self._skill.reasons:
                 raise
-            declared = ", ".join(self.skill.reasons) or "none"
+            declared = ", ".join(self._skill.reasons) or "none"
             message = f'it failed with the undeclared reason "{failed.reason}"; it declares: {declared}'
             raise _make_fault(message, failed) from failed
         if yielded is None:
@@ -52,13 +49,13 @@ class SkillRun:
         if yielded is not self:
             name = type(yielded).__name__
             raise Fault(f'it yielded a {name}; to run the steps of another generator, write "yield from"')
-        if unset_outputs := [name for name in self._output_names if not hasattr(self.skill, name)]:
+        if unset_outputs := [name for name in self._output_names if not hasattr(self._skill, name)]:
             raise Fault(f"it succeeded without setting its output {', '.join(unset_outputs)}")
         return True
 
     def read_outputs(self) -> dict[str, object]:
         """Return the values of all outputs by name; only allowed after success."""
-        return {name: getattr(self.skill, name) for name in self._output_names}
+        return {name: getattr(self._skill, name) for name in self._output_names}
 
     def halt(self) -> None:
         """Close the generator, so that its `finally` runs.
@@ -78,7 +75,7 @@ class SkillRun:
 
     @property
     def _output_names(self) -> list[str]:
-        return [name for name, port in self.skill.ports.items() if port.direction is Direction.OUT]
+        return [name for name, port in self._skill.ports.items() if port.direction is Direction.OUT]
 
 
 def _make_fault(message: str, error: Exception) -> Fault:

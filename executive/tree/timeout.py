@@ -19,7 +19,7 @@ CLOCK_TOLERANCE = 0.005
 class Timeout(ControlNode):
     """Fail with the reason `timeout` if the body takes longer than a limit on the clock of the run.
 
-    A body that ends in the tick in which the clock reaches the limit does not exceed the limit.
+    A body that ends in the same tick in which the clock reaches the limit is in time.
     """
 
     keyword = "timeout"
@@ -43,10 +43,10 @@ class Timeout(ControlNode):
         status = self.tick_child(self.do)
         if status is Status.FAILURE:
             return self.fail(self.get_failure(self.do))
-        # The tolerance of 1 ns covers rounding errors of a clock that adds up control periods.
+        # 1 ns covers the rounding errors of a clock that sums control periods.
         if status is Status.RUNNING and self.clock.now >= self._deadline - 1e-9:
             self.halt_children([self.do])
-            return self.fail_with_reason("timeout", f"the body was not done after {self.seconds:g} s")
+            return self.fail_with_reason("timeout", f"the body did not end within {self.seconds:g} s")
         return status
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
@@ -69,7 +69,7 @@ class Timeout(ControlNode):
         message = f"timeout.seconds is {self.seconds:g} s, but its body takes at least {body_time:.2f} s"
         skill_times = [(name, time) for name, time in analysis.list_skill_times(self.do) if time > 0]
         hint = f"Minimum times: {', '.join(f'{name} {time:.2f} s' for name, time in skill_times)}."
-        # In a fallback or a parallel, the minimum times of the skills do not explain their sum.
+        # The minimum times explain the finding only if their sum is the time of the body, as in a sequence.
         has_hint = abs(sum(time for _, time in skill_times) - body_time) <= 1e-9
         yield NodeFinding("seconds", "short-timeout", message, hint if has_hint else "")
 
@@ -79,7 +79,7 @@ class Timeout(ControlNode):
         return self.do
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return a text with the duration of the body and the limit."""
+        """Return the duration of the body and the limit."""
         return f"handles no failures; {failure.duration:.2f} of {self.seconds:g} s had passed"
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:

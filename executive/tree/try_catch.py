@@ -1,4 +1,4 @@
-"""Control node with handlers of failures, and with a child that runs after success and failure."""
+"""Control node with handlers of failures and a final child."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from executive.tree.node import ControlNode
 
 
 class Catch(KeySection):
-    """A handler of failures."""
+    """A handler: a node that runs after certain failures of the body."""
 
     on: Reasons = key(doc="Failures after which the handler runs.")
     do: Child = key(doc="Node to run after one of the failures in `on`.")
 
 
 class TryCatch(ControlNode):
-    """Run a body, a handler if the body fails, and `finally` at the end.
+    """Run the body, a handler if the body fails, and `finally` at the end.
 
     The node succeeds if the body or the handler succeeds. `finally` runs after success and failure, but not
     after a halt or a fault. A failure of `finally` is passed on unless the body or the handler failed too.
@@ -50,7 +50,7 @@ class TryCatch(ControlNode):
     )
 
     def describe_trigger(self, child: Child) -> str:
-        """Return a text with the failures after which the handler `child` runs: `on Grasp.missed`."""
+        """Return the failures after which the handler `child` runs, as a text: `on Grasp.missed`."""
         return next((f"on {format_reasons(handler.on)}" for handler in self.catch if handler.do is child), "")
 
     def start(self) -> None:
@@ -86,22 +86,22 @@ class TryCatch(ControlNode):
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends.
 
-        Each handler is entered in the states after the failures that it handles, `finally` in all end states.
+        Each handler starts after the failures that the handler catches; `finally` starts after all ends.
         """
         body = get_flow(self.do, state)
         success, halted, failures = body.success, body.halted, dict(body.failures)
         earlier_reasons: list[Reason] = []
         for handler in self.catch:
-            handled = {
+            caught_ends = {
                 failure: end.with_handled_failure(failure)
                 for failure, end in body.failures.items()
                 if failure.may_match(handler.on) and not failure.must_match(earlier_reasons)
             }
             earlier_reasons += handler.on
-            entry = join_states(handled.values())
+            entry = join_states(caught_ends.values())
             if entry is None:
                 continue
-            for failure in handled:
+            for failure in caught_ends:
                 if failure.must_match(handler.on):
                     failures.pop(failure, None)
             flow = get_flow(handler.do, entry)
@@ -111,21 +111,21 @@ class TryCatch(ControlNode):
         return flow if self.finally_ is None else _append_finally(self.finally_, flow, get_flow)
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum of the times of body and handlers, plus the time of `finally` [s]."""
-        fastest = min(get_min_time(child) for child in (self.do, *(handler.do for handler in self.catch)))
-        return fastest + (get_min_time(self.finally_) if self.finally_ else 0.0)
+        """Return the minimum time of the body or the fastest handler, plus the time of `finally` [s]."""
+        time = min(get_min_time(child) for child in (self.do, *(handler.do for handler in self.catch)))
+        return time + (get_min_time(self.finally_) if self.finally_ else 0.0)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
-        """Yield a warning for every reason of a handler whose failures earlier reasons catch already."""
+        """Yield a warning for every reason in a handler that has no effect because of earlier reasons."""
         body = analysis.get_flow(self.do)
         failures = () if body is None else body.failures
         earlier_reasons: list[Reason] = []
         for reason in [reason for handler in self.catch for reason in handler.on]:
-            matching = [failure for failure in failures if failure.may_match([reason])]
-            if matching and all(failure.must_match(earlier_reasons) for failure in matching):
-                catching = next(earlier for earlier in earlier_reasons if matching[0].must_match([earlier]))
-                place = analysis.describe_place(catching, reason)
-                message = f"{reason} is caught already, as {catching} in {place}"
+            caught = [failure for failure in failures if failure.may_match([reason])]
+            if caught and all(failure.must_match(earlier_reasons) for failure in caught):
+                earlier_reason = next(other for other in earlier_reasons if caught[0].must_match([other]))
+                place = analysis.describe_place(earlier_reason, reason)
+                message = f"{reason} is caught already, as {earlier_reason} in {place}"
                 yield NodeFinding(reason, "unreachable", message, is_warning=True)
             earlier_reasons.append(reason)
 
@@ -135,9 +135,9 @@ class TryCatch(ControlNode):
         return self.do
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return a text with the failures that the node catches, or with the failed handler or `finally`."""
+        """Return the cause: no matching handler, or a failure of the handler or of `finally`."""
         if failure.child is self.finally_:
-            return "the child finally failed"
+            return "its finally failed"
         if failure.child is not self.do:
             name = failure.last_handled_name
             return f"caught {name} ({failure.last_messages.get(name, '')}), but the handler failed"
@@ -150,7 +150,7 @@ class TryCatch(ControlNode):
             yield Advice("catch this failure in the try")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield the handlers, each after a name such as `catch on Grasp.missed`, and `finally`."""
+        """Yield the handlers with names such as `catch on Grasp.missed`, then `finally`."""
         for handler in self.catch:
             yield f"catch on {format_reasons(handler.on)}", handler.do
         if self.finally_ is not None:
@@ -158,7 +158,7 @@ class TryCatch(ControlNode):
 
 
 def _append_finally(finally_child: Child, flow: Flow, get_flow: FlowFunction) -> Flow:
-    """Return the possible ends of a node whose child `finally_child` runs after each end in `flow`."""
+    """Return the possible ends of `finally_child`, which runs after each end in `flow`."""
     success, halted = None, flow.halted
     failures: dict[PossibleFailure, FlowState] = {}
     if flow.success is not None:

@@ -30,7 +30,7 @@ class While(Loop):
         self._current_child = self.condition
 
     def step(self) -> Status:
-        """Tick the current child; begin the next iteration in this tick if `begin_iteration` allows it."""
+        """Tick condition or body; after the body, begin the next iteration, in the same tick if possible."""
         while True:
             child = self._current_child
             status = self.tick_in_iteration(child)
@@ -50,13 +50,13 @@ class While(Loop):
                     return Status.RUNNING
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: condition and body are entered in turn until no new state occurs."""
+        """Return the possible ends; condition and body run in turn until they add no new states."""
 
         def compute_body_flow(condition: Flow) -> Flow:
             return get_flow(self.do, condition.success) if condition.success else Flow(None, {}, None)
 
         condition, entry = find_fixed_point(
-            get_flow, self.condition, state, lambda flow: compute_body_flow(flow).success
+            get_flow, self.condition, state, lambda condition: compute_body_flow(condition).success
         )
         body = compute_body_flow(condition)
         halted = join_states((condition.halted, entry, body.halted))
@@ -75,6 +75,6 @@ class While(Loop):
         return "the condition never succeeds"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return a text with the rule for failures of the body."""
+        """Return the cause: only a failure of the condition is a success."""
         del failure
         return "a failure of the body ends the loop"

@@ -67,4 +67,4 @@ def test_the_wait_is_reported_and_shown_in_the_detail(leaf: Any, site: Any, cloc
     node = retry(site(), leaf("A", "lost"), 3, [("A", "lost")], None, make_backoff(0.5, 2, 8), clock)
     node.tick_once()
     assert (events[-1].choice, events[-1].reason) == ("attempt 2 of 3 in 0.5 s", "A.lost")
-    assert node.detail == "up to 3 attempts, on A.lost, backoff 0.5 s, times 2 each, at most 8 s"
+    assert node.detail == "up to 3 attempts, on A.lost, backoff 0.5 s, factor 2, at most 8 s"

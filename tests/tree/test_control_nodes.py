@@ -30,7 +30,7 @@ def test_a_timeout_halts_its_body_and_says_timeout(leaf: Any, site: Any, clock: 
         node.tick_once()
     assert node.status is Status.FAILURE
     assert str(node.failure) == "timeout.timeout"
-    assert node.failure.message == "the body was not done after 0.3 s"
+    assert node.failure.message == "the body did not end within 0.3 s"
     assert log == ["A starts", "A halted"]
 
 

@@ -186,7 +186,10 @@ def test_a_failure_that_it_passes_on_is_explained(project: Path) -> None:
     [
         ("class Race:\n    pass\n", "is not a ControlNode subclass"),
         ("import nothing_of_this_name\n", "cannot be loaded: ModuleNotFoundError"),
-        (RACE.replace('keyword = "race"', 'keyword = "run"'), 'the class has the keyword "run"'),
+        (
+            RACE.replace('keyword = "race"', 'keyword = "run"'),
+            'the keyword of its class as its name, in lower case: "run"',
+        ),
         (RACE.replace("def compute_flow", "def flow"), "has no method compute_flow"),
         (RACE.replace("do: Children", "status: Children"), 'cannot have the key "status"'),
         (RACE.replace("do: Children =", "do ="), "has no annotation"),

@@ -106,9 +106,10 @@ class CheckerAnalysis:
         """Return the name of a child in paths."""
         return get_path_name(get_mission_node(child))
 
-    def describe_place(self, reason: Reason, reported: Reason) -> str:
-        """Return the position of `reason`, for a finding at the position of `reported`: `line 12`."""
-        return cast("FailureName", reason).span.describe_place(cast("FailureName", reported).span.source)
+    def describe_place(self, reason: Reason, reported_reason: Reason) -> str:
+        """Return the line of `reason` as a text, with the file if `reported_reason` is in another file."""
+        source = cast("FailureName", reported_reason).span.source
+        return cast("FailureName", reason).span.describe_place(source)
 
     def is_literal(self, key: str) -> bool:
         """Return True if the node has a constant at a key, not a param or an argument."""

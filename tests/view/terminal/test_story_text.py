@@ -72,7 +72,7 @@ def test_a_time_that_is_over(abroad) -> None:
     body = "".join(f"    {line}\n" for line in PICK.splitlines())
     tree = "  timeout:\n    seconds: $patience\n    do:\n" + body
     story = FailedRun(tree, objects=CUBE, overrides={"patience": "1.0"}).tell()
-    assert story.verdict == "timeout: the body was not done after 1 s during Transit of cube-1"
+    assert story.verdict == "timeout: the body did not end within 1 s during Transit of cube-1"
     assert (story.node.path, story.node.place) == ("tree/timeout", "trial.yaml:7")
     assert story.advice == [
         "take cube-1 out of the tool before a new run",
