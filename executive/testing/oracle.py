@@ -91,7 +91,7 @@ class TruthCamera(SimCamera):
     def _find_true_detections(self) -> tuple[Detection, ...]:
         outlines = []
         matrix, X_WC = self._get_true_view()
-        for body, label in self._world.bodies.items():
+        for body, label in self._world.labels.items():
             mesh = load_mesh(self._world.models[body])
             outline = self._world.get_object_pose(body).apply(mesh.vertices)
             distances = X_WC.inverse().apply(outline)[:, 2]
@@ -156,7 +156,7 @@ def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> C
         renders_images: True to render the images of the camera; otherwise they are black.
     """
     camera = partial(TruthCamera, renders_images=renders_images)
-    return partial(SimCell, camera=camera, detectors=partial(_build_oracles, box_std=box_std))
+    return partial(SimCell, build_camera=camera, build_detectors=partial(_build_oracles, box_std=box_std))
 
 
 def _build_oracles(

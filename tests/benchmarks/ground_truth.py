@@ -174,7 +174,7 @@ class AuditedCell(SimCell):
     ) -> None:
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options, detectors=detectors)
         self.objects: tuple[FoundObject, ...] = ()
-        self._labels = dict(self._world.bodies)
+        self._labels = dict(self._world.labels)
         self._carried: dict[int, str] = {}
 
     def advance(self) -> None:
@@ -198,7 +198,7 @@ class AuditedCell(SimCell):
         gate = self.config.ledger.gate
         counts = audit_bodies(
             self._world, {body: places}, self.accounts.records, self.cell.bins, self.routes, gate,
-            held=self._tool.held_body, dropped=self._tool.dropped_bodies,
+            held_body=self._tool.held_body, dropped_bodies=self._tool.dropped_bodies,
         )  # fmt: skip
         seen_there = tuple(
             record.item
@@ -207,7 +207,7 @@ class AuditedCell(SimCell):
         )
         carried = self._carried.get(body)
         inside = ""
-        if body in self._world.bodies:
+        if body in self._world.labels:
             position = self._world.get_object_pose(body).position
             bins = self.cell.bins.items()
             inside = next((name for name, bin in bins if bin.contains(position, BIN_THICKNESS)), "")

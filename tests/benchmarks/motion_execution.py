@@ -12,7 +12,7 @@ from executive.cell.clock import STEP, StepClock
 from executive.cell.config import CellConfig
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.tool import SuctionTool
-from executive.cells.sim.world import World, name_held
+from executive.cells.sim.world import World, name_load
 from executive.errors import Blocked, Unreachable
 from executive.geometry import Pose
 from executive.motion.planner import Planner
@@ -79,11 +79,9 @@ class ClearanceMonitor:
 
     def _measure_pairs(self, held: int | None) -> Iterator[tuple[float, str]]:
         world, near = self._world, self._world.client.getClosestPoints
-        bins = (body for bodies in world.bins.values() for body in bodies)
-        things = [
-            body for body in (world.table, *bins, *world.bodies) if body not in (held, self._target_body)
-        ]
-        load = "" if held is None else name_held(world.bodies[held])
+        bodies = (world.table, *world.bin_bodies.values(), *world.labels)
+        things = [body for body in bodies if body not in (held, self._target_body)]
+        load = "" if held is None else name_load(world.labels[held])
         for body in things:
             for point in near(world.arm, body, MAX_MEASURED_DISTANCE):
                 if point[3] >= world.robot.first_moving_link:
@@ -105,7 +103,7 @@ class _Execution:
         self._world = world
         self._tool = SuctionTool(world, cell.tool)
         self._arm = SimArm(
-            world, planner, cell, StepClock(lambda: world.steps * STEP), lambda: self._tool.held_body
+            world, planner, cell, StepClock(lambda: world.step_count * STEP), lambda: self._tool.held_body
         )
         self._scenes = SceneGenerator(cell, planner, world, seed)
         self._margin = cell.motion.margin

@@ -106,7 +106,7 @@ class SceneGenerator:
             InputError: None of `MAX_TRIES` scenes could be used.
         """
         for _ in range(MAX_TRIES):
-            for body in tuple(self._world.bodies):
+            for body in tuple(self._world.labels):
                 self._world.remove_object(body)
             bodies = spawn_objects(self._world, self._cell, int(self._random.integers(2**31)))
             if not bodies:
@@ -145,7 +145,7 @@ class SceneGenerator:
         return Obstacle(x, y, kind.radius, float(low[2]) + kind.height, f"{kind.label}-{number}")
 
     def _kind(self, body: int) -> ObjectClass:
-        label = self._world.bodies[body]
+        label = self._world.labels[body]
         return build_simulated_class(label, self._cell.objects[label])
 
     def _measure_seal(self, body: int, place: tuple[float, float], top: float) -> tuple[float, float]:
@@ -163,5 +163,5 @@ class SceneGenerator:
             force = compute_breakaway_force(seal, tool)
             surface -= seal.distance if seal else 0.0
         if force < tool.min_force:
-            raise Unreachable(f"no seal holds the {self._world.bodies[body]} at its middle")
+            raise Unreachable(f"no seal holds the {self._world.labels[body]} at its middle")
         return surface, force

@@ -146,5 +146,5 @@ def test_doubtful_boxes_count_as_well(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [300, 1000, 3000])
 def test_the_run_ends_at_the_first_look_in_the_simulated_world(tmp_path: Path, count: int) -> None:
-    kind = partial(SimCell, detectors=partial(_crowded, crowd={"count": count}))
+    kind = partial(SimCell, build_detectors=partial(_crowded, crowd={"count": count}))
     assert_ended_as_crowded(*run_crowded(tmp_path, kind), count)

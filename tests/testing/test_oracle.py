@@ -46,7 +46,7 @@ def test_without_jitter_every_object_is_located_where_it_lies_as_late_as_by_a_de
     frame, found = look(made)
     assert made.cell.clock.now == pytest.approx(frame.stamp + 0.05, abs=1e-6)
     assert frame.image.max() == 0
-    bodies = made._world.bodies
+    bodies = made._world.labels
     assert [detection.label for detection in found] == list(bodies.values())
     for detection, body in zip(found, bodies, strict=True):
         place = made.cell.localizer.locate(detection, frame)
@@ -66,8 +66,8 @@ def test_jitter_differs_from_look_to_look_and_repeats_with_the_seed(build):
 
 def test_what_lies_elsewhere_is_in_the_full_view_only_and_what_the_arm_hides_in_none(build):
     made = build(box_std=0.0)
-    body, *_ = made._world.bodies
-    everything = list(made._world.bodies.values())
+    body, *_ = made._world.labels
+    everything = list(made._world.labels.values())
     made._world.place_object(body, Pose.of([0.5, -0.33, 0.03]))
     assert (labels(made), labels(made, "full")) == (everything[1:], everything)
     made._world.place_object(body, Pose.of([0.0, 0.0, 0.03]))
@@ -76,10 +76,10 @@ def test_what_lies_elsewhere_is_in_the_full_view_only_and_what_the_arm_hides_in_
 
 def test_what_another_object_lies_on_is_found_when_that_is_gone(build):
     made = build(box_std=0.0)
-    lower, upper, *_ = made._world.bodies
+    lower, upper, *_ = made._world.labels
     made._world.place_object(lower, Pose.of([0.5, 0.0, 0.03]))
     made._world.place_object(upper, Pose.of([0.5, 0.0, 0.08]))
-    first, *others = made._world.bodies.values()
+    first, *others = made._world.labels.values()
     assert labels(made) == others
     made._world.remove_object(upper)
     assert labels(made) == [first, *others[1:]]

@@ -1,4 +1,4 @@
-"""Driver of the simulated arm, which follows planned trajectories step by step and brakes on demand."""
+"""Driver of the simulated arm, which follows planned trajectories and brakes along their paths."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from executive.cell.clock import STEP
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Clock
 from executive.cells.sim import command_log
-from executive.cells.sim.contacts import Contacts
-from executive.cells.sim.rebuild import InterruptedArm
+from executive.cells.sim.contacts import ContactMonitor
+from executive.cells.sim.rebuild import InterruptedState
 from executive.cells.sim.world import World
 from executive.errors import Fault
 from executive.events import Emit, discard_event
@@ -28,17 +28,14 @@ DIFFERENTIATION_STEP = 1e-4
 START_TOLERANCE = math.radians(0.2)
 """Maximum difference of a joint position between the arm and the start of a motion [rad]."""
 TRACKING_TOLERANCE = math.radians(0.5)
-"""Maximum difference of a joint position between command and arm [rad]; below 0.001° if undisturbed."""
+"""Maximum tracking error of a joint [rad]; the error of an undisturbed arm is below 0.001°."""
 
 
 class SimArm:
     """The arm of a PyBullet world; implements `executive.cell.arm.Arm`.
 
-    `advance` is called once before every physics step, and commands the joint positions at the end of this
-    step. With full position gain and zero target velocity, the tracking error is 0.0005°; with PyBullet's
-    default gain it would be 3°.
-
-    The arm brakes if a disturbance pushes it off its path or if it collides.
+    Each physics step needs one call of `advance` before the step, which commands the joint positions at the
+    end of the step. The arm brakes if a disturbance pushes it off its path or if it collides.
 
     Args:
         world: The world of the arm.
@@ -47,7 +44,7 @@ class SimArm:
         clock: Clock of the run.
         get_held_body: Returns the body that the tool holds, or None; its contacts count as those of the arm.
         emit: Receives the events of the arm.
-        interrupted: Interrupted motion along which the arm brakes; None: the arm is at rest.
+        interrupted_state: State of an interrupted run, from which the arm brakes; None: the arm is at rest.
 
     Attributes:
         planner: Motion planner of the arm.
@@ -61,25 +58,25 @@ class SimArm:
         clock: Clock,
         get_held_body: Callable[[], int | None] = lambda: None,
         emit: Emit = discard_event,
-        interrupted: InterruptedArm | None = None,
+        interrupted_state: InterruptedState | None = None,
     ) -> None:
         self.planner = planner
         self._world = world
         self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
         self._plans = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
-        self._contacts = Contacts(world, get_held_body)
+        self._contact_monitor = ContactMonitor(world, get_held_body)
         self._motion: Trajectory | None = None
-        self._time = 0.0
+        self._motion_time = 0.0
         self._braking_times: list[float] | None = None
         self._fault_message: str | None = None
         self._collision_message: str | None = None
-        self._command = self.q
+        self._commanded_q = self.q
         # A run may be interrupted before the first joint command is logged.
-        if interrupted is None or not interrupted.command.size:
+        if interrupted_state is None or not interrupted_state.command.size:
             self.send_command()
         else:
-            self._command, self._motion = interrupted.command, interrupted.motion
-            self._time = interrupted.time
+            self._commanded_q, self._motion = interrupted_state.command, interrupted_state.motion
+            self._motion_time = interrupted_state.motion_time
             self.stop()
 
     @property
@@ -97,14 +94,14 @@ class SimArm:
     def tool_velocity(self) -> Array:
         """Velocity of the tool centre point in the world `(3,)` [m/s], from the measured joint velocities."""
         states = self._world.client.getJointStates(self._world.arm, range(self._world.robot.joint_count))
-        q, change = np.array([(state[0], state[1] * DIFFERENTIATION_STEP) for state in states]).T
+        q, q_change = np.array([(state[0], state[1] * DIFFERENTIATION_STEP) for state in states]).T
         compute_pose = self.planner.kinematics.compute_tool_pose
-        return (compute_pose(q + change).position - compute_pose(q).position) / DIFFERENTIATION_STEP
+        return (compute_pose(q + q_change).position - compute_pose(q).position) / DIFFERENTIATION_STEP
 
     @property
     def destination(self) -> Array:
         """Position of the tool `(3,)` [m] at the end of the running motion, or now if the arm is at rest."""
-        return self.planner.kinematics.compute_tool_pose(self._end_positions).position
+        return self.planner.kinematics.compute_tool_pose(self._end_q).position
 
     @property
     def at_rest(self) -> bool:
@@ -118,7 +115,7 @@ class SimArm:
 
     @property
     def collision(self) -> str | None:
-        """Description of the collision that ended the last motion, or None."""
+        """Description of the collision that ended the last motion; None: no collision."""
         return self._collision_message
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[Trajectory]:
@@ -129,7 +126,7 @@ class SimArm:
         """
         self._require_rest("plan a motion")
         self._require_pose(goal)
-        return self._plans.plan(self._command, goal, task)
+        return self._plans.plan(self._commanded_q, goal, task)
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:
         """Plan the next motion, from the end of the running motion, before `plan` requests it.
@@ -139,7 +136,7 @@ class SimArm:
         """
         self._require_pose(goal)
         if self._braking_times is None:  # a braking arm does not reach the end of the motion
-            self._plans.plan_ahead(self._end_positions, goal, task)
+            self._plans.plan_ahead(self._end_q, goal, task)
 
     def start(self, motion: Motion) -> None:
         """Begin to follow a motion. The arm must be at rest at the start of the motion.
@@ -151,56 +148,57 @@ class SimArm:
         reject_generator(motion)
         if not isinstance(motion, Trajectory):
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
-        self._check_distance(motion.start, START_TOLERANCE, "the motion starts")
+        self._check_positions(motion.start, START_TOLERANCE, "the start of the motion")
         self._raise_fault()
-        self._motion, self._time, self._collision_message = motion, 0.0, None
-        self._contacts.reset()
+        self._motion, self._motion_time, self._collision_message = motion, 0.0, None
+        self._contact_monitor.reset()
         self._world.log.append_motion(motion)
 
     def stop(self) -> None:
-        """Begin to brake along the path of the running motion, if there is one."""
+        """Begin to brake along the path of the running motion, if any."""
         if self._motion is not None and self._braking_times is None:
-            self._braking_times = list(plan_braking(self._motion, self._time, self.planner.limits, STEP))
+            limits = self.planner.limits
+            self._braking_times = list(plan_braking(self._motion, self._motion_time, limits, STEP))
 
     def run_into(self, obstacle: str) -> None:
-        """Brake as after a collision, and set `collision` to `obstacle`; do nothing if the arm is at rest."""
+        """Set `collision` to `obstacle` and brake; do nothing if the arm is at rest or brakes already."""
         if self._motion is not None and self._braking_times is None:
             self._collision_message = obstacle
             self.stop()
 
     def send_command(self) -> None:
         """Send the current command to the motors."""
-        self._world.command_arm(self._command, self._time)
+        self._world.command_arm(self._commanded_q, self._motion_time)
 
     def advance(self) -> None:
         """Check for disturbances and collisions, and send the command for the next physics step."""
         if self._fault_message is None and self._braking_times is None:
-            self._check_distance(self._command, TRACKING_TOLERANCE, "the command is")
+            self._check_positions(self._commanded_q, TRACKING_TOLERANCE, "the command")
             if self._fault_message is not None:
                 self.stop()
         if self._motion is None:
             return
         if self._braking_times is None:
-            lip_may_touch = self._time >= self._motion.guarded_start_time
-            self._collision_message = self._contacts.describe_new_contact(lip_may_touch)
+            lip_may_touch = self._motion_time >= self._motion.guarded_start_time
+            self._collision_message = self._contact_monitor.describe_new_contact(lip_may_touch)
             if self._collision_message is not None:
                 self.stop()
         if self._braking_times is None:
-            self._time += STEP
-            has_ended = self._time >= self._motion.duration
+            self._motion_time += STEP
+            has_ended = self._motion_time >= self._motion.duration
         else:
-            self._time = self._braking_times.pop(0)
+            self._motion_time = self._braking_times.pop(0)
             has_ended = not self._braking_times
-        self._command = self._motion.state_at(self._time)[0]
+        self._commanded_q = self._motion.state_at(self._motion_time)[0]
         self.send_command()
         if has_ended:
             self._motion, self._braking_times = None, None
             self._world.log.append(command_log.MOTION_END)
 
     @property
-    def _end_positions(self) -> Array:
-        """Joint positions `(n,)` [rad] at the end of the running motion; the command if none runs."""
-        return self._command if self._motion is None else self._motion.end
+    def _end_q(self) -> Array:
+        """Joint positions `(n,)` [rad] at the end of the running motion, or now if the arm is at rest."""
+        return self._commanded_q if self._motion is None else self._motion.end
 
     def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> Trajectory:
         return self.planner.plan(start, self._poses[goal] if isinstance(goal, str) else goal, task)
@@ -209,20 +207,23 @@ class SimArm:
         if isinstance(goal, str) and goal not in self._poses:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
-    def _check_distance(self, q: Array, tolerance: float, text: str) -> None:
-        """Store a fault for the next call if a joint position is over `tolerance` [rad] away from `q`."""
+    def _check_positions(self, q: Array, tolerance: float, description: str) -> None:
+        """Store a fault message if a joint is over `tolerance` [rad] away from `q`.
+
+        The message starts with `description`, a noun phrase for `q`.
+        """
         errors = np.abs(self.q - q)
         joint = int(np.argmax(errors))
         if errors[joint] > tolerance:
             self._fault_message = (
-                f"{text} {math.degrees(errors[joint]):.2f}° away from where joint {joint + 1} of the arm is; "
-                f"{math.degrees(tolerance):.1f}° are allowed"
+                f"{description} is {math.degrees(errors[joint]):.2f}° away from the position of joint "
+                f"{joint + 1}; {math.degrees(tolerance):.1f}° are allowed"
             )
 
     def _require_rest(self, action: str) -> None:
         self._raise_fault()
         if self._motion is not None:
-            remaining = self._motion.duration - self._time
+            remaining = self._motion.duration - self._motion_time
             raise Fault(
                 f"the arm was asked to {action} while moving ({remaining:.2f} s to go); wait for `at_rest`"
             )

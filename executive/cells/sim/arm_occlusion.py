@@ -1,7 +1,8 @@
-"""Occlusion of camera images by the simulated arm, computed from joint positions and kinematics."""
+"""Occlusion of camera images by the simulated arm, from joint positions and kinematics."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -31,7 +32,7 @@ class ArmOcclusion:
         arm: The arm.
         kinematics: Kinematics of the arm.
         config: The cell file.
-        is_loaded: Returns True if the tool holds an object, which is assumed to have the maximum size.
+        is_loaded: Returns True if the tool holds an object. Every held object counts as the largest one.
     """
 
     def __init__(
@@ -45,18 +46,20 @@ class ArmOcclusion:
         self._kinematics = kinematics
         self._is_loaded = is_loaded
         self._link_radius = ROBOT_MODELS[config.arm.urdf].link_radius
-        self._load_radius = max(kind.radius for kind in config.objects.values()) + MAX_LOAD_OFFSET
-        self._load_height = max(kind.height for kind in config.objects.values())
+        models = config.objects.values()
+        self._load_radius = max(model.radius for model in models) + MAX_LOAD_OFFSET
+        self._load_height = max(model.height for model in models)
         heights = (0.0, compute_max_pile_height(config))
-        self._corners = np.array([(x, y, z) for x in config.table.x for y in config.table.y for z in heights])
+        self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
 
     def compute_visibility_mask(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
         """Return a mask `(H, W)` of the pixels that are not occluded; `size` is width and height."""
         q = self._arm.q
-        flange, X_WT = self._kinematics.compute_flange_pose(q).position, self._kinematics.compute_tool_pose(q)
-        frames = self._kinematics.compute_joint_frames(q)
-        joints = [np.zeros(3), *(frame.position for frame in frames), flange]
-        parts: list[ArmPart] = [(joints, self._link_radius), ([flange, X_WT.position], TOOL_SPHERE_RADIUS)]
+        X_WF, X_WT = self._kinematics.compute_flange_pose(q), self._kinematics.compute_tool_pose(q)
+        joint_frames = self._kinematics.compute_joint_frames(q)
+        joints = [np.zeros(3), *(frame.position for frame in joint_frames), X_WF.position]
+        tool_axis = [X_WF.position, X_WT.position]
+        parts: list[ArmPart] = [(joints, self._link_radius), (tool_axis, TOOL_SPHERE_RADIUS)]
         if self._is_loaded():
             load_end = X_WT.apply(np.array([0.0, 0.0, self._load_height]))
             parts.append(([X_WT.position, load_end], self._load_radius))
@@ -64,5 +67,5 @@ class ArmOcclusion:
 
     def is_table_visible(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> bool:
         """Return True if the workspace, up to the height of a pile, is in the image and not occluded."""
-        table = compute_hull_mask(self._corners, matrix, X_WC, size)
-        return table is not None and bool(np.all(self.compute_visibility_mask(matrix, X_WC, size)[table]))
+        mask = compute_hull_mask(self._workspace_corners, matrix, X_WC, size)
+        return mask is not None and bool(np.all(self.compute_visibility_mask(matrix, X_WC, size)[mask]))

@@ -203,7 +203,7 @@ def _move_tool(world: World, X_WT: Pose) -> None:
     X_WE = X_WT @ Pose.of([0, 0, -(world.robot.flange_offset + world.config.tool.length)])
     for _ in range(3):
         q = world.client.calculateInverseKinematics(
-            world.arm, world.flange, X_WE.position, X_WE.quaternion,
+            world.arm, world.flange_index, X_WE.position, X_WE.quaternion,
             maxNumIterations=60, residualThreshold=1e-4,
         )  # fmt: skip
         world.set_joint_positions(q[: world.robot.joint_count])

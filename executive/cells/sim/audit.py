@@ -1,4 +1,4 @@
-"""Counts of the bodies by their true final positions in a simulated world, made only after a run."""
+"""Number of bodies of a simulated world by outcome, for tests and reports after a run."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ def audit_bodies(
     bins: Mapping[str, Bin],
     routes: Routes,
     max_distance: float,
-    held: int | None = None,
-    dropped: Collection[int] = (),
+    held_body: int | None = None,
+    dropped_bodies: Collection[int] = (),
 ) -> dict[str, int]:
     """Return the number of bodies of a simulated world by outcome, as `audit_objects` defines them.
 
     Args:
         world: The simulated world at the end of the run.
-        rest_positions: Positions `(3,)` [m] of each body at the start, and after each time that a test moved
-            it or the tool released it.
+        rest_positions: Positions `(3,)` [m] of each body: initial position, and position after each move by
+            a test and after each release by the tool.
         records: The items of the ledger.
         bins: The bins of the cell.
         routes: Names of the permitted bins of each class.
         max_distance: Maximum horizontal distance from the first position of an item to its object [m].
-        held: Body that the tool holds, or None.
-        dropped: Bodies that fell from the tool and have not been picked up since.
+        held_body: Body that the tool holds, or None.
+        dropped_bodies: Bodies that fell from the tool and have not been picked up since.
     """
 
     def iterate_final_objects() -> Iterator[FinalObject]:
         for body, positions in rest_positions.items():
-            is_removed = body not in world.bodies
+            is_removed = body not in world.labels
             if is_removed:
                 label, position = world.removed_objects[body]
             else:
-                label, position = world.bodies[body], world.get_object_pose(body).position
+                label, position = world.labels[body], world.get_object_pose(body).position
             bin = _find_bin(position, bins)
-            # An item that a resumed run detects in a bin has the bin's centre as its first position.
+            # For an item in a bin, a resumed run records the centre of the bin as first position.
             positions = [*positions, bins[bin].position] if bin else positions
-            yield FinalObject(label, bin, positions, body in dropped, body == held, is_removed)
+            yield FinalObject(label, bin, positions, body in dropped_bodies, body == held_body, is_removed)
 
     return audit_objects(iterate_final_objects(), records, routes, max_distance)
 

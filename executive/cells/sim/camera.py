@@ -30,10 +30,13 @@ from executive.perception.camera_model import (
 from executive.perception.mounted_camera import MountedCamera
 
 Image = NDArray[np.uint8]
+"""Colour image `(H, W, 3)`, RGB."""
 Mask = NDArray[np.bool_]
+"""Mask `(H, W)` of pixels."""
 Region = tuple[int, int, int, int]
 """Left, top, right and bottom of a region of an image [pixel]."""
 ReflectionCoefficient = Annotated[float, Field(ge=0, le=3)]
+"""Coefficient of the Phong model, which multiplies the light of one kind of reflection."""
 
 
 class Light(Section):
@@ -60,7 +63,7 @@ DEPTH_SEED = 1
 
 
 @dataclass(frozen=True, eq=False)
-class Render:
+class RenderedImage:
     """A rendered region of a camera image, without noise.
 
     Attributes:
@@ -76,12 +79,10 @@ class Render:
     @property
     def depth(self) -> Array:
         """Distances along the optical axis `(H, W)` [m], inf at pixels without a body."""
+        # The formula inverts the perspective projection of OpenGL.
+        depth_buffer = self.depth_buffer.astype(np.float64)
         with np.errstate(divide="ignore"):
-            distances = (
-                FAR_PLANE
-                * NEAR_PLANE
-                / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * self.depth_buffer.astype(np.float64))
-            )
+            distances = FAR_PLANE * NEAR_PLANE / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * depth_buffer)
         return np.where(self.depth_buffer < 1.0, distances, np.inf)
 
 
@@ -91,17 +92,17 @@ def get_camera_pose(world: World, config: CameraConfig) -> Pose:
     return X_MC if config.mount == "fixed" else world.get_flange_pose() @ X_MC
 
 
-def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light) -> Render:
+def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light) -> RenderedImage:
     """Render a region of a camera image at full resolution."""
     left, top, right, bottom = region
     width, height = right - left, bottom - top
     # TinyRenderer samples the lower left corner of a pixel; a shift by half a pixel samples the centre.
-    shifted = (left + 0.5, top - 0.5, right + 0.5, bottom - 0.5)
+    shifted_region = (left + 0.5, top - 0.5, right + 0.5, bottom - 0.5)
     _, _, rgba, depth_buffer, segmentation = world.client.getCameraImage(
         width,
         height,
         compute_view_matrix(X_WC),
-        compute_projection_matrix(matrix, shifted),
+        compute_projection_matrix(matrix, shifted_region),
         lightDirection=light.direction,
         lightColor=light.colour,
         lightDistance=3.0,
@@ -112,7 +113,7 @@ def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light
         renderer=pybullet.ER_TINY_RENDERER,
     )
     image = np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3]
-    return Render(
+    return RenderedImage(
         np.ascontiguousarray(image),
         np.asarray(segmentation, dtype=np.int32).reshape(height, width),
         np.asarray(depth_buffer, dtype=np.float32).reshape(height, width),
@@ -129,36 +130,37 @@ def add_noise(image: Image, noise: NoiseConfig, rng: np.random.Generator) -> Ima
 def add_depth_noise(depth: Array, config: DepthConfig, rng: np.random.Generator) -> Array:
     """Return noisy measurements of a depth image `(H, W)` [m], NaN at pixels without a measurement.
 
-    The noise of neighbouring pixels is correlated, because stereo matching compares windows. Beside an edge a
-    surface is often visible to only one of the two cameras of the sensor, so measurements are often missing.
+    The standard deviation is `floor + growth * depth²`, as in stereo vision. The noise of neighbouring pixels
+    is correlated, because stereo matching compares windows. Beside an edge, measurements are often missing,
+    because only one of the two cameras of the sensor sees the surface.
     """
     noise = rng.standard_normal(depth.shape)
     if config.grain:
         # The blur reduces the standard deviation, and the division restores the value 1.
         noise = np.asarray(cv2.GaussianBlur(noise, (0, 0), config.grain), dtype=np.float64)
         noise /= noise.std()
-    finite = np.where(np.isfinite(depth), depth, np.nan)
-    measured = finite + noise * (config.floor + config.growth * finite**2)
+    true_depth = np.where(np.isfinite(depth), depth, np.nan)
+    measured_depth = true_depth + noise * (config.floor + config.growth * true_depth**2)
     if config.step:
-        measured = np.round(measured / config.step) * config.step
-    dropout = np.where(_compute_edge_mask(depth, config), config.edge_dropout, config.dropout)
-    return np.where(rng.random(depth.shape) < dropout, np.nan, measured)
+        measured_depth = np.round(measured_depth / config.step) * config.step
+    dropout_probability = np.where(_compute_edge_mask(depth, config), config.edge_dropout, config.dropout)
+    return np.where(rng.random(depth.shape) < dropout_probability, np.nan, measured_depth)
 
 
 def _compute_edge_mask(depth: Array, config: DepthConfig) -> Mask:
     """Return the mask `(H, W)` of the pixels near a discontinuity of the depth."""
-    finite = np.where(np.isfinite(depth), depth, FAR_PLANE).astype(np.float32)
+    distances = np.where(np.isfinite(depth), depth, FAR_PLANE).astype(np.float32)
     kernel = np.ones((3, 3), np.uint8)
-    edges = (cv2.dilate(finite, kernel) - cv2.erode(finite, kernel) > config.edge).astype(np.uint8)
+    edge_mask = (cv2.dilate(distances, kernel) - cv2.erode(distances, kernel) > config.edge).astype(np.uint8)
     width = 2 * config.edge_width + 1
-    return cv2.dilate(edges, np.ones((width, width), np.uint8)).astype(bool)
+    return cv2.dilate(edge_mask, np.ones((width, width), np.uint8)).astype(bool)
 
 
 class SimCamera(MountedCamera):
     """A camera of the simulated world; implements `executive.cell.protocols.Camera`.
 
-    The noise of a frame depends only on the seed and on the number of the frame. The image noise does not
-    depend on whether the camera has a depth sensor.
+    The noise of a frame depends only on the seed and on the number of the frame. A depth sensor does not
+    change the image noise.
     """
 
     def __init__(
@@ -184,11 +186,11 @@ class SimCamera(MountedCamera):
             clock: Clock for the time stamps of the frames.
             seed: Seed of the noise.
             occlusion: Occlusion by the arm; None: nothing is occluded, and the table is always visible.
-            get_change_count: Function that returns the number of changes of the table (`Ledger`).
+            get_change_count: Returns the number of changes of the table (see `Ledger`).
             light: Light of the scene.
-            true_config: Pose, lens and noise with which images are rendered if they differ from `config`.
-                The frames contain the matrix and the pose of `config`.
-            bins: Bins whose positions in a frame show a displacement of the camera.
+            true_config: True pose, lens and noise of the camera; None: those of `config`. The frames contain
+                the matrix and the pose of `config`.
+            bins: Bins from whose positions in a frame a displacement of the camera is detected.
         """
         super().__init__(name, config, world.get_flange_pose, clock, get_change_count)
         self._true_config = true_config or config
@@ -204,7 +206,7 @@ class SimCamera(MountedCamera):
         return occlusion is None or occlusion.is_table_visible(self.matrix, self._compute_pose(), self._size)
 
     def describe_displacement(self, frame: Frame) -> str:
-        """Return a message about the displacement of the camera in a frame from its declared pose, or ""."""
+        """Return a message if a frame shows a displacement of the camera from the declared pose, else ""."""
         return describe_displacement(frame, self._bins)
 
     @property
@@ -212,11 +214,11 @@ class SimCamera(MountedCamera):
         return self.config.width, self.config.height
 
     def _get_true_view(self) -> tuple[Array, Pose]:
-        """Return the camera matrix and the pose `X_WC` with which images are rendered."""
+        """Return the true camera matrix and the true pose `X_WC`."""
         return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)
 
     def _capture_images(self) -> tuple[Image, Array | None]:
-        """Return the colour image and the depth image of the current frame; None without a depth sensor."""
+        """Return colour and depth image of the current frame; the depth image is None without a sensor."""
         rendered = render(self._world, *self._get_true_view(), (0, 0, *self._size), self._light)
         rng = np.random.default_rng([self._seed, self._frame_count])
         image = add_noise(rendered.image, self._true_config.noise, rng)

@@ -18,7 +18,7 @@ from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import build_simulated_class, find_model_errors
 from executive.cells.sim.poses import find_places_out_of_reach, find_unusable_poses
-from executive.cells.sim.rebuild import InterruptedArm, rebuild_world
+from executive.cells.sim.rebuild import InterruptedState, rebuild_world
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.scene_world import build_light
 from executive.cells.sim.spawn import PartSeeds, build_initial_world, find_lack_of_room
@@ -45,8 +45,8 @@ class SimCell(CellWithoutHardware):
         routes: Names of the permitted bins of each class.
         emit: Receives the events of the cell.
         options: Options of the run.
-        camera: Builds the camera; the arguments are those of `SimCamera`.
-        detectors: Builds the detectors; the arguments are those of `build_rated_detectors`.
+        build_camera: Builds the camera from the arguments of `SimCamera`.
+        build_detectors: Builds the detectors from the arguments of `build_rated_detectors`.
 
     Raises:
         InputError: The simulated cell does not support the cell file, or the scene file is invalid.
@@ -60,8 +60,8 @@ class SimCell(CellWithoutHardware):
         routes: Routes,
         emit: Emit,
         options: CellOptions,
-        camera: Callable[..., SimCamera] = SimCamera,
-        detectors: Callable[..., Mapping[str, ClosableDetector]] = build_rated_detectors,
+        build_camera: Callable[..., SimCamera] = SimCamera,
+        build_detectors: Callable[..., Mapping[str, ClosableDetector]] = build_rated_detectors,
     ) -> None:
         for _, message in _find_missing_depth_sensors(config):
             raise InputError(f"cell {config.cell}: {message}")
@@ -70,14 +70,14 @@ class SimCell(CellWithoutHardware):
         seeds = PartSeeds.of(seed)
         scene = load_scene(options.scene, config)
         world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
-        self._initial_positions = {body: world.get_object_pose(body).position for body in world.bodies}
+        self._initial_positions = {body: world.get_object_pose(body).position for body in world.labels}
         self._clearance_checker = ClearanceChecker(config)
         planner = build_planner(config, self._clearance_checker.check)
         self._tool = SuctionTool(world, config.tool)
-        interrupted = None if options.resume is None else self._rebuild_world(options.resume.log_path)
-        self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, interrupted)
+        state = None if options.resume is None else self._rebuild_world(options.resume.log_path)
+        self._arm = SimArm(world, planner, config, clock, lambda: self._tool.held_body, emit, state)
         name, camera_config = next(iter(config.cameras.items()))
-        self._camera = camera(
+        self._camera = build_camera(
             self._world,
             name,
             camera_config,
@@ -95,7 +95,7 @@ class SimCell(CellWithoutHardware):
         localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
         # Detectors are built last, because their processes would not be ended if a later statement failed.
         folders = (options.base, get_shipped_folder() / "cells")
-        self._detectors = detectors(
+        self._detectors = build_detectors(
             config, clock=clock, base=options.base, seed=seeds.detectors, folders=folders
         )
         self.cell = replace(
@@ -112,20 +112,20 @@ class SimCell(CellWithoutHardware):
     def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
         """Return key and message of each requirement of a cell file that the simulated cell cannot fulfil.
 
-        Checked are the arm, the models, the detectors, the reach of the arm, the room for the objects, the
-        clearance of the poses, and the view of the cameras.
+        The requirements concern the arm and its reach, the models, the detectors, the room for the objects,
+        the clearance of the poses, and the view of the cameras.
         """
-        if unsupported := tuple(find_arm_errors(config)):
-            return unsupported
-        missing = tuple(find_model_errors(config))
+        if arm_errors := tuple(find_arm_errors(config)):
+            return arm_errors
+        model_errors = tuple(find_model_errors(config))
         return (
-            *missing,
+            *model_errors,
             *_find_missing_depth_sensors(config),
             *find_detector_problems(config.detectors, base),
             *find_places_out_of_reach(config),
             *find_lack_of_room(config),
-            # The poses are checked in a world, which cannot be built if a model is missing.
-            *(() if missing else find_unusable_poses(config)),
+            # The check of the poses builds a world, which is impossible if a model is missing.
+            *(() if model_errors else find_unusable_poses(config)),
         )
 
     @staticmethod
@@ -156,16 +156,16 @@ class SimCell(CellWithoutHardware):
 
     def audit(self) -> dict[str, int]:
         """Return the counts of `executive.cells.audit.audit_objects` for the objects of the cell."""
-        later = self._world.rest_positions
+        moves = self._world.rest_positions
         return audit_bodies(
             self._world,
-            {body: [first, *later.get(body, ())] for body, first in self._initial_positions.items()},
+            {body: [start, *moves.get(body, ())] for body, start in self._initial_positions.items()},
             self.accounts.records,
             self.cell.bins,
             self.routes,
             self.config.ledger.gate,
-            held=self._tool.held_body,
-            dropped=self._tool.dropped_bodies,
+            held_body=self._tool.held_body,
+            dropped_bodies=self._tool.dropped_bodies,
         )
 
     def close(self) -> None:
@@ -175,12 +175,12 @@ class SimCell(CellWithoutHardware):
         self._clearance_checker.close()
         self._world.close()
 
-    def _rebuild_world(self, log: Path) -> InterruptedArm:
-        """Execute the commands of a log, append further commands to the log, and return the arm's motion."""
-        interrupted = rebuild_world(self._world, self._tool, read_commands(log))
-        self.steps, self.last_command = interrupted.steps, interrupted.last_command
+    def _rebuild_world(self, log: Path) -> InterruptedState:
+        """Execute the commands of a log, continue the log, and return the state of the interrupted run."""
+        state = rebuild_world(self._world, self._tool, read_commands(log))
+        self.steps, self.last_command = state.step_count, state.last_command_step
         self._world.log = CommandLog(log, self._world.robot.joint_count, resume=True)
-        return interrupted
+        return state
 
 
 def _find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:

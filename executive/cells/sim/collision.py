@@ -1,13 +1,13 @@
-"""Collision check of a planned path: clearance of arm, tool and load from the cell and from the arm itself.
+"""Collision check of planned paths of arm, tool and load against the cell, and of the arm against itself.
 
-The check uses a separate world, because moving the arm of the running world would disturb its physics.
+The check uses a separate world, because moving the arm of the running world would disturb the physics.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -17,18 +17,26 @@ from executive.cell.arm import Task
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.objects import Load, ObjectClass, Obstacle
-from executive.cells.sim.world import World, name_held
+from executive.cells.sim.world import DISTANCE, LINK_A, LINK_B, POSITION_B, World, name_load
 from executive.errors import Blocked
 from executive.geometry import Array, Pose
 
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
+SUPPORT_TOLERANCE = 0.001
+"""Maximum height above the floor of a bin at which a contact of the load counts as a contact with it [m]."""
 PARKING_POSITION = (0.0, 0.0, 50.0)
 """Position of currently unused bodies, far from the arm [m]."""
 
 
 class ClosestApproach(NamedTuple):
-    """Distance of a robot part and a body, negative for a penetration, and the required minimum [m]."""
+    """Closest approach of a part of the robot and a body.
+
+    Attributes:
+        part, body: Names of part and body for messages.
+        distance: Distance of part and body [m], negative for a penetration.
+        min_distance: Required minimum of the distance [m].
+    """
 
     part: str
     body: str
@@ -48,9 +56,9 @@ class ClosestApproach(NamedTuple):
 class ClearanceChecker:
     """Checks paths of the arm for collisions with table, bins, obstacles and the arm itself.
 
-    A motion may begin closer than the margin to a body (after a stop, or with a held object on the table),
-    but must not come closer to this body. A held object is modelled as an upright cylinder under the tool,
-    which may touch the table and the floor of a bin.
+    After a stop, or with a held object on the table, a motion begins within the margin of a body. The
+    distance from this body must then not decrease. The model of a held object is an upright cylinder under
+    the tool, which may touch the table and the floors of bins.
 
     Attributes:
         world: World of the check, whose arm is at the last checked joint positions.
@@ -62,7 +70,7 @@ class ClearanceChecker:
         self._loads: dict[ObjectClass, int] = {}
         """Body that models a held object of each class."""
         self._cylinders: dict[tuple[float, float], list[int]] = {}
-        """Bodies for obstacles by radius and height [m]."""
+        """Bodies that model obstacles, by radius and height [m]."""
         self._obstacles: dict[str, tuple[int, ...]] = {}
         """Bodies of the current obstacles, by name."""
 
@@ -76,18 +84,20 @@ class ClearanceChecker:
             self._check_path(path, task.load)
 
     def _check_path(self, path: Array, load: Load | None) -> None:
-        # A pair within the margin at the start may stay at its distance until it has left the margin once.
-        exempt = self._find_closest_approaches(path[0], load)
+        # For a pair within the margin at the start, the limit is the distance at the start. The margin is the
+        # limit again after the pair has left the margin.
+        start_approaches = self._find_closest_approaches(path[0], load)
+        start_distances = {pair: approach.distance for pair, approach in start_approaches.items()}
         for q in path[1:]:
             approaches = self._find_closest_approaches(q, load)
             for pair, approach in approaches.items():
-                start_distance = exempt[pair].distance if pair in exempt else math.inf
-                if approach.distance < min(approach.min_distance, start_distance) - ROUNDING_ERROR:
+                min_distance = min(approach.min_distance, start_distances.get(pair, math.inf))
+                if approach.distance < min_distance - ROUNDING_ERROR:
                     raise Blocked(self._describe_violation(approach))
-            exempt = {pair: approach for pair, approach in exempt.items() if pair in approaches}
+            start_distances = {pair: start_distances[pair] for pair in start_distances.keys() & approaches}
 
     def _find_closest_approaches(self, q: Array, load: Load | None) -> dict[tuple[str, str], ClosestApproach]:
-        """Return the closest approach of each part and body within the margin at `q` `(n,)` [rad]."""
+        """Return the closest approach of each pair of part and body within the margin at `q` `(n,)` [rad]."""
         closest: dict[tuple[str, str], ClosestApproach] = {}
         for approach in self._find_approaches(q, load):
             pair = approach.part, approach.body
@@ -96,7 +106,7 @@ class ClearanceChecker:
         return closest
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
-        """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], None without a violation."""
+        """Return the closest approach of the arm without a load at `q` `(n,)` [rad] if it is a violation."""
         closest = min(self._find_approaches(q, None), key=lambda approach: approach.distance, default=None)
         return closest if closest and closest.distance < closest.min_distance - ROUNDING_ERROR else None
 
@@ -116,51 +126,50 @@ class ClearanceChecker:
         client, arm = self.world.client, self.world.arm
         get_points = client.getClosestPoints  # looked up once, because a look-up takes as long as a call
         client.resetJointStatesMultiDof(arm, range(len(q)), [[angle] for angle in q])
-        bodies = {"the table": (self.world.table,), **self.world.bins, **self._obstacles}
-        for name, parts in bodies.items():
-            for body in parts:
-                for point in get_points(arm, body, self._margin):
-                    if point[3] >= self.world.robot.first_moving_link:
-                        yield ClosestApproach(self.world.name_link(point[3]), name, point[8], self._margin)
-        for one, other in self.world.robot.self_collision_pairs:
-            for point in get_points(arm, arm, self._margin, linkIndexA=one, linkIndexB=other):
-                yield ClosestApproach(
-                    self.world.name_link(one), self.world.name_link(other), point[8], self._margin
-                )
+        name_link = self.world.name_link
+        bodies = [("the table", self.world.table), *self.world.bin_bodies.items()]
+        bodies += [(name, body) for name, cylinders in self._obstacles.items() for body in cylinders]
+        for name, body in bodies:
+            for point in get_points(arm, body, self._margin):
+                if point[LINK_A] >= self.world.robot.first_moving_link:
+                    yield ClosestApproach(name_link(point[LINK_A]), name, point[DISTANCE], self._margin)
+        for link_a, link_b in self.world.robot.self_collision_pairs:
+            for point in get_points(arm, arm, self._margin, linkIndexA=link_a, linkIndexB=link_b):
+                yield ClosestApproach(name_link(link_a), name_link(link_b), point[DISTANCE], self._margin)
         if load is not None:
             yield from self._find_load_approaches(load.kind, bodies)
 
     def _find_load_approaches(
-        self, load: ObjectClass, bodies: Mapping[str, tuple[int, ...]]
+        self, load: ObjectClass, bodies: Sequence[tuple[str, int]]
     ) -> Iterator[ClosestApproach]:
-        """Yield the approaches of the load to `bodies` and to the arm within the margin."""
-        held, get_points = self._get_load_body(load), self.world.client.getClosestPoints
+        """Yield the approaches of the load to the arm and to `bodies` (with names) within the margin."""
+        load_body, get_points = self._get_load_body(load), self.world.client.getClosestPoints
         X_WH = self.world.get_tool_pose() @ Pose.of([0, 0, load.height / 2])
-        self.world.client.resetBasePositionAndOrientation(held, X_WH.position, X_WH.quaternion)
-        part = name_held(load.label)
-        for name, parts in bodies.items():
-            for body in parts:
-                for point in get_points(held, body, self._margin):
-                    floor = self._get_base_height(name) + BIN_THICKNESS
-                    may_touch = point[6][2] <= floor + 0.001 and name not in self._obstacles
-                    yield ClosestApproach(part, name, point[8], 0.0 if may_touch else self._margin)
-        for point in get_points(held, self.world.arm, self._margin):
-            if self.world.robot.first_moving_link <= point[4] < self.world.robot.wrist_link:
-                yield ClosestApproach(part, self.world.name_link(point[4]), point[8], self._margin)
-        self.world.client.resetBasePositionAndOrientation(held, PARKING_POSITION, [0, 0, 0, 1])
+        self.world.client.resetBasePositionAndOrientation(load_body, X_WH.position, X_WH.quaternion)
+        part = name_load(load.label)
+        for name, body in bodies:
+            max_support_height = self._get_base_height(name) + BIN_THICKNESS + SUPPORT_TOLERANCE
+            for point in get_points(load_body, body, self._margin):
+                is_support = point[POSITION_B][2] <= max_support_height and name not in self._obstacles
+                yield ClosestApproach(part, name, point[DISTANCE], 0.0 if is_support else self._margin)
+        for point in get_points(load_body, self.world.arm, self._margin):
+            if self.world.robot.first_moving_link <= point[LINK_B] < self.world.robot.wrist_link:
+                link_name = self.world.name_link(point[LINK_B])
+                yield ClosestApproach(part, link_name, point[DISTANCE], self._margin)
+        self.world.client.resetBasePositionAndOrientation(load_body, PARKING_POSITION, [0, 0, 0, 1])
 
     @contextmanager
     def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> Iterator[None]:
-        """Put the obstacles into the world as cylinders on the table until the context ends."""
-        client, used_counts = self.world.client, Counter[tuple[float, float]]()
+        """Put cylinders in place of the obstacles on the table until the context ends."""
+        client, placed_counts = self.world.client, Counter[tuple[float, float]]()
         for obstacle in obstacles:
             size = round(obstacle.radius, 4), round(obstacle.top, 4)
             bodies = self._cylinders.setdefault(size, [])
-            if len(bodies) == used_counts[size]:
+            if len(bodies) == placed_counts[size]:
                 shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=size[0], height=size[1])
                 bodies.append(int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION)))
-            body = bodies[used_counts[size]]
-            used_counts[size] += 1
+            body = bodies[placed_counts[size]]
+            placed_counts[size] += 1
             client.resetBasePositionAndOrientation(
                 body, [obstacle.x, obstacle.y, obstacle.top / 2], [0, 0, 0, 1]
             )
@@ -168,13 +177,13 @@ class ClearanceChecker:
         try:
             yield
         finally:
-            for parts in self._obstacles.values():
-                for body in parts:
+            for cylinders in self._obstacles.values():
+                for body in cylinders:
                     client.resetBasePositionAndOrientation(body, PARKING_POSITION, [0, 0, 0, 1])
             self._obstacles = {}
 
     def _get_base_height(self, name: str) -> float:
-        """Return the height of the base of a bin above the table [m]; 0 for a body that is no bin."""
+        """Return the height of the base of a bin above the table [m]; 0 for other bodies."""
         bin = self.world.config.bins.get(name)
         return bin.position[2] if bin else 0.0
 

@@ -178,7 +178,7 @@ def _read_content(path: Path) -> bytes:
         return path.read_bytes()
 
 
-def to_joint_states(command: Command) -> JointState:
+def get_joint_states(command: Command) -> JointState:
     """Return the states in a MOTION command as arrays `(N, n)`."""
     assert command.states is not None
     return JointState(*np.hsplit(command.states, 3))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from executive.cells.sim.tool import LIP_LENGTH
-from executive.cells.sim.world import World, name_held
+from executive.cells.sim.world import BODY_B, LINK_A, NORMAL_FORCE, POSITION_A, World, name_load
 
 MIN_CONTACT_FORCE = 2.0
 """Minimum force of a detected contact [N], an assumption for joint torque sensors."""
@@ -13,35 +13,37 @@ SEPARATION_STEP_COUNT = 12
 """Number of steps without contact after which two bodies count as separated; a lifted load may bounce."""
 
 
-class Contacts:
-    """Contacts of arm, tool and load with other bodies that began during the running motion.
+class ContactMonitor:
+    """Monitor of the contacts of arm, tool and load that begin during the running motion.
 
     Args:
-        world: The world.
+        world: The world of the arm.
         get_held_body: Returns the body that the tool holds, or None.
     """
 
     def __init__(self, world: World, get_held_body: Callable[[], int | None]) -> None:
         self._world = world
         self._get_held_body = get_held_body
-        self._last_steps: dict[tuple[str, int], int] = {}
-        """Step of the last contact of each ignored pair of a robot part and a body."""
+        self._last_contact_steps: dict[tuple[str, int], int] = {}
+        """Number of the step of the last contact of each ignored pair of a robot part and a body."""
 
     def reset(self) -> None:
         """Ignore each pair of bodies that is in contact now until the two bodies separate."""
-        self._last_steps = {(part, body): self._world.steps for part, body, _, _ in self._iterate_contacts()}
+        step = self._world.step_count
+        self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
 
     def describe_new_contact(self, lip_may_touch: bool) -> str | None:
-        """Return the description of a new contact, or None; called once per step.
+        """Return the description of a new contact, or None. Each step needs one call.
 
         Args:
             lip_may_touch: True to ignore contacts of the lip of the cup.
         """
-        now, last_steps = self._world.steps, self._last_steps
-        self._last_steps = {p: step for p, step in last_steps.items() if now - step <= SEPARATION_STEP_COUNT}
+        now, last_steps = self._world.step_count, self._last_contact_steps
+        oldest = now - SEPARATION_STEP_COUNT
+        self._last_contact_steps = {pair: step for pair, step in last_steps.items() if step >= oldest}
         for part, body, position, force in self._iterate_contacts():
-            if (part, body) in self._last_steps:
-                self._last_steps[part, body] = now
+            if (part, body) in self._last_contact_steps:
+                self._last_contact_steps[part, body] = now
             elif force > MIN_CONTACT_FORCE and not (lip_may_touch and self._is_lip(part, position)):
                 x, y, z = self._world.get_tool_pose().position
                 name = self._world.name_body(body)
@@ -50,16 +52,19 @@ class Contacts:
 
     def _is_lip(self, part: str, position: Sequence[float]) -> bool:
         """Return True if a point in the world [m] on a part of the robot is on the lip of the cup."""
-        is_tool = part == "the tool"
-        return is_tool and bool(self._world.get_tool_pose().inverse().apply(position)[2] > -LIP_LENGTH)
+        X_TW = self._world.get_tool_pose().inverse()
+        is_tool = part == self._world.name_link(self._world.tool_index)
+        return is_tool and bool(X_TW.apply(position)[2] > -LIP_LENGTH)
 
     def _iterate_contacts(self) -> Iterator[tuple[str, int, Sequence[float], float]]:
         """Yield part of the robot, touched body, contact point [m] and normal force [N] of each contact."""
-        world, held = self._world, self._get_held_body()
+        world, held_body = self._world, self._get_held_body()
         for point in world.client.getContactPoints(bodyA=world.arm) or ():
-            if point[2] != held:
-                yield world.name_link(point[3]), point[2], point[5], point[9]
-        if held is not None:
-            for point in world.client.getContactPoints(bodyA=held) or ():
-                if point[2] != world.arm:
-                    yield name_held(world.bodies[held]), point[2], point[5], point[9]
+            if point[BODY_B] != held_body:
+                part = world.name_link(point[LINK_A])
+                yield part, point[BODY_B], point[POSITION_A], point[NORMAL_FORCE]
+        if held_body is not None:
+            part = name_load(world.labels[held_body])
+            for point in world.client.getContactPoints(bodyA=held_body) or ():
+                if point[BODY_B] != world.arm:
+                    yield part, point[BODY_B], point[POSITION_A], point[NORMAL_FORCE]

@@ -1,4 +1,4 @@
-"""Pictures of the world of a recorded run, rendered in several processes that rebuild the world."""
+"""Pictures of the world of a recorded run, rendered by several processes with rebuilt worlds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.camera import Image, Light, Render, render
+from executive.cells.sim.camera import Image, Light, RenderedImage, render
 from executive.cells.sim.command_log import RUN_STEP, read_commands
 from executive.cells.sim.rebuild import WorldRebuilder
 from executive.cells.sim.scene_file import load_scene
@@ -28,9 +28,9 @@ TOP_COLOUR, BOTTOM_COLOUR = (226, 231, 237), (172, 182, 194)
 """Colours of the background at the top and at the bottom of a picture, RGB, each 0 to 255."""
 MIN_EDGE_CONTRAST = 24
 """Minimum difference in brightness of neighbouring pixels at an edge, 0 to 255."""
-PICTURES_PER_BLOCK = 24
+MAX_PICTURES_PER_BLOCK = 24
 """Maximum number of pictures of a block; each block rebuilds its own world from the start of the run."""
-PICTURES_IN_FIRST_BLOCK = 2
+MAX_PICTURES_IN_FIRST_BLOCK = 2
 """Maximum number of pictures of the first block, which is small to get the first picture early."""
 
 
@@ -54,7 +54,7 @@ class PictureSource:
 
 
 def count_steps(log: Path) -> int:
-    """Return the number of control steps of a run by the command log of its world.
+    """Return the number of control steps in the command log of a run.
 
     Raises:
         InputError: The file cannot be read, or is no valid log.
@@ -72,11 +72,11 @@ def render_pictures(
         steps: Numbers of control steps, ascending.
         worker_count: Number of processes.
     """
-    bounds = [0, *range(PICTURES_IN_FIRST_BLOCK, len(steps), PICTURES_PER_BLOCK), len(steps)]
-    blocks = [steps[first:end] for first, end in pairwise(bounds)]
+    starts = range(MAX_PICTURES_IN_FIRST_BLOCK, len(steps), MAX_PICTURES_PER_BLOCK)
+    blocks = [steps[start:end] for start, end in pairwise([0, *starts, len(steps)])]
     with WorkerPool(worker_count) as pool:
         pending: deque[Future[list[Image]]] = deque()
-        # The number of pending blocks is limited, because completed pictures occupy memory.
+        # The number of pending blocks is limited, because their pictures occupy memory.
         for block in blocks:
             pending.append(pool.submit(_render_block, source, block))
             if len(pending) > worker_count:
@@ -86,12 +86,12 @@ def render_pictures(
 
 
 def _render_block(source: PictureSource, steps: Sequence[int]) -> list[Image]:
-    """Return the pictures after the given steps; this function runs in a process of its own."""
+    """Return the pictures of a block as a list, because a worker process cannot return an iterator."""
     return list(render_pictures_in_process(source, steps))
 
 
 def render_pictures_in_process(source: PictureSource, steps: Sequence[int]) -> Iterator[Image]:
-    """Yield the pictures of `render_pictures`, rendered in one world in this process."""
+    """Yield pictures `(H, W, 3)` uint8 RGB of the world after the given control steps, in ascending order."""
     scene = load_scene(source.scene, source.config)
     world, viewpoint = build_initial_world(source.config, source.seed, scene=scene), source.viewpoint
     try:
@@ -99,12 +99,12 @@ def render_pictures_in_process(source: PictureSource, steps: Sequence[int]) -> I
         world.client.changeVisualShape(world.floor, -1, rgbaColor=[1, 1, 1, 0])
         rebuilder = WorldRebuilder(world, SuctionTool(world, source.config.tool))
         commands = read_commands(source.log)
-        completed = 0
+        executed_step_count = 0
         for step in steps:
-            while completed < step:
+            while executed_step_count < step:
                 command = next(commands)
                 rebuilder.execute(command)
-                completed += command.kind == RUN_STEP
+                executed_step_count += command.kind == RUN_STEP
             yield _compose_picture(
                 render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, *viewpoint.size), FILM_LIGHT)
             )
@@ -112,11 +112,11 @@ def render_pictures_in_process(source: PictureSource, steps: Sequence[int]) -> I
         world.close()
 
 
-def _compose_picture(rendered: Render) -> Image:
+def _compose_picture(rendered: RenderedImage) -> Image:
     """Return a rendered image with a background and blurred edges, because PyBullet has no antialiasing."""
     height = len(rendered.image)
-    fraction = np.linspace(0, 1, height)[:, None, None]
-    background = (1 - fraction) * np.array(TOP_COLOUR) + fraction * np.array(BOTTOM_COLOUR)
+    bottom_weight = np.linspace(0, 1, height)[:, None, None]
+    background = (1 - bottom_weight) * np.array(TOP_COLOUR) + bottom_weight * np.array(BOTTOM_COLOUR)
     is_empty = rendered.bodies == -1
     image = np.where(is_empty[..., None], np.rint(background).astype(np.uint8), rendered.image)
     grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)

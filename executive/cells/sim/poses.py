@@ -98,4 +98,4 @@ def _find_occluding_bin(config: CellConfig, world: World, camera_position: Array
     height = min(kind.height for kind in config.objects.values()) / 2
     points = [(x, y, height) for x in xs for y in ys]
     hit_bodies = {hit[0] for hit in world.client.rayTestBatch(points, [tuple(camera_position)] * len(points))}
-    return next((name for name, bodies in world.bins.items() if hit_bodies.intersection(bodies)), None)
+    return next((name for name, body in world.bin_bodies.items() if body in hit_bodies), None)

@@ -200,7 +200,7 @@ class SceneRenderer:
             X_WC = get_camera_pose(world, camera)
             declared_X_WC = get_camera_pose(world, self._declared_camera)
             objects = {
-                body: SceneObject(world.bodies[body], world.models[body], world.get_object_pose(body), BLACK)
+                body: SceneObject(world.labels[body], world.models[body], world.get_object_pose(body), BLACK)
                 for body in bodies
             }
             whole_image, light = (0, 0, camera.width, camera.height), build_light(self._scene.light)

@@ -187,7 +187,7 @@ def _stack_objects(world: World, bodies: Sequence[int], probability: float, rng:
 
 def _try_stack(world: World, upper: int, lower: int, rng: np.random.Generator) -> bool:
     """Put one object on another and return True if the stack is stable; otherwise restore all poses."""
-    initial_poses = {body: world.get_object_pose(body) for body in world.bodies}
+    initial_poses = {body: world.get_object_pose(body) for body in world.labels}
     base = initial_poses[lower].position
     lower_mesh, upper_mesh = (load_mesh(world.models[body]) for body in (lower, upper))
     height = base[2] + lower_mesh.top - upper_mesh.bottom + DROP_HEIGHT

@@ -1,4 +1,4 @@
-"""Simulated suction tool, whose seal breaks at a force that depends on the contact."""
+"""Simulated suction tool with a seal that breaks at a force that depends on the contact."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pybullet
 from executive.cell.config import ToolConfig
 from executive.cells.sim import command_log
 from executive.cells.sim.suction import compute_breakaway_force, measure_contact
-from executive.cells.sim.world import World
+from executive.cells.sim.world import POSITION_A, World
 from executive.geometry import Array, Pose
 
 TOUCH_DISTANCE = 0.001
@@ -21,14 +21,21 @@ LIP_LENGTH = 0.002
 PULL_SMOOTHING = 0.25
 """Weight of the newest step in the low-pass filter of the pull on the seal.
 
-The time constant is 3.5 steps or 14 ms, because a seal breaks within milliseconds, while impact forces of the
+The time constant is 3.5 steps or 14 ms: a seal breaks within milliseconds, but the impact forces of the
 solver last a single step.
 """
 
 
 @dataclass
 class _Grip:
-    """Held body, its constraint, breakaway force of its seal [N] and filtered pull on the seal `(3,)` [N]."""
+    """Grip of the tool on a body.
+
+    Attributes:
+        body: The held body.
+        constraint: Constraint between tool and body.
+        breakaway_force: Pull at which the seal breaks [N].
+        pull: Filtered pull on the seal `(3,)` [N].
+    """
 
     body: int
     constraint: int
@@ -37,11 +44,11 @@ class _Grip:
 
 
 class SuctionTool:
-    """The suction tool of a `World`; implements `Tool`. `advance` is called after every physics step.
+    """The suction tool of a `World`; implements `Tool`. Each physics step is followed by a call of `advance`.
 
-    A held body keeps its pose relative to the tool until the filtered pull on the seal exceeds the
-    breakaway force. Moments have no effect. A broken seal forms again only after cup and object have
-    separated or the vacuum was off, because right after the break the object is still within reach.
+    A held body keeps its pose relative to the tool until the filtered pull on the seal exceeds the breakaway
+    force; moments do not break the seal. Right after a break the object is still within reach. The seal
+    therefore forms again only after the object has left the reach or the vacuum was off.
 
     Attributes:
         dropped_bodies: Bodies whose last seal broke; ground truth, not for skills.
@@ -50,19 +57,20 @@ class SuctionTool:
     def __init__(self, world: World, config: ToolConfig) -> None:
         self._world = world
         self._config = config
-        self._vacuum = False
+        self._is_vacuum_on = False
         self._grip: _Grip | None = None
         self._separating_body: int | None = None
-        self._last_touch = (-1, False)
+        self._last_touch_check = (-1, False)
+        """Number of physics steps at the last check of `touching`, and its result."""
         self.dropped_bodies: set[int] = set()
 
     @property
     def touching(self) -> bool:
         """True if the lip was within `TOUCH_DISTANCE` of any body after the last physics step."""
-        step, is_touching = self._last_touch
-        if step != self._world.steps:
+        step, is_touching = self._last_touch_check
+        if step != self._world.step_count:
             is_touching = any(True for _ in self._find_bodies_near(TOUCH_DISTANCE))
-            self._last_touch = (self._world.steps, is_touching)
+            self._last_touch_check = (self._world.step_count, is_touching)
         return is_touching
 
     @property
@@ -88,14 +96,14 @@ class SuctionTool:
     def close(self) -> None:
         """Switch the vacuum on, and hold a body within reach if the seal is strong enough."""
         self._world.log.append(command_log.VACUUM_ON)
-        self._vacuum = True
+        self._is_vacuum_on = True
         if self._grip is None:
             self._seal()
 
     def open(self) -> None:
         """Release the held body and switch the vacuum off."""
         self._world.log.append(command_log.VACUUM_OFF)
-        self._vacuum = False
+        self._is_vacuum_on = False
         self._separating_body = None
         if self._grip is not None:
             body = self._grip.body
@@ -114,7 +122,7 @@ class SuctionTool:
         """Update the seal after a physics step."""
         if self._grip is not None:
             self._check_pull(self._grip)
-        elif self._vacuum:
+        elif self._is_vacuum_on:
             self._seal()
 
     def _check_pull(self, grip: _Grip) -> None:
@@ -126,15 +134,15 @@ class SuctionTool:
 
     def _seal(self) -> None:
         """Hold a body within reach if the seal is strong enough."""
-        near = set(self._find_bodies_near(self._config.reach))
-        if self._separating_body not in near:
+        near_bodies = set(self._find_bodies_near(self._config.reach))
+        if self._separating_body not in near_bodies:
             self._separating_body = None
-        sealable = near & self._world.bodies.keys() - {self._separating_body}
-        if not sealable:
+        sealable_bodies = near_bodies & self._world.labels.keys() - {self._separating_body}
+        if not sealable_bodies:
             return
         world, config = self._world, self._config
         X_WT = world.get_tool_pose()
-        contact = measure_contact(world.client, X_WT, sealable, config.cup_radius, config.reach)
+        contact = measure_contact(world.client, X_WT, sealable_bodies, config.cup_radius, config.reach)
         force = compute_breakaway_force(contact, config)
         if contact is not None and force >= config.min_force:
             self.dropped_bodies.discard(contact.body)
@@ -143,13 +151,14 @@ class SuctionTool:
             self._set_collision(contact.body, False)
 
     def _attach(self, body: int) -> int:
-        """Fix a body to the tool at its current pose and return the constraint, between centres of mass."""
+        """Fix a body to the tool at its current pose, and return the constraint."""
         world = self._world
-        X_WI = Pose.of(*world.client.getLinkState(world.arm, world.tool, computeForwardKinematics=True)[:2])
-        X_IB = X_WI.inverse() @ Pose.of(*world.client.getBasePositionAndOrientation(body))
+        # The constraint connects the centres of mass of tool (frame I) and body (frame B).
+        tool_state = world.client.getLinkState(world.arm, world.tool_index, computeForwardKinematics=True)
+        X_IB = Pose.of(*tool_state[:2]).inverse() @ Pose.of(*world.client.getBasePositionAndOrientation(body))
         return int(
             world.client.createConstraint(
-                world.arm, world.tool, body, -1, pybullet.JOINT_FIXED, [0, 0, 0],
+                world.arm, world.tool_index, body, -1, pybullet.JOINT_FIXED, [0, 0, 0],
                 X_IB.position, [0, 0, 0], X_IB.quaternion,
             )
         )  # fmt: skip
@@ -162,23 +171,23 @@ class SuctionTool:
         self._grip = None
 
     def _set_collision(self, body: int, enabled: bool) -> None:
-        self._world.client.setCollisionFilterPair(self._world.arm, body, self._world.tool, -1, int(enabled))
+        world = self._world
+        world.client.setCollisionFilterPair(world.arm, body, world.tool_index, -1, int(enabled))
 
     def _find_bodies_near(self, distance: float) -> Iterator[int]:
         """Yield every body except the arm within `distance` [m] of the lip.
 
-        The bounding boxes are compared first (3 us), so the call is fast while no body is near the tool.
+        A comparison of bounding boxes (3 µs) comes first, because mostly no body is near the tool.
         """
         world = self._world
-        low, high = world.client.getAABB(world.arm, world.tool)
-        overlapping = world.client.getOverlappingObjects(
-            [value - distance for value in low], [value + distance for value in high]
-        )
-        bodies = sorted({body for body, _ in overlapping or ()} - {world.arm})
+        low, high = world.client.getAABB(world.arm, world.tool_index)
+        low, high = [value - distance for value in low], [value + distance for value in high]
+        overlaps = world.client.getOverlappingObjects(low, high) or ()
+        bodies = sorted({body for body, _ in overlaps} - {world.arm})
         if not bodies:
             return
         X_TW = world.get_tool_pose().inverse()
         for body in bodies:
-            points = world.client.getClosestPoints(world.arm, body, distance, linkIndexA=world.tool)
-            if any(X_TW.apply(point[5])[2] > -LIP_LENGTH for point in points):
+            points = world.client.getClosestPoints(world.arm, body, distance, linkIndexA=world.tool_index)
+            if any(X_TW.apply(point[POSITION_A])[2] > -LIP_LENGTH for point in points):
                 yield body

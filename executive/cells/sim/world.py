@@ -1,7 +1,7 @@
-"""Simulated world of a cell: arm with tool, table, bins and loose objects in PyBullet.
+"""PyBullet world of a cell: arm with tool, table, bins and loose objects.
 
-The origin of the world frame W is at the base of the arm, on the table top. Worlds with the same cell file
-and the same objects in the same order are bitwise identical.
+The origin of the world frame W is at the base of the arm, on the table top. Worlds with equal cell files and
+equal objects in equal order are bitwise identical.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from executive.cell.layout import NECK_LENGTH, TOOL_RADIUS, list_bin_boxes
 from executive.cells.sim import command_log
 from executive.cells.sim.command_log import CommandLog
 from executive.cells.sim.model_files import find_model
-from executive.cells.sim.models import add_body, compute_upright_pose
+from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, get_upright_pose
 from executive.cells.sim.robot_models import ROBOT_MODELS, RobotModel
 from executive.cells.sim.table_top import TableTop
 from executive.geometry import Array, Pose
@@ -35,6 +35,8 @@ TOOL_MASS = 0.1
 """Mass of the tool [kg]."""
 MAX_RAY_LENGTH, RAY_RESTART_DISTANCE = 5.0, 1e-4
 """Maximum length of a ray, and distance behind a hit of the arm at which the ray is cast again [m]."""
+BODY_B, LINK_A, LINK_B, POSITION_A, POSITION_B, DISTANCE, NORMAL_FORCE = 2, 3, 4, 5, 6, 8, 9
+"""Indices of values in a contact point or closest point of PyBullet, for a query with the bodies A and B."""
 
 
 class World:
@@ -50,25 +52,24 @@ class World:
         client: The connection to the physics server, which identifies bodies by integers.
         arm: Body of the arm, fixed at the origin.
         robot: Model of the arm.
-        flange: Index of the link with the flange.
-        tool: Index of the link of the tool, whose frame is that of the flange.
+        flange_index: Index of the link with the flange.
+        tool_index: Index of the link of the tool, whose frame is the frame of the flange.
         table, floor: Bodies of the table and of the floor under the table.
         table_top: The surface of the table.
-        bins: Bodies of each bin, by name.
-        bodies: Class of every loose object, by body.
-        models: Model of every loose object, by body.
-        steps: Number of physics steps.
+        bin_bodies: Body of each bin, by name.
+        labels: Class of each loose object, by body.
+        models: Model of each loose object, by body.
+        step_count: Number of physics steps.
         log: Log of the commands to the world; each command is appended before its execution.
         is_idle: True during physics steps that belong to no control step of the run.
-        rest_positions: Positions `(3,)` [m] to which loose objects were moved or at which the tool released
-            them, by body; without their initial positions.
+        rest_positions: Positions `(3,)` [m] of each object after a move or a release, by body.
         removed_objects: Class and last position `(3,)` [m] of each removed object, by body.
     """
 
     def __init__(self, config: CellConfig, *, gui: bool = False, visuals: bool = True) -> None:
         self.config = config
         self.robot = ROBOT_MODELS[config.arm.urdf]
-        self.flange, self.tool = self.robot.joint_count - 1, self.robot.joint_count
+        self.flange_index, self.tool_index = self.robot.joint_count - 1, self.robot.joint_count
         self.client = BulletClient(pybullet.GUI if gui else pybullet.DIRECT)
         self.client.setGravity(0, 0, -9.81)
         self.client.setTimeStep(STEP)
@@ -84,10 +85,10 @@ class World:
         )
         self.table_top = TableTop(self.client, self.table)
         self.arm = self._load_arm(flags)
-        self.bins = {name: (add_bin(self.client, bin),) for name, bin in config.bins.items()}
-        self.bodies: dict[int, str] = {}
+        self.bin_bodies = {name: add_bin(self.client, bin) for name, bin in config.bins.items()}
+        self.labels: dict[int, str] = {}
         self.models: dict[int, ObjectConfig] = {}
-        self.steps = 0
+        self.step_count = 0
         self.log = CommandLog()
         self.is_idle = False
         self.rest_positions: dict[int, list[Array]] = {}
@@ -97,46 +98,46 @@ class World:
     def add_object(
         self, label: str, X_WO: Pose, colour: Sequence[float], model: ObjectConfig | None = None
     ) -> int:
-        """Add an object of the class `label` at `X_WO`, whose z axis points up if the object is upright.
+        """Add an object of the class `label` and return the body.
 
-        Returns the body of the object. The default model is that of the class in the cell file.
+        Args:
+            label: Class of the object.
+            X_WO: Pose of the upright frame O of the object (see `compute_upright_pose`).
+            colour: Red, green and blue, each 0 to 1.
+            model: Model of the object; None: the model of the class in the cell file.
         """
         model = model or self.config.objects[label]
         body = add_body(self.client, model, X_WO)
         self.client.changeVisualShape(body, -1, rgbaColor=[*colour, 1])
-        self.bodies[body], self.models[body] = label, model
+        self.labels[body], self.models[body] = label, model
         return body
 
     def remove_object(self, body: int) -> None:
         """Remove a loose object from the world."""
         self.log.append(command_log.REMOVE, body)
-        self.removed_objects[body] = self.bodies[body], self.get_object_pose(body).position
-        del self.bodies[body], self.models[body]
+        self.removed_objects[body] = self.labels[body], self.get_object_pose(body).position
+        del self.labels[body], self.models[body]
         self.client.removeBody(body)
 
     def name_body(self, body: int) -> str:
         """Return the name of a body for messages."""
-        for name, bodies in {"the table": (self.table,), "the floor": (self.floor,), **self.bins}.items():
-            if body in bodies:
-                return name
-        return f"a {self.bodies[body]}" if body in self.bodies else "the arm"
+        names = {self.table: "the table", self.floor: "the floor"}
+        names |= {bin_body: name for name, bin_body in self.bin_bodies.items()}
+        return f"a {self.labels[body]}" if body in self.labels else names.get(body, "the arm")
 
     def name_link(self, link: int) -> str:
         """Return the name of a link of the arm for messages, by its index."""
-        return "the tool" if link == self.tool else f"link {link + 1}"
+        return "the tool" if link == self.tool_index else f"link {link + 1}"
 
     def get_object_pose(self, body: int) -> Pose:
-        """Return the pose `X_WO` of a loose object, in the frame of `add_object`."""
-        X_WI = Pose.of(*self.client.getBasePositionAndOrientation(body))
-        X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
-        return X_WI @ X_LI.inverse() @ compute_upright_pose(self.models[body]).inverse()
+        """Return the pose `X_WO` of the upright frame O of a loose object."""
+        return get_upright_pose(self.client, body, self.models[body])
 
     def place_object(self, body: int, X_WO: Pose) -> None:
         """Move a loose object to `X_WO`, at rest."""
         self.rest_positions.setdefault(body, []).append(X_WO.position)
         self.log.append(command_log.SET_POSE, body, *X_WO.position, *X_WO.quaternion)
-        X_LI = Pose.of(*self.client.getDynamicsInfo(body, -1)[3:5])
-        X_WI = X_WO @ compute_upright_pose(self.models[body]) @ X_LI
+        X_WI = X_WO @ compute_upright_pose(self.models[body]) @ get_inertial_pose(self.client, body)
         self.client.resetBasePositionAndOrientation(body, X_WI.position, X_WI.quaternion)
 
     def set_joint_positions(self, q: Sequence[float] | Array) -> None:
@@ -147,8 +148,7 @@ class World:
     def command_arm(self, q: Array, time: float = 0.0) -> None:
         """Command joint positions `q` `(n,)` [rad]; `time` [s] since the start of the motion is only logged.
 
-        With full position gain, zero target velocity and a command before every step, the arm follows a path
-        with an error of 0.0005°.
+        If a command precedes every physics step, the full position gain leaves a tracking error of 0.0005°.
         """
         self.log.append(command_log.JOINT_TARGETS, time, *q)
         self.client.setJointMotorControlArray(
@@ -162,7 +162,7 @@ class World:
 
     def get_flange_pose(self) -> Pose:
         """Return `X_WF`, the pose of the flange."""
-        state = self.client.getLinkState(self.arm, self.flange, computeForwardKinematics=True)
+        state = self.client.getLinkState(self.arm, self.flange_index, computeForwardKinematics=True)
         return Pose.of(*state[4:6]) @ Pose.of([0, 0, self.robot.flange_offset])
 
     def get_tool_pose(self) -> Pose:
@@ -171,8 +171,7 @@ class World:
 
     def cast_ray(self, origin: Array, direction: Array) -> Array | None:
         """Return the first point `(3,)` [m] of a ray on a body other than arm and tool, or None."""
-        end = origin + MAX_RAY_LENGTH * direction / np.linalg.norm(direction)
-        start = origin
+        start, end = origin, origin + MAX_RAY_LENGTH * direction / np.linalg.norm(direction)
         while True:
             body, _, fraction, point, _ = self.client.rayTest(start, end)[0]
             if body != self.arm:
@@ -184,7 +183,7 @@ class World:
         """Advance the physics by 1/240 s."""
         self.log.append(command_log.IDLE_STEP if self.is_idle else command_log.RUN_STEP)
         self.client.stepSimulation()
-        self.steps += 1
+        self.step_count += 1
 
     def close(self) -> None:
         """Disconnect from the physics server; the world cannot be used afterwards."""
@@ -192,10 +191,10 @@ class World:
         self.client.disconnect()
 
     def _load_arm(self, flags: int) -> int:
-        """Load the arm with the tool as an additional fixed link and return the body.
+        """Load the arm with the tool as an additional fixed link, and return the body.
 
-        The errors of a constraint between arm and tool could drift. Links of one body do not collide with
-        each other (PyBullet's default), so tool and wrist may overlap.
+        A fixed link has no drift, in contrast to a constraint between two bodies. PyBullet by default
+        ignores collisions between links of one body, so that tool and wrist may overlap.
         """
         path = find_model(self.config.arm.urdf)
         text = path.read_text().replace('filename="meshes/', f'filename="{path.parent}/meshes/')
@@ -207,13 +206,13 @@ class World:
             return int(self.client.loadURDF(str(generated), useFixedBase=True, flags=flags))
 
 
-def name_held(label: str) -> str:
+def name_load(label: str) -> str:
     """Return the name of a held object of class `label` for messages."""
     return f"the held {label}"
 
 
 def add_bin(client: BulletClient, bin: BinConfig) -> int:
-    """Create a static body with floor and walls of a bin at its position, and return the body."""
+    """Create the static body of a bin, with floor and walls, and return the body."""
     half_sizes, centres = map(list, zip(*list_bin_boxes(bin.size), strict=True))
     shape = {"shapeTypes": [pybullet.GEOM_BOX] * len(half_sizes), "halfExtents": half_sizes}
     colours = [[*bin.colour, 1]] * len(half_sizes)
@@ -223,16 +222,25 @@ def add_bin(client: BulletClient, bin: BinConfig) -> int:
 
 
 def _make_tool_urdf(length: float, cup_radius: float, robot: RobotModel) -> str:
-    """Return the URDF text of the tool, from the flange to the lip, with the closing tag of the robot."""
-    shaft = length - NECK_LENGTH
-    cylinders = [(shaft, TOOL_RADIUS, shaft / 2), (NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2)]
+    """Return the URDF text of the tool, from the flange to the lip, with the closing tag of the robot.
+
+    Args:
+        length: Distance from the flange to the lip [m].
+        cup_radius: Radius of the cup and of the neck behind the cup [m].
+        robot: Model of the arm.
+    """
+    shaft_length = length - NECK_LENGTH
+    cylinders = (
+        (shaft_length, TOOL_RADIUS, shaft_length / 2),
+        (NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2),
+    )
     shapes = "".join(
-        f'<{kind}><origin xyz="0 0 {z}"/><geometry>'
-        f'<cylinder length="{size - 2 * margin}" radius="{radius - margin}"/></geometry>'
-        + ('<material name="Grey"/>' if kind == "visual" else "")
-        + f"</{kind}>"
-        for size, radius, z in cylinders
-        for kind, margin in (("visual", 0.0), ("collision", CYLINDER_MARGIN))
+        f'<{tag}><origin xyz="0 0 {z}"/><geometry>'
+        f'<cylinder length="{cylinder_length - 2 * margin}" radius="{radius - margin}"/></geometry>'
+        + ('<material name="Grey"/>' if tag == "visual" else "")
+        + f"</{tag}>"
+        for cylinder_length, radius, z in cylinders
+        for tag, margin in (("visual", 0.0), ("collision", CYLINDER_MARGIN))
     )
     return f"""
   <link name="tool">

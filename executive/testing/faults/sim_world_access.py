@@ -29,7 +29,7 @@ class SimWorldAccess(WorldAccess):
     @property
     def objects(self) -> Sequence[TrueObject]:
         """All loose objects, in the order of their creation."""
-        return [self._describe(body) for body in self._world.bodies]
+        return [self._describe(body) for body in self._world.labels]
 
     @property
     def held_object(self) -> TrueObject | None:
@@ -65,4 +65,4 @@ class SimWorldAccess(WorldAccess):
         self._world.is_idle = False
 
     def _describe(self, body: int) -> TrueObject:
-        return TrueObject(body, self._world.bodies[body], self._world.get_object_pose(body).position)
+        return TrueObject(body, self._world.labels[body], self._world.get_object_pose(body).position)

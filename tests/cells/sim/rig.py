@@ -32,7 +32,7 @@ class Rig:
         self.world = World(config, visuals=False)
         self.clearance = ClearanceChecker(config)
         self.planner = build_planner(config, self.clearance.check)
-        self.clock = StepClock(lambda: self.world.steps * STEP)
+        self.clock = StepClock(lambda: self.world.step_count * STEP)
         self.events: list[Event] = []
         self.tool = SuctionTool(self.world, config.tool)
         self.arm = SimArm(
@@ -49,7 +49,7 @@ class Rig:
         """Make control steps."""
         for _ in range(count):
             self.arm.advance()
-            self.commands.append(self.arm._command)
+            self.commands.append(self.arm._commanded_q)
             self.world.step()
             self.tool.advance()
 
@@ -93,7 +93,7 @@ class Rig:
 
     def pressing(self) -> float:
         """Return the force between the tool and everything else [N]."""
-        points = self.world.client.getContactPoints(bodyA=self.world.arm, linkIndexA=self.world.tool)
+        points = self.world.client.getContactPoints(bodyA=self.world.arm, linkIndexA=self.world.tool_index)
         return float(sum(point[9] for point in points))
 
     def close(self) -> None:

@@ -45,11 +45,11 @@ def bump(rig: Rig, motion: Trajectory, earliest: float = 0.0) -> str:
     rig.arm.start(motion)
     while rig.arm.collision is None:
         assert not rig.arm.at_rest, "it ran into nothing"
-        s = rig.arm._time
+        s = rig.arm._motion_time
         rig.step()
     assert s >= earliest, rig.arm.collision
     assert rig.run() <= 120
-    assert measure_distance(rig.arm._command, motion) < 1e-9
+    assert measure_distance(rig.arm._commanded_q, motion) < 1e-9
     assert rig.arm.collision is not None
     return rig.arm.collision
 

@@ -22,7 +22,7 @@ class OneBody:
     """A world with one body, by default a cube over the bin."""
 
     def __init__(self, label: str = "cube", place: Sequence[float] = IN_BIN) -> None:
-        self.bodies = {7: label}
+        self.labels = {7: label}
         self.removed_objects: dict[int, tuple[str, np.ndarray]] = {}
         self._place = place
 
@@ -45,16 +45,16 @@ def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more:
         (("red_bin",), {}, "right"),
         (("blue_bin", "red_bin"), {}, "right"),
         (("blue_bin", "grey_bin"), {}, "wrong_bin"),
-        (("red_bin",), {"held": 7}, "left"),
-        (("blue_bin",), {"dropped": {7}}, "elsewhere"),
-        (("red_bin",), {"dropped": {7}}, "right"),
+        (("red_bin",), {"held_body": 7}, "left"),
+        (("blue_bin",), {"dropped_bodies": {7}}, "elsewhere"),
+        (("red_bin",), {"dropped_bodies": {7}}, "right"),
     ],
 )
 def test_a_body_in_a_bin_counts_by_its_class_and_by_who_put_it_there(
     bins: tuple[str, ...], more: dict[str, Any], end: str
 ) -> None:
     none = {"right": 0, "wrong_bin": 0, "left": 0, "elsewhere": 0, "fell_in_wrong_bin": 0, "unseen": 1}
-    fell = bins == ("blue_bin",) and "dropped" in more
+    fell = bins == ("blue_bin",) and "dropped_bodies" in more
     assert counted(bins, **more) == {**none, end: 1, "fell_in_wrong_bin": int(fell)}
 
 
@@ -63,7 +63,7 @@ def test_a_body_in_a_bin_counts_by_its_class_and_by_who_put_it_there(
     [
         (("red_bin",), IN_BIN, {}, "right"),
         (("blue_bin",), IN_BIN, {}, "wrong_bin"),
-        (("red_bin",), IN_BIN, {"dropped": {7}}, "elsewhere"),
+        (("red_bin",), IN_BIN, {"dropped_bodies": {7}}, "elsewhere"),
         (("red_bin",), ON_TABLE, {}, "elsewhere"),
     ],
 )
@@ -71,7 +71,7 @@ def test_a_body_that_was_taken_out_of_a_bin_counts_as_if_it_still_lay_there(
     bins: tuple[str, ...], place: Sequence[float], more: dict[str, Any], end: str
 ) -> None:
     world = OneBody()
-    world.removed_objects[7] = (world.bodies.pop(7), np.array(place))
+    world.removed_objects[7] = (world.labels.pop(7), np.array(place))
     item = SimpleNamespace(state=None, first_position=np.array(ON_TABLE))
     assert counted(bins, world, records=[item], **more) == {**dict.fromkeys(AUDIT_KEYS, 0), end: 1}
     assert counted(bins, world, **more) == dict.fromkeys(AUDIT_KEYS, 0), "nobody had seen it"

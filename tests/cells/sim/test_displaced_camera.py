@@ -81,7 +81,7 @@ def test_a_camera_that_is_moved_during_a_run_ends_it_once_the_tool_is_empty() ->
                 self._true_config = self._true_config.model_copy(update=moved)
             return super().capture()
 
-    kind = partial(make_oracle_kind(), camera=partial(Pushed, renders_images=True))
+    kind = partial(make_oracle_kind(), build_camera=partial(Pushed, renders_images=True))
     result = run_mission("sort_overhead", kind, seed=1)
     assert (result.status, result.reason, result.held_item) == ("FAILURE", "Detect.camera_moved", "")
     assert result.agrees and result.items["placed"] > 0

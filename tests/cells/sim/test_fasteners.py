@@ -83,7 +83,7 @@ def test_it_is_picked_at_the_first_attempt_and_lands_in_its_bin(
 def test_the_table_felt_through_a_hole_is_no_contact(with_one: Callable[..., SimCell]) -> None:
     made = with_one("washer", 1)
     target = seen(made)
-    (body,) = made._world.bodies
+    (body,) = made._world.labels
     # As if the detection had been off by just the ring: the cup comes down in the hole.
     target.position[:2] = made._world.get_object_pose(body).position[:2] - np.array([0.017, 0.0])
     result = run_skill(Approach(target=target), made)

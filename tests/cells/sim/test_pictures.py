@@ -72,7 +72,7 @@ def test_each_picture_is_of_its_moment(shoot: PictureSource, tmp_path: Path) -> 
 def test_several_processes_take_the_same_pictures_in_the_same_order(
     shoot: PictureSource, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "PICTURES_PER_BLOCK", 4)
+    monkeypatch.setattr(module, "MAX_PICTURES_PER_BLOCK", 4)
     steps = [0, 3, 6, 9, 12, 15, 24, 30, STEPS]
     with closing(render_pictures(shoot, steps, worker_count=2)) as taken:
         together = list(taken)

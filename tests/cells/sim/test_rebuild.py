@@ -51,7 +51,7 @@ def state_of(cell: SimCell | SimpleNamespace) -> str:
     joints = [joint[:2] for joint in world.client.getJointStates(world.arm, range(7))]
     bodies = [
         (body, world.client.getBasePositionAndOrientation(body), world.client.getBaseVelocity(body))
-        for body in world.bodies
+        for body in world.labels
     ]
     return repr((joints, bodies, tool.held_body, tool.pull, cell.steps))
 
@@ -77,7 +77,8 @@ def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
         if cell.steps in TICKS:
             copy = folder / str(cell.steps)
             copy.write_bytes((folder / "log").read_bytes())
-            snapshots.append(Left(copy, state_of(cell), cell.steps, cell._arm._motion, cell._arm._time))
+            arm = cell._arm
+            snapshots.append(Left(copy, state_of(cell), cell.steps, arm._motion, arm._motion_time))
         if cell.steps == max(TICKS):
             raise Cut
 
@@ -125,9 +126,9 @@ def test_the_arm_brakes_on_the_path_it_was_on(cells: list[tuple[Left, SimCell]],
                 break
             cell.advance()
             assert one.motion is not None
-            on_path = one.motion.state_at(cell._arm._time).q
-            assert np.abs(cell._arm._command - on_path).max() < 1e-7, one.tick
-            commands.append(cell._arm._command)
+            on_path = one.motion.state_at(cell._arm._motion_time).q
+            assert np.abs(cell._arm._commanded_q - on_path).max() < 1e-7, one.tick
+            commands.append(cell._arm._commanded_q)
         assert cell.cell.arm.at_rest, one.tick
         if len(commands) > 3:
             accelerations = np.diff(commands, 2, axis=0) / STEP**2
@@ -144,7 +145,7 @@ def test_a_command_that_no_physics_step_has_followed_is_not_skipped(
     CommandLog(log, 7, resume=True).append(JOINT_TARGETS, time, *one.motion.state_at(time).q)
     cell = rebuilt(mission, log)
     cell.advance()
-    assert cell._arm._time == pytest.approx(time, abs=STEP / 10)
+    assert cell._arm._motion_time == pytest.approx(time, abs=STEP / 10)
     cell.close()
 
 

@@ -84,7 +84,7 @@ def capture(made: SimCell) -> Frame:
 
 def placed(world: World) -> list[tuple[str, list[float]]]:
     """Return label and pose of every object."""
-    return [(label, world.get_object_pose(body).to_rounded_list(5)) for body, label in world.bodies.items()]
+    return [(label, world.get_object_pose(body).to_rounded_list(5)) for body, label in world.labels.items()]
 
 
 def test_a_scene_without_changes_is_the_declared_world(world: Build, overhead: CellConfig) -> None:
@@ -164,9 +164,9 @@ def test_unknown_objects_lie_beside_the_others_and_no_detector_knows_them(
     unknown = {"count": [2, 2], "models": [168, 169], "scale": 0.5, "colours": [[0.0, 0.9, 0.0]]}
     made = cell(unknown=unknown, table={"objects": [3, 3], "stacked": 1.0})
     world = made._world
-    strange = [body for body, label in world.bodies.items() if label == UNKNOWN_LABEL]
-    assert (len(world.bodies), len(strange)) == (5, 2)
-    others = [body for body in world.bodies if body not in strange]
+    strange = [body for body, label in world.labels.items() if label == UNKNOWN_LABEL]
+    assert (len(world.labels), len(strange)) == (5, 2)
+    others = [body for body in world.labels if body not in strange]
     for body in strange:
         model, place = world.models[body], world.get_object_pose(body).position
         assert "169.urdf" in model.urdf

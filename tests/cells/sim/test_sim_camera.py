@@ -64,7 +64,7 @@ def test_projected_meshes_agree_with_the_rendered_silhouettes(
     matrix, X_WC = compute_calibration(camera)[0], get_camera_pose(world, camera)
     left, top, _, _ = camera.table_view
     bodies = render(world, matrix, X_WC, camera.table_view, CELL_LIGHT).bodies
-    for body, label in world.bodies.items():
+    for body, label in world.labels.items():
         rows, columns = np.nonzero(bodies == body)
         seen = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
         pixels = project(

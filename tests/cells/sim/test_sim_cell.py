@@ -41,7 +41,7 @@ def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
 
 def placements(made: SimCell) -> list[tuple[str, list[float]]]:
     world = made._world
-    poses = [(label, world.get_object_pose(body)) for body, label in world.bodies.items()]
+    poses = [(label, world.get_object_pose(body)) for body, label in world.labels.items()]
     return [(label, [*pose.position, *pose.rotation.ravel()]) for label, pose in poses]
 
 
@@ -77,8 +77,8 @@ def test_the_audit_counts_every_body_once_by_where_it_really_is(build_cell: Buil
         "unseen": 0,
     }
 
-    one, two, three, _ = made._world.bodies
-    home = made.cell.bins[SHIPPED_ROUTES[made._world.bodies[one]][0]].position
+    one, two, three, _ = made._world.labels
+    home = made.cell.bins[SHIPPED_ROUTES[made._world.labels[one]][0]].position
     put(made, one, (home[0] + 0.05, home[1] - 0.05, 0.04))
     assert made.audit() == {
         "right": 1,
@@ -90,7 +90,7 @@ def test_the_audit_counts_every_body_once_by_where_it_really_is(build_cell: Buil
     }
 
     strange = next(
-        b for n, b in made.cell.bins.items() if n not in SHIPPED_ROUTES[made._world.bodies[two]]
+        b for n, b in made.cell.bins.items() if n not in SHIPPED_ROUTES[made._world.labels[two]]
     ).position
     put(made, two, (strange[0], strange[1] + 0.03, 0.04))
     assert made.audit() == {
@@ -127,7 +127,7 @@ def test_the_audit_counts_every_body_once_by_where_it_really_is(build_cell: Buil
 def test_what_the_ledger_never_saw_is_unseen_wherever_it_ends(build_cell: Build) -> None:
     made = build_cell(seed=0)
     assert made.audit()["unseen"] == 4
-    hidden, *_ = made._world.bodies
+    hidden, *_ = made._world.labels
     lay = made._world.get_object_pose(hidden)
     put(made, hidden, (0.0, 0.0, 0.03))  # in the foot of the arm, where no camera looks
     look(made)
@@ -157,7 +157,7 @@ def test_the_table_is_hidden_while_the_arm_is_over_it(build_cell: Build) -> None
 @pytest.mark.parametrize("name", ["overhead", "fasteners"])
 def test_a_class_weighs_what_its_objects_do(build_cell: Build, name: str) -> None:
     made = build_cell(name)
-    for body, label in made._world.bodies.items():
+    for body, label in made._world.labels.items():
         mass = made._world.client.getDynamicsInfo(body, -1)[0]
         assert made.cell.classes[label].mass == pytest.approx(mass), label
 
@@ -167,7 +167,7 @@ def test_only_depth_and_ray_find_what_does_not_stand_on_the_table(
     build_cell: Build, way: str, raised: float
 ) -> None:
     made = build_cell("depth", localization=way)
-    body = next(body for body, label in made._world.bodies.items() if label == "cube")
+    body = next(body for body, label in made._world.labels.items() if label == "cube")
     put(made, body, (0.6, 0.15, 0.075))
     frame = made.cell.camera.capture()
     assert isinstance(frame, TrueFrame)

@@ -30,16 +30,16 @@ def with_stacks(config: CellConfig, share: float) -> CellConfig:
 
 def lowest(world: World, body: int) -> float:
     """Return the height of an object's underside [m]."""
-    vertices = load_mesh(world.config.objects[world.bodies[body]]).vertices
+    vertices = load_mesh(world.config.objects[world.labels[body]]).vertices
     return float(world.get_object_pose(body).apply(vertices)[:, 2].min())
 
 
 def carried(world: World) -> dict[int, int]:
     """Return what each object that lies on another one lies on."""
-    places = {body: world.get_object_pose(body).position[:2] for body in world.bodies}
+    places = {body: world.get_object_pose(body).position[:2] for body in world.labels}
     return {
         upper: min(places.keys() - {upper}, key=lambda b: float(np.linalg.norm(places[b] - places[upper])))
-        for upper in world.bodies
+        for upper in world.labels
         if lowest(world, upper) > 0.02
     }
 
@@ -48,7 +48,7 @@ def placed(world: World) -> list[tuple[str, float, float, float]]:
     """Return label and rounded place [m] of every object."""
     return [
         (label, *(round(float(value), 4) for value in world.get_object_pose(body).position))
-        for body, label in world.bodies.items()
+        for body, label in world.labels.items()
     ]
 
 
@@ -84,7 +84,7 @@ def test_objects_stand_still_apart_and_inside_the_workspace(
         assert table.x[0] - 0.005 <= pose.position[0] <= table.x[1] + 0.005
         assert table.y[0] - 0.005 <= pose.position[1] <= table.y[1] + 0.005
     for (a, X_WA), (b, X_WB) in combinations(poses.items(), 2):
-        radii = sum(overhead.objects[world.bodies[body]].radius for body in (a, b))
+        radii = sum(overhead.objects[world.labels[body]].radius for body in (a, b))
         distance = float(np.linalg.norm(X_WA.position[:2] - X_WB.position[:2]))
         assert {a, b} & pairs.keys() or distance >= radii + table.gap - 0.005
     for _ in range(240):
@@ -114,8 +114,8 @@ def test_the_first_world_is_the_one_that_a_cell_of_the_same_seed_begins_with(ove
     options = CellOptions(SilentOperator(), base=Path("."))
     cell = make_oracle_kind()(overhead, seed=9, routes={}, emit=discard_event, options=options)
     world = build_initial_world(overhead, 9)
-    assert (world.bodies, world.rest_positions) == (cell._world.bodies, {})
-    for body in world.bodies:
+    assert (world.labels, world.rest_positions) == (cell._world.labels, {})
+    for body in world.labels:
         one, other = (each.client.getBasePositionAndOrientation(body) for each in (world, cell._world))
         assert one == other
     cell.close()

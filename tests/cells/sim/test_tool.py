@@ -97,7 +97,7 @@ def test_the_lip_feels_the_table_too(bench: Bench) -> None:
 def test_the_shaft_of_the_tool_beside_an_object_is_no_touch_of_the_lip(bench: Bench) -> None:
     bench.put(-0.03, dx=CUBE / 2 + 0.0125)
     near = bench.world.client.getClosestPoints(
-        bench.world.arm, bench.body, 0.001, linkIndexA=bench.world.tool
+        bench.world.arm, bench.body, 0.001, linkIndexA=bench.world.tool_index
     )
     assert near and not bench.tool.touching
 

@@ -25,7 +25,7 @@ def test_the_arm_is_where_its_joints_put_it(world: World) -> None:
     visuals = SimVisuals(world)
     before = visuals.poses()
     assert np.allclose(before["link 8"].position, world.get_flange_pose().position, atol=1e-6)
-    for body in world.bodies:
+    for body in world.labels:
         assert before[f"object {body}"].position[:2] == pytest.approx(
             world.get_object_pose(body).position[:2], abs=1e-6
         )

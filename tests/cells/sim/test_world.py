@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from executive.cell.config import CellConfig
-from executive.cells.sim.world import World, name_held
+from executive.cells.sim.world import World, name_load
 from executive.geometry import Pose, make_tool_down_pose, rotate_about_z
 
 Build = Callable[[CellConfig], World]
@@ -17,7 +17,7 @@ def test_the_table_top_is_at_height_zero_and_the_bin_floors_just_above(
 ) -> None:
     world = build(overhead)
     hits = world.client.rayTestBatch([[0.5, 0, 1], [0.2, 0.44, 1]], [[0.5, 0, -1], [0.2, 0.44, -1]])
-    assert [hit[0] for hit in hits] == [world.table, world.bins["blue_bin"][0]]
+    assert [hit[0] for hit in hits] == [world.table, world.bin_bodies["blue_bin"]]
     assert [hit[3][2] for hit in hits] == pytest.approx([0.0, 0.005], abs=1e-6)
 
 
@@ -26,7 +26,7 @@ def test_the_tool_ends_where_the_tool_centre_point_is(build: Build, wrist: CellC
     world.set_joint_positions(np.radians(wrist.arm.poses_deg["scan"]))
     X_WT = world.get_tool_pose()
     assert X_WT.rotation == pytest.approx(make_tool_down_pose([0, 0, 0]).rotation, abs=1e-5)
-    low, high = world.client.getAABB(world.arm, world.tool)
+    low, high = world.client.getAABB(world.arm, world.tool_index)
     assert low[2] == pytest.approx(X_WT.position[2], abs=2e-3)
     assert high[2] - low[2] == pytest.approx(wrist.tool.length, abs=5e-3)
 
@@ -39,7 +39,7 @@ def test_an_object_is_where_it_was_put_and_can_be_put_elsewhere(build: Build, ov
     world.place_object(body, second)
     assert world.get_object_pose(body).to_rounded_list() == pytest.approx(second.to_rounded_list(), abs=1e-6)
     world.remove_object(body)
-    assert world.bodies == {}
+    assert world.labels == {}
 
 
 def test_a_ray_ends_at_the_first_thing_but_the_arm(build: Build, overhead: CellConfig) -> None:
@@ -56,9 +56,9 @@ def test_a_ray_ends_at_the_first_thing_but_the_arm(build: Build, overhead: CellC
 def test_every_body_and_part_has_a_name_for_the_text_of_an_error(build: Build, overhead: CellConfig) -> None:
     world = build(overhead)
     duck = world.add_object("duck", Pose.of([0.5, 0.1, 0.2]), (1, 1, 1))
-    bodies = world.floor, world.table, *world.bins["blue_bin"], duck, world.arm
+    bodies = world.floor, world.table, world.bin_bodies["blue_bin"], duck, world.arm
     names = ["the floor", "the table", "blue_bin", "a duck", "the arm"]
     assert [world.name_body(body) for body in bodies] == names
-    parts = [world.name_link(link) for link in (-1, 0, world.flange, world.tool)]
+    parts = [world.name_link(link) for link in (-1, 0, world.flange_index, world.tool_index)]
     assert parts == ["link 0", "link 1", "link 7", "the tool"]
-    assert name_held("duck") == "the held duck"
+    assert name_load("duck") == "the held duck"
