@@ -129,12 +129,12 @@ def test_the_table_gets_a_colour_and_a_texture_and_the_objects_keep_theirs(
 
 def test_number_gap_and_stacks_are_those_of_the_scene(world: Build, overhead: CellConfig) -> None:
     made = world(table={"objects": [7, 7], "gap": 0.05})
-    places = [made.get_object_pose(body).position[:2] for body in made.bodies]
-    kinds = [overhead.objects[label].radius for label in made.bodies.values()]
+    places = [made.get_object_pose(body).position[:2] for body in made.labels]
+    kinds = [overhead.objects[label].radius for label in made.labels.values()]
     gaps = [np.linalg.norm(places[a] - places[b]) - kinds[a] - kinds[b] for a in range(7) for b in range(a)]
     assert (len(places), min(gaps) > 0.045) == (7, True)
     piled = world(table={"objects": [6, 6], "stacked": 1})
-    assert max(piled.get_object_pose(body).position[2] for body in piled.bodies) > 0.06
+    assert max(piled.get_object_pose(body).position[2] for body in piled.labels) > 0.06
 
 
 def test_appearance_changes_no_position_and_the_ledger_does_not_know_the_true_size(
@@ -143,11 +143,11 @@ def test_appearance_changes_no_position_and_the_ledger_does_not_know_the_true_si
     looks = {"objects": {"any": {"colours": [BLACK]}, "duck": {}}, "light": {"brightness": 0.3}}
     usual, black = world(), world(**looks)
     assert placed(usual) == placed(black)
-    for body, label in black.bodies.items():
+    for body, label in black.labels.items():
         colour = black.client.getVisualShapeData(body)[0][7][:3]
         assert (tuple(round(value, 3) for value in colour) == BLACK) == (label != "duck")
     large = world(objects={"sphere": {"scale": 1.3}}, table={"objects": [6, 6]})
-    for body, label in large.bodies.items():
+    for body, label in large.labels.items():
         factor = 1.3 if label == "sphere" else 1.0
         mesh, declared = load_mesh(large.models[body]), load_mesh(overhead.objects[label])
         assert mesh.top - mesh.bottom == pytest.approx(factor * (declared.top - declared.bottom))

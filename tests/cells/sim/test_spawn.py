@@ -54,8 +54,8 @@ def placed(world: World) -> list[tuple[str, float, float, float]]:
 
 def test_a_seed_decides_everything(build: Build, overhead: CellConfig) -> None:
     plain, stacked = build(overhead), build(with_stacks(overhead, 1.0))
-    assert spawn_objects(plain, overhead, 1) == tuple(plain.bodies)
-    for body, label in plain.bodies.items():
+    assert spawn_objects(plain, overhead, 1) == tuple(plain.labels)
+    for body, label in plain.labels.items():
         colour = plain.client.getVisualShapeData(body)[0][7][:3]
         assert tuple(round(value, 3) for value in colour) in overhead.objects[label].colours
     spawn_objects(stacked, stacked.config, 2, count=4)
