@@ -167,7 +167,7 @@ def measure_detector(
         )
         with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
             return evaluate(
-                cell_detector, _show_progress(samples, update), threshold=threshold, worst=worst_mistakes,
+                cell_detector, _show_progress(samples, update), threshold=threshold, mistakes=worst_mistakes,
                 localizer=_build_localizer(run_cell) if run_cell else None,
                 table=run_cell.table if run_cell else None,
             )  # fmt: skip

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from statistics import median_low
 
 from executive.cell.detection import Detections, Observation
 from executive.ledger.belief import MIN_LOG_ODDS_OF_PROOF, Belief
 from executive.ledger.bin_contents import BinContents
-from executive.ledger.item import ItemRecord, State
+from executive.ledger.item import State
 from executive.ledger.records import ItemRecords
 
 
@@ -25,16 +25,6 @@ class Recovery:
         self._records, self._bins = records, bins
         self._counts_by_bin: dict[str, list[Counter[str]]] = defaultdict(list)
         """Number of visible objects of each class, by bin, in each look that shows the whole bin."""
-
-    def mark_as_dropped(self, records: Collection[ItemRecord], change_count: int) -> None:
-        """Set items to DROPPED, so that looks search for them on the table and in the bins.
-
-        `change_count` is the number of changes of the table so far.
-        """
-        for record in records:
-            record.change_count, record.is_untracked = change_count, True
-            record.bin_log_odds.clear()
-            self._records.change_state(record, State.DROPPED)
 
     def add_look(self, look: Detections, bin_names: Mapping[Observation, str | None]) -> None:
         """Count the objects in each bin whose whole floor is visible in a look.

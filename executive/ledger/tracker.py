@@ -297,7 +297,10 @@ class Tracker:
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""
         assert self._recovery is not None, "items are marked as dropped after `lose_track`"
-        self._recovery.mark_as_dropped(records, self.change_count)
+        for record in records:
+            record.change_count, record.is_untracked = self.change_count, True
+            record.bin_log_odds.clear()
+            self._records.change_state(record, State.DROPPED)
         self.invalidate_positions()
 
     def _invalidate_near(self, centre: Array, radius: float) -> None:

@@ -1,4 +1,4 @@
-"""Reader of the annotations of labelled images in COCO or YOLO format; it does not read the images."""
+"""Reader of the annotations (classes and boxes) of labelled images in COCO or YOLO format."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ YOLO_CLASS_FILES = ("data.yaml", "data.yml")
 """Permitted names of the file with the class names of a YOLO dataset."""
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp")
 """Suffixes of the image files in a YOLO dataset."""
-BOX_VALUE_COUNT = 4
+YOLO_BOX_VALUE_COUNT = 4
 """Number of values of a YOLO box: centre x, centre y, width and height."""
 MAX_OBJECT_COUNT = 1_000
 """Maximum number of labelled objects in an image; RF-DETR detects at most 300 (its number of queries)."""
@@ -60,7 +60,7 @@ class ImageAnnotation:
         )
 
     def add(self, label: str, box: Box, message_start: str) -> None:
-        """Add an object; `message_start` is the start of the message if the image has too many objects."""
+        """Add an object; `message_start` is the start of the error message for too many objects."""
         if len(self.labels) == MAX_OBJECT_COUNT:
             raise InputError(f"{message_start} more than {MAX_OBJECT_COUNT} objects; divide the image")
         self.labels.append(label)
@@ -112,9 +112,8 @@ class _YoloClassFile(BaseModel):
 
 def is_split(folder: Path) -> bool:
     """Return True if a folder is a split of a dataset: labelled images in COCO or YOLO format."""
-    return (folder / COCO_FILE_NAME).is_file() or (
-        (folder / "images").is_dir() and (folder / "labels").is_dir()
-    )
+    is_yolo = (folder / "images").is_dir() and (folder / "labels").is_dir()
+    return is_yolo or (folder / COCO_FILE_NAME).is_file()
 
 
 def read_annotations(split: Path) -> Annotations:
@@ -134,13 +133,13 @@ def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     content = parse_file(file, MAX_COCO_FILE_SIZE, _CocoFile.model_validate_json)
     class_names = {category.id: category.name for category in content.categories}
     annotations = {image.id: ImageAnnotation() for image in content.images}
-    for duplicate, values in (
+    for message, keys in (
         ("images have the same id", [image.id for image in content.images]),
         ("images have the same file_name", [split / image.file_name for image in content.images]),
         ("categories have the same id", [category.id for category in content.categories]),
     ):
-        if len(set(values)) < len(values):
-            raise InputError(f"{file}: two {duplicate}")
+        if len(set(keys)) < len(keys):
+            raise InputError(f"{file}: two {message}")
     for index, coco_object in enumerate(content.annotations):
         image_id, class_id = coco_object.image_id, coco_object.category_id
         key = f"{file}: annotations[{index}]"
@@ -165,6 +164,7 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
         raise InputError(f"{split.parent} has no data.yaml, which names the classes of a YOLO dataset")
 
     def parse(text: str) -> _YoloClassFile:
+        """Return the class file; `BaseLoader` reads each name as text, for instance `no`."""
         return _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader))
 
     names = parse_file(class_file, MAX_CLASS_FILE_SIZE, parse).names
@@ -177,47 +177,46 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
 
 
 def _read_labels(file: Path, class_names: Mapping[int, str]) -> ImageAnnotation:
-    """Return the objects in the label file of a YOLO image; an image without a label file has none."""
+    """Return the objects in the label file of a YOLO image; an image without a label file has no objects."""
     annotation = ImageAnnotation(is_normalized=True)
     if not os.path.lexists(file):
         return annotation
     for line_number, line in enumerate(_read_text(file, MAX_LABEL_FILE_SIZE).splitlines(), start=1):
         if not line.strip():
             continue
+        place = f"{file}:{line_number}"
         try:
             class_number, *texts = line.split()
             values = [float(text) for text in texts]
             label = class_names[int(class_number)]
         except KeyError:
-            raise InputError(
-                f"{file}:{line_number}: {class_number} is not one of {len(class_names)} classes"
-            ) from None
+            raise InputError(f"{place}: {class_number} is not one of {len(class_names)} classes") from None
         except ValueError:
             raise InputError(
-                f'{file}:{line_number}: must be a class number and normalized coordinates, not "{line}"'
+                f'{place}: must be a class number and normalized coordinates, not "{line}"'
             ) from None
-        is_polygon = len(values) > BOX_VALUE_COUNT and len(values) % 2 == 0
-        if len(values) != BOX_VALUE_COUNT and not is_polygon:
+        is_polygon = len(values) > YOLO_BOX_VALUE_COUNT and len(values) % 2 == 0
+        if len(values) != YOLO_BOX_VALUE_COUNT and not is_polygon:
             raise InputError(
-                f"{file}:{line_number}: a box has {BOX_VALUE_COUNT} values and a polygon an even number, at "
-                f"least 6; this line has {len(values)}"
+                f"{place}: a box has {YOLO_BOX_VALUE_COUNT} values and a polygon an even number, at least 6; "
+                f"this line has {len(values)}"
             )
-        # A value that is not finite fails the comparison.
+        # NaN and infinity fail the comparison, too.
         if not all(-NORMALIZED_TOLERANCE <= value <= 1 + NORMALIZED_TOLERANCE for value in values):
-            raise InputError(f'{file}:{line_number}: coordinates must be normalized (0 to 1), not "{line}"')
+            raise InputError(f'{place}: coordinates must be normalized (0 to 1), not "{line}"')
         if is_polygon:
             xs, ys = values[0::2], values[1::2]
             box = min(xs), min(ys), max(xs), max(ys)
         else:
             x, y, width, height = values
             box = x - width / 2, y - height / 2, x + width / 2, y + height / 2
-        annotation.add(label, box, f"{file}:{line_number}: the image has")
+        annotation.add(label, box, f"{place}: the image has")
         annotation.polygon_count += is_polygon
     return annotation
 
 
 def _find_image(folder: Path, name: str, source: str) -> Path:
-    """Return the path of an image; `source` is the file and the key with the name, for error messages.
+    """Return the path of an image; `source` states, in error messages, which file and key contain the name.
 
     Raises:
         InputError: The image is missing, is not a regular file, or lies outside of the folder.

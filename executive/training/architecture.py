@@ -57,10 +57,10 @@ def describe_architecture() -> dict[str, str]:
 
 @functools.cache
 def declare_missing_operators() -> object | None:
-    """Declare operators if the compiled part of torchvision does not load; return their library, or None.
+    """Declare the operators of torchvision if its compiled library cannot be loaded; return the declarations.
 
-    With a CPU build of torch and the default build of torchvision, the compiled part does not load. Without
-    the declarations, the import of torchvision then raises an error. The library keeps them alive.
+    A CPU build of torch cannot load the compiled library of the default build of torchvision. The import of
+    torchvision then fails without declared operators. The cache of the function keeps the declarations valid.
     """
     import torch
 

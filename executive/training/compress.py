@@ -59,9 +59,10 @@ def compress_weights(model: onnx.ModelProto) -> onnx.ModelProto:
             initializers += _to_int8(tensor.name, values, output_axes[tensor.name], added_nodes)
         else:
             initializers += _to_float16(tensor.name, values, added_nodes)
-    for field, entries in ((graph.initializer, initializers), (graph.node, [*added_nodes, *graph.node])):
+    # Protobuf does not allow the assignment of a list to a field.
+    for field, content in ((graph.initializer, initializers), (graph.node, [*added_nodes, *graph.node])):
         del field[:]
-        field.extend(entries)
+        field.extend(content)
     return compressed
 
 
@@ -76,7 +77,8 @@ def _to_int8(
     name: str, values: NDArray[np.float32], axis: int, added_nodes: list[Any]
 ) -> list[onnx.TensorProto]:
     """Return a weight as int8, and its scales; append the nodes that restore it to `added_nodes`."""
-    other_axes = tuple(i for i in range(values.ndim) if i != axis)
+    other_axes = tuple(index for index in range(values.ndim) if index != axis)
+    # The largest weight of each output channel becomes 127, the maximum of int8.
     scales = np.abs(values).max(axis=other_axes, keepdims=True) / 127
     scales = np.where(scales == 0, 1, scales).astype(np.float32)
     tensor = numpy_helper.from_array(np.round(values / scales).astype(np.int8), f"{name}_int8")

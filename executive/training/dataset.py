@@ -1,4 +1,4 @@
-"""Writer of datasets of labelled images, in two layouts from which detectors are trained.
+"""Writer of datasets of labelled images in COCO or YOLO layout, for the training of detectors.
 
 Layout `coco` has a file `_annotations.coco.json` beside the images of each split, like exports of Roboflow.
 Layout `yolo` has a file `data.yaml`, and folders `images` and `labels` in each split. The caller writes the
@@ -22,7 +22,7 @@ from executive.cell.frame import Box
 from executive.errors import InputError
 
 SPLITS = ("train", "valid", "test")
-"""Folders of a dataset."""
+"""Names of the splits of a dataset, and of their folders."""
 JPEG_QUALITY = 95
 """JPEG quality of the images, 0 to 100."""
 
@@ -91,8 +91,8 @@ def write_annotations(
         _write_json(root / split / "ignored.json", ignored_boxes)
         _write_json(root / split / "truth.json", {entry.file: entry.truth for entry in split_entries})
     if layout == "yolo":
-        names = {"val" if split == "valid" else split: f"{split}/images" for split in splits}
-        data = {"path": ".", **names, "nc": len(classes), "names": list(classes)}
+        folders = {"val" if split == "valid" else split: f"{split}/images" for split in splits}
+        data = {"path": ".", **folders, "nc": len(classes), "names": list(classes)}
         (root / "data.yaml").write_text(yaml.safe_dump(data, sort_keys=False))
 
 

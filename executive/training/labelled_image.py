@@ -13,7 +13,7 @@ from executive.cell.frame import Box, Frame
 from executive.geometry import Array, Pose
 
 MIN_BORDER_DISTANCE = 0.5
-"""Minimum distance of a box from the border of the searched region if the object is not truncated [pixel]."""
+"""Minimum distance of the box of a complete object from the border of the searched region [pixel]."""
 MIN_VISIBLE_FRACTION = 0.9
 """Minimum visible fraction of the silhouette of an object that counts as fully visible."""
 
@@ -28,8 +28,8 @@ class LabelledImage:
         labels: Class of each object.
         boxes: Box of each object [pixel].
         ignored_boxes: Boxes of objects that a detector may find or miss; both are correct [pixel].
-        truth: Ground truth of the renderer, for instance `X_WC` and `positions`; `part` is the region of the
-            camera's full frame that the image shows [pixel].
+        truth: Ground truth of the renderer, for instance `X_WC` and `positions`. The key `part` contains the
+            region of the camera's full frame that the image shows [pixel].
         region: Region of the image [pixel] that is searched and labelled; None: the whole image.
         depth: `(H, W)` [m], as in a `Frame`; None without a depth sensor.
         second_image: Image of the scene from the same pose with other noise, or None.
@@ -83,7 +83,7 @@ class LabelledImage:
         return 0, 0, width, height
 
     def _compute_camera_matrix(self) -> Array:
-        """Return the camera matrix of this image, which may be a scaled part of the camera's frame."""
+        """Return the camera matrix `(3, 3)` of this image, which may be a scaled part of a frame."""
         left, top, *_ = self.truth.get("part", (0, 0))
         matrix = np.array(self.truth["matrix"], dtype=float)
         matrix[:2, 2] -= left, top

@@ -14,7 +14,7 @@ from executive.training.symmetry import SYMMETRY_COUNT, transform_boxes, transfo
 class SymmetryAugmentedData(RFDETRDataModule):
     """Dataset whose training images are transformed by random symmetries of the square.
 
-    Each symmetry gives a possible image of a camera that looks straight down. No pixel is resampled.
+    A camera that looks straight down can capture each transformed image. No pixel is resampled.
     """
 
     def on_after_batch_transfer(self, batch: tuple[Any, Any], dataloader_idx: int) -> tuple[Any, Any]:

@@ -1,4 +1,4 @@
-"""Card of a trained model: its settings, its accuracy and the metrics of every epoch."""
+"""Card of a trained model: settings, accuracy, and metrics of each epoch."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ EPOCH_COLUMNS = {
     "val/precision": "precision",
     "val/recall": "recall",
 }
-"""Heading in a card of each column of the trainer's `metrics.csv`."""
+"""Headings in a model card, by column of the trainer's `metrics.csv`."""
 
 METRIC_COLUMNS = {
     "images": ("images", "{}"), "objects": ("objects", "{}"),
     "precision": ("precision", "{:.4f}"), "recall": ("recall", "{:.4f}"),
     "mAP50": ("map50", "{:.4f}"), "mAP50-95": ("map50_95", "{:.4f}"),
 }  # fmt: skip
-"""Attribute of `Evaluation` and number format of each metric in a card, by heading."""
+"""Attribute of `Evaluation` and number format of each metric, by heading in a model card."""
 
 
 def render_card(

@@ -40,7 +40,7 @@ def fit_model(
         epochs=settings.epochs,
         batch_size=BATCH_SIZE,
         lr=learning_rate,
-        # By default, smaller learning rates preserve pretrained encoder weights, which are not used here.
+        # By default, smaller learning rates preserve pretrained encoder weights; no such weights are used.
         lr_encoder=learning_rate,
         lr_vit_layer_decay=1.0,
         lr_component_decay=1.0,
@@ -83,6 +83,6 @@ def read_class_names(dataset: Path) -> list[str]:
 
 
 def has_bfloat16() -> bool:
-    """Return True if this CPU multiplies bfloat16 matrices in hardware, without slow emulation."""
+    """Return True if this CPU multiplies bfloat16 matrices in hardware; an emulation would be slow."""
     capabilities = torch.cpu.get_capabilities()
     return bool(capabilities.get("avx512_bf16") or capabilities.get("amx_bf16"))

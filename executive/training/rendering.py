@@ -1,4 +1,4 @@
-"""Renderer of labelled images in parallel; the number of processes does not change the images."""
+"""Parallel renderer of labelled images, which do not depend on the number of processes."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def render_run_frames(
     config: CellConfig, *, image_count: int, seed: int, worker_count: int, progress: ReportProgress,
     scene: SceneConfig = DECLARED_SCENE,
 ) -> list[LabelledImage]:  # fmt: skip
-    """Return full frames of a cell's camera, each of a random initial scene of a run.
+    """Return full frames of a cell's camera, each with a random scene as at the start of a run.
 
     The objects in the camera's view `table` are labelled.
 
@@ -91,19 +91,19 @@ def _render_in_blocks(
     render: Callable[[range], dict[int, ResultT]], count: int, worker_count: int, progress: ReportProgress
 ) -> list[ResultT]:
     """Return the results of `render` for images 0 to `count` - 1, in order, from worker processes."""
-    numbers, results = range(count), dict[int, ResultT]()
-    blocks = [numbers[first : first + BLOCK_SIZE] for first in numbers[::BLOCK_SIZE]]
+    image_numbers, results = range(count), dict[int, ResultT]()
+    blocks = [image_numbers[first : first + BLOCK_SIZE] for first in image_numbers[::BLOCK_SIZE]]
     with WorkerPool(worker_count) as pool:
         for task in as_completed([pool.submit(render, block) for block in blocks]):
             results.update(task.result())
             progress(len(results), count)
-    return [results[number] for number in numbers]
+    return [results[number] for number in image_numbers]
 
 
-def _draw_samples(
-    cells: Sequence[CellConfig], seed: int, numbers: range, scene: SceneConfig | None = None
+def _render_samples(
+    cells: Sequence[CellConfig], seed: int, image_numbers: range, scene: SceneConfig | None = None
 ) -> Iterator[tuple[int, str, Sample]]:
-    """Yield number, camera and sample of random scenes, which vary more than in a run if `scene` is None."""
+    """Yield number, camera and sample of random scenes; without `scene`, scenes vary more than in a run."""
     cv2.setNumThreads(1)
     cameras = [next(iter(cell.cameras)) for cell in cells]
     with contextlib.ExitStack() as stack:
@@ -113,33 +113,33 @@ def _draw_samples(
         ]
         for renderer in renderers:
             stack.callback(renderer.close)
-        for number in numbers:
+        for number in image_numbers:
             cell_index = number % len(cells)
             sample_seed = int(np.random.SeedSequence([seed, number]).generate_state(1, np.uint64)[0])
             yield number, cameras[cell_index], renderers[cell_index].render_sample(sample_seed)
 
 
 def _render_dataset_images(
-    cells: Sequence[CellConfig], out: Path, layout: str, seed: int, train_count: int, numbers: range
+    cells: Sequence[CellConfig], out: Path, layout: str, seed: int, train_count: int, image_numbers: range
 ) -> dict[int, DatasetEntry]:
     """Render and save images in a worker process; return their dataset entries by image number."""
     entries = {}
-    for number, camera, sample in _draw_samples(cells, seed, numbers):
+    for number, camera, sample in _render_samples(cells, seed, image_numbers):
         split, file = "train" if number < train_count else "valid", f"{camera}_{number:06d}.jpg"
         save_image(build_image_path(out, layout, split, file), sample.image)
-        entries[number] = _make_entry(sample, split, file, camera)
+        entries[number] = _make_dataset_entry(sample, split, file, camera)
     return entries
 
 
 def _render_frames(
-    config: CellConfig, scene: SceneConfig, seed: int, numbers: range
+    config: CellConfig, scene: SceneConfig, seed: int, image_numbers: range
 ) -> dict[int, LabelledImage]:
     """Render frames in a worker process, and return them by image number."""
-    samples = _draw_samples([config], seed, numbers, scene)
+    samples = _render_samples([config], seed, image_numbers, scene)
     return {i: to_labelled_frame(sample, camera, f"{camera}_{i:06d}") for i, camera, sample in samples}
 
 
-def _make_entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEntry:
+def _make_dataset_entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEntry:
     """Return the dataset entry of a sample, with the ground truth in JSON values for measuring localizers."""
     truth = _collect_truth(sample, camera, sample.region)
     truth["matrix"] = sample.matrix.tolist()
@@ -156,16 +156,12 @@ def to_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
     left, top, right, _ = sample.region
     scale, corner = (right - left) / IMAGE_SIZE, [left, top, left, top]
     return LabelledImage(
-        file=file,
-        image=sample.frame,
-        labels=sample.labels,
+        file=file, image=sample.frame, labels=sample.labels,
         boxes=_to_boxes(sample.boxes * scale + corner),
         ignored_boxes=_to_boxes(sample.ignored * scale + corner),
         truth=_collect_truth(sample, camera, (0, 0, width, height)),
-        region=sample.region,
-        depth=sample.depth,
-        second_image=sample.second_frame,
-    )
+        region=sample.region, depth=sample.depth, second_image=sample.second_frame,
+    )  # fmt: skip
 
 
 def _collect_truth(sample: Sample, camera: str, part: Box) -> dict[str, Any]:

@@ -27,9 +27,9 @@ QUERY_GROUP_COUNT: int = ARCHITECTURE["group_detr"]
 def restore_model(model: Path) -> Any:
     """Return an `rfdetr.RFDETRNano` with the weights of an exported model.
 
-    The export renames and drops weights. A model with random weights is exported to find the tensor with the
-    values of each exported weight. All groups of queries become copies of the first group. Layers that the
-    export drops, because no output depends on them, stay random.
+    The export renames and drops weights. To find the original names, a model with random weights is exported,
+    and each exported weight is compared with the tensors of the model. All groups of queries become copies of
+    the first group. Layers that the export drops, because no output depends on them, stay random.
 
     Args:
         model: ONNX file that `executive train` wrote.
@@ -40,6 +40,7 @@ def restore_model(model: Path) -> Any:
     stored_weights = _read_weights(onnx.load(str(model)))
     detector = create_model(len(stored_weights.get(CLASS_BIAS_NAME, [0])) - 1)
     weights_by_name = detector.model.model.state_dict()
+    # Random values distinguish tensors that RF-DETR initializes with equal constants.
     for tensor in weights_by_name.values():
         if tensor.is_floating_point():
             tensor.normal_()
@@ -74,7 +75,7 @@ def _read_weights(model: onnx.ModelProto) -> dict[str, Array]:
 
 
 def _find_candidate_tensors(weights_by_name: dict[str, torch.Tensor], name: str) -> Iterator[torch.Tensor]:
-    """Yield the weights of a model, and views of weights, that an export can contain under `name`."""
+    """Yield the tensors of a model, and parts of tensors, that an export may contain under `name`."""
     if name in weights_by_name:
         yield weights_by_name[name]
         return

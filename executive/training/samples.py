@@ -26,7 +26,7 @@ EVALUATION_SPLITS = ("test", "valid", "val", "train")
 
 
 class Samples:
-    """Labelled images of a split, or of the first existing split of a dataset.
+    """Labelled images of a split; of a dataset, the first existing split in `EVALUATION_SPLITS` is used.
 
     Args:
         folder: Folder of the split or the dataset.
@@ -47,7 +47,7 @@ class Samples:
         return len(self._annotations)
 
     def __iter__(self) -> Iterator[LabelledImage]:
-        """Yield the labelled images, each read when it is needed.
+        """Yield the labelled images; an image is read when the iteration reaches it.
 
         Raises:
             InputError: An image cannot be read.
@@ -55,14 +55,11 @@ class Samples:
         ignored, truth = (_read_json(self._split / name) for name in ("ignored.json", "truth.json"))
         for path, annotation in self._annotations.items():
             image = read_image(path)
+            height, width = image.shape[:2]
             yield LabelledImage(
-                path.name,
-                image,
-                tuple(annotation.labels),
-                annotation.to_pixel_boxes(image.shape[1], image.shape[0]),
-                tuple(map(tuple, ignored.get(path.name, ()))),
-                truth.get(path.name, {}),
-            )
+                path.name, image, tuple(annotation.labels), annotation.to_pixel_boxes(width, height),
+                tuple(map(tuple, ignored.get(path.name, ()))), truth.get(path.name, {}),
+            )  # fmt: skip
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
@@ -98,6 +95,6 @@ def _find_split(folder: Path) -> Path:
 
 
 def _read_json(path: Path) -> dict[str, Any]:
-    """Return the JSON object in a file, by file name of the image; {} without a file."""
+    """Return the values in a JSON file by file name of the image; {} if the JSON file does not exist."""
     parse = TypeAdapter(dict[str, Any]).validate_json
     return parse_file(path, MAX_COCO_FILE_SIZE, parse) if path.is_file() else {}

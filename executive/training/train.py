@@ -20,10 +20,10 @@ ReportBatch = Callable[[int, int], None]
 
 CARD_THRESHOLD = 0.5
 """Minimum confidence of the detections for precision and recall in a model card."""
-LEARNING_RATE = 3e-4
-"""Learning rate of random weights, or of a model with other classes."""
-FINE_TUNING_RATE = 1e-4
-"""Learning rate of a model with the same classes, small enough to preserve the weights."""
+NEW_MODEL_LEARNING_RATE = 3e-4
+"""Default learning rate of random weights, and of a start model with other classes."""
+FINE_TUNING_LEARNING_RATE = 1e-4
+"""Default learning rate of a start model with equal classes, small enough to preserve the weights."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,10 @@ class Settings:
 
 
 def train(
-    dataset: Path,
-    out: Path,
-    settings: Settings,
+    dataset: Path, out: Path, settings: Settings,
     report_epoch: ReportEpoch = lambda _number, _metrics: None,
     report_batch: ReportBatch = lambda _finished_count, _total_count: None,
-) -> None:
+) -> None:  # fmt: skip
     """Train a model and write it to `out`.
 
     Files in `out`: `model.onnx` and `labels.txt` for a detector of kind `rfdetr`; `card.md` with the accuracy
@@ -105,13 +103,15 @@ def train(
 
 def choose_learning_rate(start_model: Path | None, labels: list[str]) -> float:
     """Return the default learning rate for training `start_model` on the classes `labels`."""
-    if start_model is None:
-        return LEARNING_RATE
-    file = find_label_file(start_model)
-    return FINE_TUNING_RATE if file.is_file() and list(read_labels(file)) == labels else LEARNING_RATE
+    if start_model is not None:
+        file = find_label_file(start_model)
+        if file.is_file() and list(read_labels(file)) == labels:
+            return FINE_TUNING_LEARNING_RATE
+    return NEW_MODEL_LEARNING_RATE
 
 
 def _check_inputs(dataset: Path, start_model: Path | None) -> None:
+    """Raise `InputError` if the start model is missing, or if the dataset is missing or damaged."""
     if start_model is not None and not start_model.is_file():
         raise InputError(f"there is no model {start_model} to start from; train one first, or omit --from")
     coco_files = [dataset / split / COCO_FILE_NAME for split in ("train", "valid")]

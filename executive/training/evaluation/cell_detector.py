@@ -1,4 +1,4 @@
-"""Detector of a cell file, which gets the requests of a run without a run."""
+"""Detector of a cell file that searches single frames outside of a run."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ WHOLE_IMAGE_CAMERA = CameraConfig(
     mount="fixed", position=(0, 0, 1), look_at=(0, 0, 0), up=(1, 0, 0), fov_deg=60,
     table_view=(0, 0, 64, 64), scan_poses=("none",),
 ).model_copy(update={"table_view": (0, 0, 1 << 20, 1 << 20)})  # fmt: skip
-"""Camera whose view `full` is the whole image for images of any size."""
+"""Camera for images of any size; `model_copy` does not validate the size of `table_view`."""
 
 
 class CellDetector:
     """Detector of a cell file for measurements of its accuracy.
 
     Args:
-        configs: Detectors of the cell file, of which the measured detector may use others.
+        configs: Detectors of the cell file by name; the measured detector may use other detectors.
         name: Name of the detector to measure.
         base: Folder to which paths in the options are relative.
         camera: Camera of the frames; None: the detector searches whole images.
         view: Searched view of `camera`, `table` or `full`.
-        classes: Classes of the cell, without which detections are dropped as in a run; None: all classes.
+        classes: Classes of the cell; detections of other classes are dropped, as in a run. None: all classes.
 
     Raises:
         InputError: A detector cannot be built.

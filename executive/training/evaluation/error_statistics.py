@@ -14,7 +14,7 @@ from executive.cell.protocols import Localizer
 from executive.errors import NoDepth
 from executive.geometry import Array
 from executive.perception.camera_model import intersect_plane
-from executive.training.evaluation.matching import MIN_IOU, BoxMatch, compute_ious, is_occluded
+from executive.training.evaluation.matching import MIN_IOU, BoxMatch, compute_ious, is_occluded, split_matches
 from executive.training.evaluation.measured_rates import CountedRate, MeasuredErrorRates
 from executive.training.evaluation.metrics import NO_OBJECT, ClassMetrics
 from executive.training.labelled_image import LabelledImage
@@ -43,13 +43,13 @@ class ErrorStatistics:
         self.counts_by_object_count: dict[int, Counter[str]] = defaultdict(Counter)
         self.confusion: Counter[tuple[str, str]] = Counter()
         self.centre_errors, self.position_errors = list[float](), list[float]()
-        self.localization_errors, self._squared_errors = list[float](), list[float]()
+        self.localization_errors, self._squared_offsets = list[float](), list[float]()
 
     def add(self, matches: Sequence[BoxMatch], sample: LabelledImage, frame: Frame) -> None:
         """Count the matches of one image, and measure the position errors of its correct detections."""
         self._image_count += 1
         counts = self.counts_by_object_count[len(sample.labels)]
-        match_by_object = {match.object_index: match for match in matches if match.object_index is not None}
+        match_by_object, false_detections = split_matches(matches)
         for index, label in enumerate(sample.labels):
             match = match_by_object.get(index)
             self.confusion[label, match.detection.label if match else NO_OBJECT] += 1
@@ -58,8 +58,7 @@ class ErrorStatistics:
                 counts.update(objects=1, missed=match is None, confused=is_confused)
             if match is not None and match.is_correct:
                 self._measure_errors(match, index, sample, frame)
-        false_detections = [match.detection.label for match in matches if match.object_index is None]
-        self.confusion.update((NO_OBJECT, label) for label in false_detections)
+        self.confusion.update((NO_OBJECT, detection.label) for detection in false_detections)
         counts.update(false_detections=len(false_detections))
 
     @property
@@ -92,7 +91,7 @@ class ErrorStatistics:
         return metrics
 
     def make_confusion_matrix(self) -> dict[str, dict[str, int]]:
-        """Return the confusion matrix: number of objects by true class, then by detected class."""
+        """Return the number of objects by true class (row), then by detected class (column)."""
         rows, columns = (
             sorted(labels, key=lambda label: (label == NO_OBJECT, label))
             for labels in ({row for row, _ in self.confusion}, {column for _, column in self.confusion})
@@ -105,7 +104,7 @@ class ErrorStatistics:
             return None
         counts = sum(self.counts_by_object_count.values(), Counter[str]())
         detected_count = counts["objects"] - counts["missed"]
-        jitter = float(np.sqrt(np.mean(self._squared_errors))) if self._squared_errors else 0.0
+        jitter = float(np.sqrt(np.mean(self._squared_offsets))) if self._squared_offsets else 0.0
         return MeasuredErrorRates(
             miss_rate=CountedRate.estimate_proportion(counts["missed"], counts["objects"]),
             confusion_rate=CountedRate.estimate_proportion(counts["confused"], detected_count),
@@ -117,14 +116,14 @@ class ErrorStatistics:
 
     @property
     def _correct_count(self) -> int:
-        """Number of objects that are detected with their class."""
+        """Number of objects that are detected with their class: the diagonal of the confusion matrix."""
         return sum(count for (row, column), count in self.confusion.items() if row == column)
 
     def _measure_errors(self, match: BoxMatch, index: int, sample: LabelledImage, frame: Frame) -> None:
         """Measure the position errors of a correct detection of the object `index`."""
         self.centre_errors.append(float(np.hypot(*match.offset)))
         if sample.is_fully_visible(index):
-            self._squared_errors += ((match.offset * sample.pixel_scale) ** 2).tolist()
+            self._squared_offsets += ((match.offset * sample.pixel_scale) ** 2).tolist()
         if not sample.is_fully_inside(index):
             return
         if "positions" in sample.truth:
@@ -132,7 +131,7 @@ class ErrorStatistics:
             position = intersect_plane(frame.matrix, frame.X_WC, match.detection.centre, true_position[2])
             self.position_errors.append(float(np.linalg.norm(position - true_position) * 1000))
         if self._localizer is not None and "centres" in sample.truth:
-            # A run also omits objects without a measured depth.
+            # Objects without a measured depth are omitted, as in a run.
             with contextlib.suppress(NoDepth):
                 position = self._localizer.locate(match.detection, frame)
                 true_centre = np.array(sample.truth["centres"][index])
@@ -142,8 +141,9 @@ class ErrorStatistics:
 class RepeatedErrors:
     """Errors that are repeated in a second image, and random and systematic parts of position errors.
 
-    Two images of a scene differ only in the noise of the sensor. The variance of the random error is half the
-    mean squared difference of both errors; the variance of the systematic error is their mean product.
+    Two images of a scene differ only in the noise of the sensor, so that the systematic error of an object is
+    equal in both images. Half the mean squared difference of the two errors is the variance of the random
+    error; the mean product of the two errors is the variance of the systematic error.
 
     Args:
         localizer: Computes the positions of detections; None: systematic errors are not measured.
@@ -157,30 +157,30 @@ class RepeatedErrors:
         self._localizer = localizer
         self.error_count = self.repeated_count = 0
         self._random_variances, self._error_products = list[float](), list[float]()
+        """Values for each object and axis, in the image [pixel²] and on the table [m²]."""
 
     def add(
-        self, first: Sequence[BoxMatch], second: Sequence[BoxMatch], sample: LabelledImage, frame: Frame
+        self, matches: list[BoxMatch], second_matches: list[BoxMatch], sample: LabelledImage, frame: Frame
     ) -> None:
         """Count the errors in the first image of a scene, and the errors that the second image repeats."""
-        first_by_object = {match.object_index: match for match in first if match.object_index is not None}
-        second_by_object = {match.object_index: match for match in second if match.object_index is not None}
+        first_by_object, first_false_detections = split_matches(matches)
+        second_by_object, second_false_detections = split_matches(second_matches)
         for index, label in enumerate(sample.labels):
             if not sample.is_fully_visible(index):
                 continue
             first_match, second_match = first_by_object.get(index), second_by_object.get(index)
-            if first_match is None and is_occluded(index, first, sample):
+            if first_match is None and is_occluded(index, matches, sample):
                 continue
             first_label = first_match and first_match.detection.label
             second_label = second_match and second_match.detection.label
             self.error_count += first_label != label
             self.repeated_count += first_label != label and first_label == second_label
             if first_match and second_match and first_match.is_correct and second_match.is_correct:
-                self._compare(first_match, second_match, sample, frame)
-        second_false = [match.detection for match in second if match.object_index is None]
-        for false in (match.detection for match in first if match.object_index is None):
-            boxes = [detection.box for detection in second_false if detection.label == false.label]
+                self._add_errors(first_match, second_match, sample, frame)
+        for detection in first_false_detections:
+            boxes = [second.box for second in second_false_detections if second.label == detection.label]
             self.error_count += 1
-            self.repeated_count += bool(compute_ious([false.box], boxes).max(initial=0.0) >= MIN_IOU)
+            self.repeated_count += bool(compute_ious([detection.box], boxes).max(initial=0.0) >= MIN_IOU)
 
     @property
     def repeated_fraction(self) -> float:
@@ -198,7 +198,7 @@ class RepeatedErrors:
         variance = float(np.mean(self._error_products)) if self._error_products else 0.0
         return math.sqrt(max(variance, 0.0))
 
-    def _compare(self, first: BoxMatch, second: BoxMatch, sample: LabelledImage, frame: Frame) -> None:
+    def _add_errors(self, first: BoxMatch, second: BoxMatch, sample: LabelledImage, frame: Frame) -> None:
         """Add the random and systematic errors of one object from its detections in both images."""
         assert first.object_index is not None
         difference = (first.offset - second.offset) * sample.pixel_scale

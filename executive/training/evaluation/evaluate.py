@@ -30,14 +30,15 @@ from executive.training.labelled_image import LabelledImage
 from executive.training.samples import Samples
 
 MIN_CONFIDENCE = 0.01
-"""Minimum confidence of the detections of a model file in the mean average precision."""
+"""Minimum confidence of the detections of a model file; the average precision needs low confidences."""
 MODEL_NAME = "model"
 """Name of the detector that is built from a model file."""
 
 
 def evaluate(
     detector: CellDetector, samples: Iterable[LabelledImage], *, threshold: float | None = None,
-    localizer: Localizer | None = None, worst: WorstMistakes | None = None, table: TableConfig | None = None,
+    localizer: Localizer | None = None, mistakes: WorstMistakes | None = None,
+    table: TableConfig | None = None,
 ) -> Evaluation:  # fmt: skip
     """Return the accuracy of a detector on labelled images; ignored objects do not count.
 
@@ -46,7 +47,7 @@ def evaluate(
         samples: The images.
         threshold: Minimum confidence of a detection; None: the threshold of the detector.
         localizer: Computes positions, which are compared with the true positions; None: no comparison.
-        worst: Collection of the worst mistakes; None: mistakes are not collected.
+        mistakes: Collection of the worst mistakes; None: mistakes are not collected.
         table: Workspace whose brightness, contrast and colours are measured; None: no measurement.
     """
     errors, repeated_errors = ErrorStatistics(localizer), RepeatedErrors(localizer)
@@ -66,17 +67,17 @@ def evaluate(
         latencies.append(latency)
         average_precision.add([entry for entry in answer.confident if not is_ignored(entry, sample)], sample)
         min_confidence = answer.error_rates.threshold if threshold is None else threshold
-        matches = _match(answer, sample, min_confidence)
+        matches = _match_confident(answer, sample, min_confidence)
         errors.add(matches, sample, frame)
         if sample.second_image is not None:
             with contextlib.suppress(Unavailable):
                 second_answer, _ = detector.detect(replace(frame, image=sample.second_image))
-                second_matches = _match(second_answer, sample, min_confidence)
+                second_matches = _match_confident(second_answer, sample, min_confidence)
                 repeated_errors.add(matches, second_matches, sample, frame)
         if table is not None and (frame_statistics := compute_frame_statistics(frame, table)):
             statistics_of_frames.append(frame_statistics)
-        if worst is not None:
-            worst.add(matches, sample)
+        if mistakes is not None:
+            mistakes.add(matches, sample)
     map50, map50_95 = average_precision.compute()
     return Evaluation(
         threshold=detector.threshold if threshold is None else threshold,
@@ -102,8 +103,8 @@ def evaluate(
     )
 
 
-def _match(answer: Answer, sample: LabelledImage, min_confidence: float) -> list[BoxMatch]:
-    """Return the matches of detections with at least `min_confidence` that show no ignored object."""
+def _match_confident(answer: Answer, sample: LabelledImage, min_confidence: float) -> list[BoxMatch]:
+    """Return the matches of detections with at least `min_confidence`; ignored objects are excluded."""
     confident = [entry for entry in answer.confident if entry.confidence >= min_confidence]
     return match_detections([entry for entry in confident if not is_ignored(entry, sample)], sample)
 
@@ -152,9 +153,9 @@ class AveragePrecision:
 
     def add(self, detections: Sequence[Detection], sample: LabelledImage) -> None:
         """Add the detections in one image, which may have any confidence."""
-        boxes, labels = [entry.box for entry in detections], [entry.label for entry in detections]
-        predicted = self._to_detections(boxes, labels)
-        predicted.confidence = np.array([entry.confidence for entry in detections], dtype=float)
+        boxes = [detection.box for detection in detections]
+        predicted = self._to_detections(boxes, [detection.label for detection in detections])
+        predicted.confidence = np.array([detection.confidence for detection in detections], dtype=float)
         self._metric.update([predicted], [self._to_detections(sample.boxes, sample.labels)])
         self._has_objects |= bool(sample.labels)
 

@@ -14,7 +14,7 @@ from executive.geometry import Array
 from executive.training.labelled_image import LabelledImage
 
 MIN_OCCLUDING_IOU = 0.2
-"""Minimum intersection over union (IoU) of the boxes of two objects of which one occludes the other."""
+"""Minimum intersection over union (IoU) of the boxes of two objects that occlude each other."""
 MIN_IOU = 0.5
 """Minimum intersection over union (IoU) of two boxes that belong to the same object."""
 
@@ -51,20 +51,27 @@ def match_detections(detections: Sequence[Detection], sample: LabelledImage) -> 
     ranked = sorted(detections, key=lambda detection: -detection.confidence)
     ious = compute_ious([detection.box for detection in ranked], sample.boxes)
     is_same_class = [[detection.label == label for label in sample.labels] for detection in ranked]
-    object_indices: dict[int, int] = {}
-    for mask in (np.array(is_same_class, dtype=bool).reshape(ious.shape), np.ones_like(ious)):
+    object_by_rank: dict[int, int] = {}
+    for is_allowed in (np.array(is_same_class, dtype=bool).reshape(ious.shape), np.ones_like(ious)):
         for rank in range(len(ranked)):
-            object_ious = ious[rank] * mask[rank]
-            if rank not in object_indices and object_ious.max(initial=0.0) >= MIN_IOU:
-                object_indices[rank] = int(object_ious.argmax())
-                ious[:, object_indices[rank]] = 0.0
+            object_ious = ious[rank] * is_allowed[rank]
+            if rank not in object_by_rank and object_ious.max(initial=0.0) >= MIN_IOU:
+                object_by_rank[rank] = int(object_ious.argmax())
+                # An IoU of 0 excludes the object from further assignments.
+                ious[:, object_by_rank[rank]] = 0.0
     matches = []
     for rank, detection in enumerate(ranked):
-        index = object_indices.get(rank)
+        index = object_by_rank.get(rank)
         is_correct = index is not None and sample.labels[index] == detection.label
         box = detection.box if index is None else sample.boxes[index]
         matches.append(BoxMatch(detection, index, is_correct, box))
     return matches
+
+
+def split_matches(matches: Sequence[BoxMatch]) -> tuple[dict[int, BoxMatch], list[Detection]]:
+    """Return the matches of the detected objects by index of the object, and the false detections."""
+    by_object = {match.object_index: match for match in matches if match.object_index is not None}
+    return by_object, [match.detection for match in matches if match.object_index is None]
 
 
 def is_occluded(index: int, matches: Sequence[BoxMatch], sample: LabelledImage) -> bool:
@@ -74,7 +81,7 @@ def is_occluded(index: int, matches: Sequence[BoxMatch], sample: LabelledImage) 
 
 
 def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
-    """Return True if a detection shows an ignored object, and no labelled object with a higher IoU."""
+    """Return True if a detection shows an ignored object, with a higher IoU than any labelled object."""
     iou = compute_ious([detection.box], sample.ignored_boxes).max(initial=0.0)
     return bool(iou >= MIN_IOU and iou > compute_ious([detection.box], sample.boxes).max(initial=0.0))
 

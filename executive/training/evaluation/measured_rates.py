@@ -1,7 +1,6 @@
-"""Error rates of a detector with upper confidence bounds.
+"""Error rates of a detector with exact one-sided upper confidence bounds.
 
-The bounds are exact one-sided 95 % confidence limits (Clopper and Pearson, Biometrika 26 (1934), 404-413;
-Garwood, Biometrika 28 (1936), 437-442).
+Sources: Clopper and Pearson, Biometrika 26 (1934), 404-413; Garwood, Biometrika 28 (1936), 437-442.
 """
 
 from __future__ import annotations
@@ -38,12 +37,14 @@ class CountedRate:
     @staticmethod
     def estimate_proportion(events: int, trials: int) -> CountedRate:
         """Return the proportion of trials with an event; the bound is 1 if all trials have an event."""
+        # The bound is a quantile of the beta distribution (Clopper and Pearson).
         bound = float(betaincinv(events + 1, trials - events, CONFIDENCE_LEVEL)) if events < trials else 1.0
         return CountedRate(events, trials, bound)
 
     @staticmethod
     def estimate_mean_count(events: int, trials: int) -> CountedRate:
         """Return the mean number of events per trial, which can exceed 1."""
+        # The bound of the number of events is a quantile of the gamma distribution (Garwood).
         return CountedRate(events, trials, float(gammaincinv(events + 1, CONFIDENCE_LEVEL)) / trials)
 
 
@@ -69,7 +70,7 @@ class MeasuredErrorRates:
 
     @property
     def rates(self) -> StoredErrorRates:
-        """Error rates for the ledger: confidence bounds, and other values, all rounded up."""
+        """Error rates for the ledger, rounded up: bounds of the counted rates, and the other values."""
         return StoredErrorRates(
             miss_rate=min(round_up(self.miss_rate.bound), MAX_PROPORTION),
             confusion_rate=min(round_up(self.confusion_rate.bound), MAX_PROPORTION),
@@ -85,4 +86,5 @@ def round_up(value: float, digits: int = 2) -> float:
     if value <= 0:
         return 0.0
     places = digits - 1 - math.floor(math.log10(value))
+    # The inner rounding removes floating-point errors, which `ceil` would round up.
     return round(math.ceil(round(value * 10**places, 6)) / 10**places, max(places, 0))

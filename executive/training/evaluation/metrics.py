@@ -65,7 +65,7 @@ class Evaluation:
         map50: Mean average precision at IoU 0.5 over detections with any confidence.
         map50_95: Mean average precision over IoUs from 0.5 to 0.95.
         centre: Distance between the centres of detected and true box [pixel].
-        position: Distance between the centres in the world, at the height of the object [mm].
+        position: Distance of these centres, projected into the world at the height of the object [mm].
         localized: Distance between the localizer's position and the true centre of the object [mm].
         latency: Wall time from a frame to its detections [ms], without the first image.
         by_class: Metrics of each class.

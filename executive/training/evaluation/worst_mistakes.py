@@ -34,8 +34,15 @@ BACKGROUND, TEXT, SECONDARY_TEXT = (32, 38, 43), (255, 255, 255), (169, 180, 188
 TRUE_COLOUR, DETECTED_COLOUR, OUTLINE_COLOUR = "#56B4E9", "#E69F00", "#000000"
 """Colours of true boxes, of detected boxes, and of the outline around their lines."""
 
+HEADER_BASELINE, TEXT_BASELINE, FILE_BASELINE = 21, 15, 32
+"""Distances of lines of text from the upper side of the header, and of a caption (two lines) [pixel]."""
+FONT, FONT_SCALE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
+"""Font of OpenCV, and scale of its size."""
+
 Picture = NDArray[np.uint8]
+"""An image `(H, W, 3)`, RGB."""
 Colour = tuple[int, int, int]
+"""Red, green and blue, 0 to 255."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +80,14 @@ class WorstMistakes:
         self.mistakes: list[Mistake] = []
 
     def add(self, matches: Sequence[BoxMatch], sample: LabelledImage) -> None:
-        """Add the mistakes in one image, and drop the least severe ones beyond the maximum number."""
+        """Add the mistakes in one image, and remove the least severe mistakes beyond the maximum number."""
         self.mistakes += find_mistakes(matches, sample)
         self.mistakes.sort(key=lambda mistake: -mistake.severity)
         del self.mistakes[self._max_count :]
 
 
 def find_mistakes(matches: Sequence[BoxMatch], sample: LabelledImage) -> Iterator[Mistake]:
-    """Yield the mistakes in one image; a correct detection is a mistake of the position of the box."""
+    """Yield the mistakes in one image, including the position errors of correct detections."""
     detections = tuple(match.detection for match in matches)
     detected_objects = {match.object_index for match in matches}
     for index, label in enumerate(sample.labels):
@@ -114,14 +121,16 @@ def draw_sheet(mistakes: Sequence[Mistake], title: str) -> Picture:
     width = GAP + columns * column_width
     sheet = np.full((HEADER_HEIGHT + rows * row_height, width, 3), BACKGROUND, np.uint8)
     legend_left = width - GAP - _measure_text(LEGEND)
-    _write_text(sheet, LEGEND, (legend_left, 21), SECONDARY_TEXT)
-    _write_text(sheet, title if mistakes else f"{title}: no mistakes", (GAP, 21), TEXT, legend_left - 2 * GAP)
+    _write_text(sheet, LEGEND, (legend_left, HEADER_BASELINE), SECONDARY_TEXT)
+    header = title if mistakes else f"{title}: no mistakes"
+    _write_text(sheet, header, (GAP, HEADER_BASELINE), TEXT, legend_left - 2 * GAP)
     for index, mistake in enumerate(mistakes):
         row, column = divmod(index, columns)
         left, top = GAP + column * column_width, HEADER_HEIGHT + row * row_height
         sheet[top : top + TILE_SIZE, left : left + TILE_SIZE] = _draw_tile(mistake)
-        _write_text(sheet, f"{index + 1}. {mistake.text}", (left, top + TILE_SIZE + 15), TEXT)
-        _write_text(sheet, mistake.sample.file, (left, top + TILE_SIZE + 32), SECONDARY_TEXT)
+        bottom = top + TILE_SIZE
+        _write_text(sheet, f"{index + 1}. {mistake.text}", (left, bottom + TEXT_BASELINE), TEXT)
+        _write_text(sheet, mistake.sample.file, (left, bottom + FILE_BASELINE), SECONDARY_TEXT)
     return sheet
 
 
@@ -130,11 +139,11 @@ def _draw_tile(mistake: Mistake) -> Picture:
     import supervision as sv
 
     left, top, right, bottom = mistake.box
-    side = max(CROP_SCALE * max(right - left, bottom - top), MIN_CROP_SIZE)
-    corner = np.array([left + right - side, top + bottom - side]) / 2
-    zoom = TILE_SIZE / side
+    crop_size = max(CROP_SCALE * max(right - left, bottom - top), MIN_CROP_SIZE)
+    crop_corner = np.array([left + right - crop_size, top + bottom - crop_size]) / 2
+    zoom = TILE_SIZE / crop_size
     # The centre of pixel i is at i + 0.5 in the coordinates of boxes, and at i in those of OpenCV.
-    shift = zoom * (0.5 - corner) - 0.5
+    shift = zoom * (0.5 - crop_corner) - 0.5
     matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
     image = mistake.sample.image[..., ::-1]  # The annotators expect BGR.
     size, border = (TILE_SIZE, TILE_SIZE), BACKGROUND[::-1]
@@ -142,7 +151,7 @@ def _draw_tile(mistake: Mistake) -> Picture:
     detected = sv.BoxAnnotator, [detection.box for detection in mistake.detections], DETECTED_COLOUR
     layers: Any = (detected, (sv.BoxCornerAnnotator, mistake.sample.boxes, TRUE_COLOUR))
     for annotator, boxes, colour in layers:
-        tile_boxes = ((np.array(boxes).reshape(-1, 2, 2) - corner) * zoom).reshape(-1, 4)
+        tile_boxes = ((np.array(boxes).reshape(-1, 2, 2) - crop_corner) * zoom).reshape(-1, 4)
         detections = sv.Detections(tile_boxes, class_id=np.zeros(len(boxes), int))
         for hex_colour, thickness in ((OUTLINE_COLOUR, 2 * LINE_THICKNESS), (colour, LINE_THICKNESS)):
             tile = annotator(sv.Color.from_hex(hex_colour), thickness).annotate(tile, detections)
@@ -157,9 +166,9 @@ def _write_text(
     while _measure_text(written_text) > max_width and len(text) > 1:
         text = text[:-1]
         written_text = f"{text}..."
-    cv2.putText(image, written_text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, 1, cv2.LINE_AA)
+    cv2.putText(image, written_text, corner, FONT, FONT_SCALE, colour, 1, cv2.LINE_AA)
 
 
 def _measure_text(text: str) -> int:
     """Return the width of a text [pixel]."""
-    return int(cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.42, 1)[0][0])
+    return int(cv2.getTextSize(text, FONT, FONT_SCALE, 1)[0][0])

@@ -136,7 +136,7 @@ def test_the_cells_localizer_is_held_against_the_true_middle(saying, sample, bot
 
 def test_the_worst_misses_are_gathered(saying, sample, both):
     worst = WorstMistakes()
-    evaluate(saying(both[:1]), [sample], worst=worst)
+    evaluate(saying(both[:1]), [sample], mistakes=worst)
     assert [mistake.text for mistake in worst.mistakes] == ["duck missed", "cube off by 0.0 px"]
 
 
