@@ -21,7 +21,7 @@ from executive.perception.evidence import describe_touch_contradiction, may_miss
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY_CONTACT_MARGIN = 0.001
-"""Height above the guarded descent [m] from which a contact counts as a collision."""
+"""Minimum height of a collision above the start of the guarded descent [m]."""
 
 
 class Approach(Skill):
@@ -29,20 +29,19 @@ class Approach(Skill):
 
     The arm makes one motion: fast to a position above the target, then a slow, guarded descent, because the
     camera does not measure the height of the surface exactly. The skill succeeds on contact near the expected
-    height. Each further attempt is offset from the previous attempt: along a spiral, or along the ring of an
-    object with a hole. From the fourth attempt on, the descent ends only 5 mm above the table, to distinguish
-    a false detection from an object.
+    height. Repeated attempts touch different points of the target, on a spiral, or on the ring of an object
+    with a hole. From the fourth attempt on, the descent ends 5 mm above the table, to distinguish a false
+    detection from an object.
 
-    A touch at a wrong height contradicts the class of the target. There are two exceptions: an earlier touch
-    matched the class; or this touch is the first one that is too low, it matches no other class, and looks
-    alone prove the class. A touch more than `overtravel` too low, or below the middle of the object, is not a
-    touch of the target: the skill fails with `no_contact` if an earlier touch matched the class, otherwise
-    the touch contradicts the class.
+    A touch at a wrong height contradicts the class of the target, unless an earlier touch matched the class.
+    The first touch that is too low is no contradiction either if its height matches no other class and the
+    detections alone prove the class. A touch below the middle of the object, or more than `overtravel` too
+    low, missed the target. If an earlier touch matched the class, the skill then fails with `no_contact`.
     """
 
     target: In[Target] = port(doc="the target to touch")
-    overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="depth of the search below the surface")
-    offset: Metres = param(SPIRAL_SPACING, ge=0, le=0.02, doc="spacing of the spiral of further attempts")
+    overtravel: Metres = param(OVERTRAVEL, ge=0, le=0.03, doc="depth of the descent below the surface")
+    offset: Metres = param(SPIRAL_SPACING, ge=0, le=0.02, doc="spacing of the points on the spiral")
     reasons: ClassVar = ("stale", "unreachable", "blocked", "contradicted", "no_contact")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
@@ -58,8 +57,8 @@ class Approach(Skill):
         """Move to the target and descend until the cup touches something."""
         item, tool = self.target.item, cell.tool
         if not cell.ledger.is_fresh(self.target):
-            detected = f"{item} was detected at {self.target.stamp:.2f} s"
-            raise self.failure("stale", f"{detected}, and the robot may have moved it since; look again")
+            message = f"the robot may have moved {item} since its detection at {self.target.stamp:.2f} s"
+            raise self.failure("stale", f"{message}; look again")
 
         def find_goal_and_task() -> tuple[Goal, Task]:
             return make_approach(cell, self.target, self.overtravel, self.offset)
@@ -67,39 +66,40 @@ class Approach(Skill):
         motion = yield from plan(self, cell.arm, find_goal_and_task)
         goal, _ = find_goal_and_task()
         yield from follow(self, cell, motion, until=_build_contact_check(tool))
-        kind, middle = cell.classes[self.target.label], float(self.target.position[2])
-        height, highest = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded_length
-        expected = f"expected at {(highest - cell.descent) * 1000:.0f} mm"
+        label, object_class = self.target.label, cell.classes[self.target.label]
+        centre_height = float(self.target.position[2])
+        height, start_height = float(cell.arm.tool_pose.position[2]), goal.position[2] + goal.guarded_length
+        expectation = f"was expected at {(start_height - cell.descent) * 1000:.0f} mm"
         if not tool.touching:
-            cell.ledger.record_miss(item, found_table=_proves_absence(goal, self.target, kind))
-            no_contact = f"no contact down to {height * 1000:.0f} mm"
-            raise self.failure("no_contact", f"{no_contact}, {item} was {expected}")
-        if height > highest + EARLY_CONTACT_MARGIN:
+            cell.ledger.record_miss(item, found_table=_proves_absence(goal, self.target, object_class))
+            message = f"no contact down to {height * 1000:.0f} mm, {item} {expectation}"
+            raise self.failure("no_contact", message)
+        if height > start_height + EARLY_CONTACT_MARGIN:
             cell.ledger.invalidate_positions()
-            collision = f"the tool touched something at {height * 1000:.0f} mm"
-            raise self.failure("blocked", f"{collision} on its way to {item}, which was {expected}")
-        contradiction = describe_touch_contradiction(self.target.label, height, cell.classes)
-        is_near_top = height >= compute_min_contact_height(kind, middle, self.overtravel)
-        may_have_missed = is_near_top and may_miss_top(self.target.label, height, cell.classes)
-        if not cell.ledger.record_touch(item, contradiction, may_miss_top=may_have_missed):
-            raise self.failure("contradicted", f"{item} may be no {self.target.label}: {contradiction}")
+            message = f"the tool touched something at {height * 1000:.0f} mm on its way to {item}"
+            raise self.failure("blocked", f"{message}, which {expectation}")
+        contradiction = describe_touch_contradiction(label, height, cell.classes)
+        is_near_top = height >= compute_min_contact_height(object_class, centre_height, self.overtravel)
+        may_have_missed_top = is_near_top and may_miss_top(label, height, cell.classes)
+        if not cell.ledger.record_touch(item, contradiction, may_miss_top=may_have_missed_top):
+            raise self.failure("contradicted", f"{item} may be no {label}: {contradiction}")
         if contradiction and not is_near_top:
             cell.ledger.record_miss(item)
-            raise self.failure("no_contact", f"the top of {item} was {expected}; {contradiction}")
+            raise self.failure("no_contact", f"the top of {item} {expectation}; {contradiction}")
 
 
-def _proves_absence(goal: Goal, target: Target, kind: ObjectClass) -> bool:
+def _proves_absence(goal: Goal, target: Target, object_class: ObjectClass) -> bool:
     """Return True if a descent to `goal` without contact proves that there is no object at the target.
 
-    The descent must end near the table, below the middle of the object, and within half of its radius.
+    The descent must end near the table, below the centre of the object, and within half of its radius.
     """
     x, y, z = goal.position
-    is_central = math.dist((x, y), target.position[:2]) <= kind.radius / 2
+    is_central = math.dist((x, y), target.position[:2]) <= object_class.radius / 2
     return is_central and z < target.position[2] and z <= 2 * PROBE_CLEARANCE
 
 
 def _build_contact_check(tool: Tool) -> Callable[[], bool]:
-    """Return a function that returns True on a new contact; an existing contact must end first."""
+    """Return a function that returns True on a contact that starts after this call."""
     was_free = not tool.touching
 
     def has_new_contact() -> bool:

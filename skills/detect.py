@@ -15,13 +15,13 @@ from executive.skill import Out, Skill, param, port
 class Detect(Skill):
     """Detect the objects in a new image, without blocking the tick loop.
 
-    Succeeds with all detections that are not in doubt. A detection is in doubt if it is below the detector's
-    threshold or if its second class is more than half as likely. An empty list is a result, not a failure.
-    If all detections on the table are in doubt, the skill fails with `unsure`, or passes without detections.
-    If the arm hides part of the workspace, the skill fails with `hidden`, or passes and searches the rest:
-    the hidden area counts neither as empty nor as occupied.
-    A look with more than 60 boxes fails with `crowded`, whatever their confidence.
-    Fails with `camera_moved` if the image shows the bins away from their expected positions.
+    The output contains all detections that are not doubtful; it may be empty. A detection is doubtful if its
+    confidence is below the threshold, or if its second class has more than half of this confidence.
+    If all detections on the table are doubtful, the skill fails with `unsure`, or, by the param `doubtful`,
+    succeeds with an empty output. If the arm hides part of the workspace, the skill fails with `hidden`, or,
+    by the param `hidden`, searches the visible part; the hidden part is then neither empty nor occupied.
+    The skill fails with `crowded` if the detector reports more than 60 boxes of any confidence, and with
+    `camera_moved` if the bins in the image are away from their expected positions.
     """
 
     detections: Out[Detections] = port(doc="the detections and their frame")
@@ -30,7 +30,7 @@ class Detect(Skill):
         "table", choices=("table", "full"), doc="`table`: the workspace; `full`: the whole image"
     )
     doubtful: str = param(
-        "fail", choices=("fail", "pass"), doc="result if all detections on the table are in doubt"
+        "fail", choices=("fail", "pass"), doc="result if all detections on the table are doubtful"
     )
     hidden: str = param("fail", choices=("fail", "pass"), doc="result if the arm hides part of the workspace")
     reasons: ClassVar = ("unsure", "hidden", "unavailable", "crowded", "camera_moved")
@@ -60,8 +60,10 @@ class Detect(Skill):
             raise self.failure("crowded", str(error)) from error
         except Unavailable as error:
             raise self.failure("unavailable", str(error)) from error
-        on_table = (box for box in answer.doubtful if not is_detection_in_bin(cell, box, frame))
-        if not answer.confident and self.doubtful == "fail" and (best := next(on_table, None)):
+        table_detections = (
+            detection for detection in answer.doubtful if not is_detection_in_bin(cell, detection, frame)
+        )
+        if not answer.confident and self.doubtful == "fail" and (best := next(table_detections, None)):
             raise self.failure("unsure", answer.describe_doubt(best))
         self.detections = Detections(
             **vars(answer), frame=frame, view=self.view, area=camera.get_view_box(self.view)

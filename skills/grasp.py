@@ -10,14 +10,14 @@ from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 
 class Grasp(Skill):
-    """Close the tool on the target and verify that it holds.
+    """Close the tool on the target and verify the grasp.
 
-    Succeeds if the tool's sensor reports a seal after `settle`.
+    The skill succeeds if the tool's sensor reports a seal after `settle`.
     """
 
     target: In[Target] = port(doc="the target that the tool touches")
     held: Out[Item] = port(refers="item", doc="the item in the tool")
-    settle: Seconds = param(0.10, ge=0, le=2, doc="time allowed for the grip to settle")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
     reasons: ClassVar = ("missed",)
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (EMPTY, HOLDING)
@@ -31,7 +31,7 @@ class Grasp(Skill):
             yield from cell.clock.sleep(self.settle)
             is_sealed = cell.tool.holding
         finally:
-            # A halted skill must not leave an object in the tool that the ledger does not know.
+            # A halted skill must not leave an object in the tool, because the ledger has no held item.
             if not is_sealed:
                 cell.tool.open()
         if not is_sealed:

@@ -10,10 +10,10 @@ from executive.skill import ANY, EMPTY, HOLDING, Out, Skill, port
 
 
 class IsHolding(Skill):
-    """Check by the tool's sensor whether the tool holds an item.
+    """Check with the sensor of the tool whether the tool holds an item.
 
-    If the ledger has an item in the tool and the sensor feels none, the item is recorded as dropped. After a
-    timeout or a failure during a transit, the result decides how the mission continues.
+    The skill records a drop if the ledger has an item in the tool, but the sensor detects no seal. A mission
+    can use this skill to decide how to continue after a timeout or a failure during a transit.
     """
 
     held: Out[Item] = port(refers="item", doc="the item in the tool")
@@ -32,5 +32,5 @@ class IsHolding(Skill):
         cell.tool.open()
         if item is not None:
             cell.ledger.record_drop(item)
-            raise self.failure("empty", f"the sensor feels no seal; {item} was dropped")
-        raise self.failure("empty", "the sensor feels no seal")
+            raise self.failure("empty", f"the sensor detects no seal; {item} was dropped")
+        raise self.failure("empty", "the sensor detects no seal")

@@ -14,15 +14,15 @@ from executive.skill import In, Out, Skill, port
 class Localize(Skill):
     """Find the position and the item of every detected object.
 
-    Uses the camera pose stored with the frame, so the camera may have moved since. The ledger assigns each
-    detection to an item. A detection is in doubt if the size of its box does not fit its class. If the frame
-    has a depth image, a detection is also in doubt if the height of its top fits neither an object of its
-    class on the table nor such an object on another object.
+    The skill uses the camera pose stored with the frame, because the camera may have moved since the capture.
+    The ledger assigns each detection to an item. A detection is doubtful if the size of its box does not fit
+    its class, or if the depth image shows its top at a height that is impossible for its class, both on the
+    table and on another object.
     """
 
     detections: In[Detections] = port(doc="the detections and their frame")
     targets: Out[list[Target]] = port(
-        doc="one target per open item whose place is known, from this look or an earlier one"
+        doc="one target per open item whose position is known from this frame or an earlier frame"
     )
     reasons: ClassVar = ("stale", "no_depth")
 

@@ -10,9 +10,9 @@ from executive.skill import Skill, param
 
 
 class MoveToScan(Skill):
-    """Bring the arm to rest in a pose of the cell, for a look or out of the way.
+    """Move the arm to a pose of the cell, for instance to a pose from which the camera sees the workspace.
 
-    With `auto`, the arm does not move if the camera sees the whole workspace already. The skill does not
+    With `auto`, the arm does not move if the camera already sees the whole workspace. The skill does not
     check the view after the motion: `executive check` verifies that the scan poses of a simulated cell show
     the whole workspace.
     """
@@ -21,7 +21,7 @@ class MoveToScan(Skill):
         "auto",
         refers="pose",
         choices=("auto", "next"),
-        doc="an arm pose of the cell; `auto`: the camera's first, if needed; `next`: its next one",
+        doc="an arm pose of the cell; `auto`: the first scan pose, if needed; `next`: the next scan pose",
     )
     reasons: ClassVar = ("unreachable", "blocked")
     uses: ClassVar = ("arm",)

@@ -17,15 +17,15 @@ MIN_LIFT_HEIGHT = 0.003
 
 
 class PutDown(Skill):
-    """Put the held item down at the safe place of the cell, or at the free place nearest to it.
+    """Put the held item down at the safe place of the cell, or at the nearest free position.
 
-    An item that was not lifted yet is released at its position if the motion is blocked. The tool's sensor is
-    read during the whole motion.
+    If the motion is blocked before the item is lifted, the skill releases the item at its position. The skill
+    reads the sensor of the tool during the whole motion.
     """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
     drop: Metres = param(0.005, ge=0, le=0.05, doc="height of the item's underside above the table")
-    settle: Seconds = param(0.10, ge=0, le=2, doc="time allowed for the vacuum to vanish")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
     reasons: ClassVar = ("unreachable", "blocked", "dropped", "stuck")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
@@ -35,17 +35,17 @@ class PutDown(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Transport the item to the free position, and release it."""
-        kind = cell.classes[cell.ledger.get_label(self.held)]
-        goal, height = make_put_down_goal(cell, kind, self.drop, self.held), kind.height
-        lying_height = float(cell.safe_place[2]) + height
+        object_class = cell.classes[cell.ledger.get_label(self.held)]
+        goal = make_put_down_goal(cell, object_class, self.drop, self.held)
+        top_height = float(cell.safe_place[2]) + object_class.height
         try:
             yield from transport(self, cell, self.held, goal, "the safe place")
         except SkillFailed as failure:
-            # An item that was not lifted can stay at its position.
-            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > lying_height + MIN_LIFT_HEIGHT:
+            # An item that still lies on the table is released there.
+            if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > top_height + MIN_LIFT_HEIGHT:
                 raise
         x, y, _ = cell.arm.tool_pose.position
-        place = np.array((x, y, lying_height - height / 2))
+        centre = np.array((x, y, top_height - object_class.height / 2))
         yield from release_item(
-            self, cell, self.held, self.settle, lambda: cell.ledger.record_put_down(self.held, place)
+            self, cell, self.held, self.settle, lambda: cell.ledger.record_put_down(self.held, centre)
         )

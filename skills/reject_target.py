@@ -10,14 +10,14 @@ from executive.skill import In, Skill, param, port
 
 
 class RejectTarget(Skill):
-    """Mark the item as rejected: it is reported, left where it is, and not tried again.
+    """Reject an item: the robot leaves the item at its position, and the report lists it.
 
-    With `after`, the skill succeeds without an effect until that many grasps have failed.
+    Before the item has `after` failed attempts, the skill succeeds without an effect.
     """
 
     item: In[Item] = port(refers="item", doc="the item to reject")
     why: str = param("could not be picked", doc="reason in the report")
-    after: int = param(0, ge=0, doc="number of failed attempts from which the item is rejected")
+    after: int = param(0, ge=0, doc="minimum number of failed attempts before the rejection")
     reasons: ClassVar = ()
 
     def run(self, cell: Cell) -> None:

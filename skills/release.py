@@ -13,13 +13,13 @@ from executive.skill import ANY, EMPTY, HOLDING, In, Out, Seconds, Skill, param,
 class Release(Skill):
     """Release the held item in its bin and verify that the tool is empty.
 
-    An item that fell before its release is dropped and not placed.
+    The skill fails with `dropped` if the item fell before its release.
     """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
     bin: In[str] = port(refers="bin", doc="the bin under the tool")
     placed: Out[Item] = port(refers="item", doc="the item in the bin")
-    settle: Seconds = param(0.10, ge=0, le=2, doc="time allowed for the vacuum to vanish")
+    settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
     reasons: ClassVar = ("stuck", "dropped")
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (HOLDING, EMPTY)
@@ -35,5 +35,5 @@ class Release(Skill):
             )
         elif cell.ledger.is_open(item):
             raise self.failure("dropped", f"{item} is not in the tool any more")
-        # Otherwise the item was already released, before this skill was halted and started again.
+        # A skill that is started again after a halt may find its item already placed.
         self.placed = item

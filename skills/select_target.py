@@ -15,9 +15,9 @@ from executive.skill import In, Out, Skill, SkillFailed, param, port
 class SelectTarget(Skill):
     """Select the next target to pick, and its bin.
 
-    A target is no candidate if its item is no longer to be sorted, its class has no route, the robot may have
-    moved it since its last detection, or too few looks agree on its class, given the error rates of the
-    detector. While the arm moves, distances are measured from its destination.
+    The skill selects only open items with a route whose positions are still valid. Enough looks must agree
+    on the class of an item, given the error rates of the detector. Distances are measured from the tool, or
+    from the destination of the arm while the arm moves.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
@@ -25,7 +25,7 @@ class SelectTarget(Skill):
     wanted: In[str | None] = port(default=None, refers="class", doc="only this class")
     target: Out[Target] = port(doc="the chosen target")
     item: Out[Item] = port(refers="item", doc="the item of the target")
-    bin: Out[str] = port(refers="bin", doc="the bin with the fewest objects among those of its class")
+    bin: Out[str] = port(refers="bin", doc="the bin with the fewest used slots among the bins of the class")
     prefer: str = param(
         "nearest", choices=("nearest", "surest"), doc="`nearest` to the tool, or the `surest` detection"
     )
@@ -39,10 +39,10 @@ class SelectTarget(Skill):
             if self._is_requested(cell, target.item)
         ]
         if not candidates:
-            raise self._explain_none(cell)
+            raise self._explain_missing_candidate(cell)
         best = candidates[0]
         if self.prefer == "surest":
-            best = min(candidates, key=lambda t: (-t.confidence, t.item))
+            best = min(candidates, key=lambda target: (-target.confidence, target.item))
         self.target, self.item = best, best.item
         bins = cell.routes[cell.ledger.get_label(best.item)]
         self.bin = min(bins, key=lambda bin: predict_object_count(cell, bin))
@@ -56,16 +56,16 @@ class SelectTarget(Skill):
             and (self.wanted is None or label == self.wanted)
         )
 
-    def _explain_none(self, cell: Cell) -> SkillFailed:
+    def _explain_missing_candidate(self, cell: Cell) -> SkillFailed:
         """Return the failure with the reason why there is no candidate."""
-        uncertain = [item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item)]
-        if uncertain:
-            names = ", ".join(uncertain)
-            return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
+        items = cell.ledger.find_uncertain_items()
+        if uncertain := [item for item in items if self._is_requested(cell, item)]:
+            return self.failure(
+                "doubtful", f"not enough looks agree on {', '.join(uncertain)} yet; look again"
+            )
         name = self.same or self.wanted or "object to sort"
         if self.same is None and cell.ledger.is_table_empty(self.wanted):
-            empty = f"no {name} is left on the table, except rejected objects"
-            unknown = describe_unknown_labels(cell.ledger.unknown_labels)
-            message = "; ".join(filter(None, (empty, unknown)))
-            return self.failure("no_candidate", message)
+            message = f"no {name} is left on the table, except rejected objects"
+            unknown_labels = describe_unknown_labels(cell.ledger.unknown_labels)
+            return self.failure("no_candidate", "; ".join(filter(None, (message, unknown_labels))))
         return self.failure("unseen", f"no {name} is in sight, but it is not certain that the table is empty")

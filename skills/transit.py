@@ -13,20 +13,15 @@ from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Skill, param, port
 
 
 class Transit(Skill):
-    """Transport the held item to a free slot of a bin, just above the floor or the layer of objects there.
+    """Transport the held item to a position above a free slot of a bin.
 
-    The arm makes one motion: up, over all walls, and down into the bin, with accelerations that the seal
-    withstands with a safety factor of two. The vacuum sensor is read during the whole motion.
+    The arm makes one motion: up, over all walls, and down into the bin. The accelerations are so low that the
+    seal holds with a safety factor of two. The skill reads the vacuum sensor during the whole motion.
     """
 
     held: In[Item] = port(refers="item", doc="the item in the tool")
-    bin: In[str] = port(refers="bin", doc="the bin to carry it to")
-    drop: Metres = param(
-        DROP_HEIGHT,
-        ge=0.005,
-        le=0.1,
-        doc="height of the item's underside above the floor, or the layer of objects there",
-    )
+    bin: In[str] = port(refers="bin", doc="the bin for the item")
+    drop: Metres = param(DROP_HEIGHT, ge=0.005, le=0.1, doc="height of the item's underside above the slot")
     reasons: ClassVar = ("unreachable", "blocked", "dropped")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True

@@ -47,7 +47,7 @@ def test_a_success_has_no_story() -> None:
         ("  - MoveToScan\n  - try: [Detect, IsHolding]\n    catch: [{on: [Detect.hidden], do: succeed}]\n",
          "try: catches only Detect.hidden"),
         ("  try: IsHolding\n  catch: [{on: [IsHolding.empty], do: {invert: succeed}}]\n",
-         "try: caught IsHolding.empty (the sensor feels no seal), but the handler failed"),
+         "try: caught IsHolding.empty (the sensor detects no seal), but the handler failed"),
         ("  - MoveToScan\n  - repeat: {until: [Detect.hidden], do: [Detect, IsHolding]}\n",
          "repeat: succeeds only with Detect.hidden"),
         ("  repeat: {times: 3, do: IsHolding}\n",

@@ -77,9 +77,7 @@ def test_it_does_not_go_where_something_may_have_moved_since(fake: FakeCell, tar
     fake.ledger.invalidate_positions()
     result = run_skill(Approach(target=target), fake)
     assert (result.status, result.reason, fake.arm.commands) == ("FAILURE", "stale", [])
-    assert result.message == (
-        "cube-1 was detected at 0.00 s, and the robot may have moved it since; look again"
-    )
+    assert result.message == "the robot may have moved cube-1 since its detection at 0.00 s; look again"
 
 
 def test_every_further_attempt_comes_down_elsewhere(fake: FakeCell, target: Target, look: Look) -> None:
