@@ -21,8 +21,6 @@ from executive.tree.node import NodeContext, TreeNode
 from executive.tree.node_registry import ControlNodes, load_control_nodes
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 
-"""Node of the built tree: a py_trees behaviour with a `path` and a `failure`."""
-
 
 def build_tree(
     loaded: LoadedMission,

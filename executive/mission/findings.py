@@ -147,21 +147,21 @@ def _mask_secrets(line: str) -> str:
 
 
 def sort_findings(findings: Iterable[Finding], first_path: str) -> tuple[Finding, ...]:
-    """Return the findings sorted by file, line and column, without duplicates.
+    """Return the findings sorted by file (`first_path` first), line and column, without duplicates.
 
-    The findings of the file `first_path` come first. Findings with the same position are duplicates if they
-    have the same text, or the same code of `_VALUE_CODES`.
+    Findings at one position are duplicates if they have one text, or one code of `_VALUE_CODES`.
     """
-    unique: dict[tuple[str, int, int, str], Finding] = {}
+    unique: dict[tuple[bool, str, int, int, str], Finding] = {}
     for finding in findings:
         identity = finding.code if finding.code in _VALUE_CODES else str(finding)
-        unique.setdefault((finding.path, finding.line, finding.col, identity), finding)
-    return tuple(sorted(unique.values(), key=lambda f: (f.path != first_path, f.path, f.line, f.col)))
+        position = (finding.path != first_path, finding.path, finding.line, finding.col)
+        unique.setdefault((*position, identity), finding)
+    return tuple(unique[key] for key in sorted(unique, key=lambda key: key[:-1]))
 
 
 def find_similar_word(word: str, known_words: Iterable[str]) -> str | None:
     """Return the known word that is most similar to `word`, or None if none is similar."""
-    words_by_lower_case = {known.lower(): known for known in known_words}
+    words_by_lower_case = {known_word.lower(): known_word for known_word in known_words}
     matches = difflib.get_close_matches(word.lower(), words_by_lower_case, n=1, cutoff=0.6)
     return words_by_lower_case[matches[0]] if matches else None
 

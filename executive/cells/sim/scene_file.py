@@ -178,10 +178,9 @@ def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
     root, findings = parse_yaml(source)
     if root is None:
         raise MissionError(sort_findings(findings, source.path))
-    validated = validate(root, SceneConfig)
-    scene = validated.model
+    scene, validation_errors = validate(root, SceneConfig)
     mismatches = () if scene is None else _find_mismatches(scene, root, config)
-    all_findings = (*findings, *validated.findings, *mismatches)
+    all_findings = (*findings, *validation_errors, *mismatches)
     if scene is None or all_findings:
         raise MissionError(sort_findings(all_findings, source.path))
     return scene

@@ -29,13 +29,10 @@ def check_constants(context: CheckContext) -> Iterator[Finding]:
 
 def _check_keys(context: CheckContext, owner: InnerNode | SectionNode, name: str) -> Iterator[Finding]:
     for key, value in iterate_keys(owner):
-        if isinstance(value, SectionNode):
-            yield from _check_keys(context, value, key.name)
-        elif isinstance(value, tuple):
-            for item in value:
-                if isinstance(item, SectionNode):
-                    yield from _check_keys(context, item, key.name)
-        elif key.kind is KeyKind.CONSTANT:
+        for item in value if isinstance(value, tuple) else (value,):
+            if isinstance(item, SectionNode):
+                yield from _check_keys(context, item, key.name)
+        if key.kind is KeyKind.CONSTANT:
             max_value = find_upper_bound(owner, key)
             yield from _check_constant(context, f"{name}.{key.name}", key, value, max_value)
         elif (
@@ -127,6 +124,5 @@ class CheckerAnalysis:
 
     def list_skills(self) -> Sequence[type[Skill] | None]:
         """Return the skills below the node; None stands for a skill that is not installed."""
-        return [
-            self._context.skills.get(node.skill) for node in self._node.walk() if isinstance(node, SkillNode)
-        ]
+        nodes = [node for node in self._node.walk() if isinstance(node, SkillNode)]
+        return [self._context.skills.get(node.skill) for node in nodes]

@@ -107,11 +107,9 @@ def _find_reads(context: CheckContext, branch: Node) -> Iterator[VariableRead]:
         for reference in find_control_node_inputs(node):
             yield VariableRead(node, get_type_name(node), reference.name, reference.span)
         for wire in context.find_wires(node, Direction.IN):
-            if (
-                state.written_variables is None
-                or wire.variable in state.written_variables
-                or not wire.port.is_required
-            ):
+            written_variables = state.written_variables
+            is_written = written_variables is None or wire.variable in written_variables
+            if is_written or not wire.port.is_required:
                 yield VariableRead(node, str(wire), wire.variable, wire.span)
 
 

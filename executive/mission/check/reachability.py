@@ -52,9 +52,8 @@ def check_tool_states(context: CheckContext) -> Iterator[Finding]:
         name = f'{node.skill} in the subtree "{use.name}"' if use else node.skill
         if required_state is EMPTY and (tool := entry_state.find_tool_state(HOLDING)):
             message = f"{name} needs an empty tool, but the tool may hold an object here"
-            hint = (
-                f"{_explain_tool_state(flow, tool, span)} Put it down on every path from there to this node."
-            )
+            explanation = _explain_tool_state(flow, tool, span)
+            hint = f"{explanation} Put it down on every path from there to this node."
             yield make_error(span, "tool-state", message, hint)
         if required_state is HOLDING and (tool := entry_state.find_tool_state(EMPTY)):
             message = f"{name} needs an object in the tool, but the tool may be empty here"

@@ -1,7 +1,6 @@
 """Expansion of a mission: subtrees replace each `use`, and values of params and arguments replace `$name`.
 
-After expansion, every reference is a variable. Checks and builder get only the expanded tree, so the checks
-see the values of the arguments at every use.
+The checks and the tree builder get only the expanded tree, in which every reference is a variable.
 """
 
 from __future__ import annotations
@@ -25,12 +24,13 @@ _MAX_DEPTH = 40
 _MAX_NODE_COUNT = 5000
 """Maximum number of expanded nodes."""
 _CALLER_PREFIX = "^"
-"""Temporary prefix of the caller's variables, which distinguishes them from variables of the subtree."""
+"""Temporary prefix of variables of the caller in the arguments of a subtree with local variables."""
 
 ValuesByName = Mapping[str, Value]
 """Values of params and arguments by name."""
 
 PartT = TypeVar("PartT")
+"""Type of a node or of a part of a node."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class ExpandedMission:
 
     Attributes:
         tree: Expanded tree, or None if it could not be expanded.
-        unused_subtrees: Expanded bodies of unused subtrees; without subtrees that require arguments.
+        unused_subtrees: Expanded bodies of the unused subtrees that require no arguments.
         findings: Errors and warnings about subtrees, params and arguments.
     """
 
@@ -86,10 +86,10 @@ class _Expander:
         self.params: ValuesByName = {name: param.value for name, param in mission.params.items()}
         self.findings: list[Finding] = []
         self.used_names: set[str] = set()
-        # Params and arguments with references, as (subtree, name); for a param, the subtree is "".
+        # Referenced params and arguments, as (subtree, name); for a param, the subtree is "".
         self._used_values: set[tuple[str, str]] = set()
         self._node_count = 0
-        # Span of the `use` in the tree whose subtree is being expanded.
+        # Span of the `use` in the mission file for the subtree that is being expanded.
         self._outermost_span: Span | None = None
         self._use_counts: Counter[str] = Counter()
 
@@ -101,7 +101,7 @@ class _Expander:
             return None
 
     def find_unused_names(self) -> Iterator[Finding]:
-        """Yield a finding for every param, and every argument of a used subtree, that has no reference."""
+        """Yield a finding for every param without reference, and every unused argument of a used subtree."""
         for name, param in self.mission.params.items() if self.mission.tree else ():
             if ("", name) not in self._used_values and f"${name}" not in param.span.source.text:
                 yield make_warning(param.span, "unused-param", f'the param "{name}" is never used')
@@ -117,15 +117,14 @@ class _Expander:
         """Return the expanded node; `callers` are the subtrees that contain the node, the outermost first."""
         self._node_count += 1
         if depth > _MAX_DEPTH or self._node_count > _MAX_NODE_COUNT:
-            problem = f"has more than {_MAX_NODE_COUNT} nodes"
-            if depth > _MAX_DEPTH:
-                problem = f"is more than {_MAX_DEPTH} levels deep"
+            is_too_deep = depth > _MAX_DEPTH
+            depth_problem = f"is more than {_MAX_DEPTH} levels deep"
+            problem = depth_problem if is_too_deep else f"has more than {_MAX_NODE_COUNT} nodes"
             message = f"after the expansion of subtrees, the tree {problem}"
             self.findings.append(make_error(self._outermost_span or node.span, "too-large", message))
             raise _TooLargeError
 
         def expand_part(part: object) -> object:
-            """Return a part of the node after the expansion of its nodes and references."""
             if isinstance(part, Node):
                 return self._expand_node(part, values, callers, depth + 1)
             if isinstance(part, Reference):
@@ -161,11 +160,9 @@ class _Expander:
         name = reference.name if value is not None else find_similar_word(reference.name, values)
         is_argument = bool(callers) and name in self.mission.subtrees[callers[-1]].arguments
         self._used_values.add((callers[-1] if is_argument else "", name or ""))
-        if value is None:
-            return reference
-        if isinstance(value, Reference):
-            return value
-        # A finding about the value has the position of the value; its message contains the `origin`.
+        if value is None or isinstance(value, Reference):
+            return value or reference
+        # A finding about the value is located at the value, so its message must contain the reference.
         origin = f"${reference.name} in {reference.span.describe_place(value.span.source)}"
         return replace(value, origin=origin, reference_span=reference.span)
 
@@ -191,7 +188,7 @@ class _Expander:
             return use
         self._use_counts[use.name] += 1
         self._outermost_span = self._outermost_span if callers else use.span
-        # A library has no access to params, so that a library has one meaning in all missions.
+        # A library must not depend on the params of a mission.
         params: ValuesByName = {} if subtree.library else self.params
         if subtree.returns is not None:
             arguments = {name: _add_caller_prefix(value) for name, value in arguments.items()}
@@ -202,7 +199,7 @@ class _Expander:
         return replace(use, body=body, returned_variables=tuple(returns.values()))
 
     def _rename_variables(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
-        """Return the body with unique local variables, and with the caller's names of returned variables."""
+        """Return the body with unique names of local variables; returned variables get the caller's names."""
         use_number = self._use_counts[use.name]
         prefix = f"{use.name}." if use_number == 1 else f"{use.name}-{use_number}."
         written_variables = find_written_variables(body, self.skills)
@@ -265,12 +262,11 @@ class _Expander:
 
 
 def _add_caller_prefix(value: Value) -> Value:
-    """Return a reference with the prefix of the caller's variables; a constant is unchanged."""
     return replace(value, name=_CALLER_PREFIX + value.name) if isinstance(value, Reference) else value
 
 
 def _map_parts(part: PartT, change: Callable[[object], object]) -> PartT:
-    """Return a copy of `part` in which `change(value)` replaces every value that `part` directly contains."""
+    """Return a copy of `part` with `change(value)` in place of every value that `part` directly contains."""
     mapped: object = part
     if isinstance(part, tuple):
         mapped = tuple([change(item) for item in part])

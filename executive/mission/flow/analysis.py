@@ -1,8 +1,4 @@
-"""Abstract execution of the tree over all possible execution paths.
-
-Each node is entered with the facts that hold on all paths to it (`FlowState`) and returns its possible ends,
-with the facts after each of them (`Flow`).
-"""
+"""Data-flow analysis of the tree over all possible execution paths (abstract interpretation)."""
 
 from __future__ import annotations
 
@@ -40,9 +36,9 @@ class FlowAnalysis:
 
     Attributes:
         nodes: Every node by its path.
-        entry_states: Facts that hold at every start of a node, by its path; unreachable nodes are missing.
-        flows: Possible ends of a node after the last analysed entry, by its path.
-        body_end_states: Facts after each success of the body of a `use`, by the path of the use.
+        entry_states: State that joins all possible starts of a node, by path; without unreachable nodes.
+        flows: Possible ends of a node, and the states after them, for the last analysed entry, by path.
+        body_end_states: State that joins all successes of the body of a `use`, by path of the `use`.
         root_flow: Possible ends of the whole tree.
     """
 
@@ -62,7 +58,7 @@ class FlowAnalysis:
         return self._skills[similar] if similar else None
 
     def _analyse(self, node: Node, state: FlowState) -> Flow:
-        """Return the possible ends of a node that is entered in a state; each such pair is computed once."""
+        """Return the possible ends of a node that starts in a state, from the cache if possible."""
         self.entry_states[node.path] = state.join(self.entry_states.get(node.path, state))
         entry = node.path, state
         if entry not in self._flows_by_entry:
@@ -80,9 +76,8 @@ class FlowAnalysis:
                 return self._compute_skill_flow(node, state)
             case UseNode(body=Node() as body):
                 return self._compute_use_flow(node, body, state)
-        for part in node.children:
-            # The states in which the mission would enter the parts of an unknown node are unknown, too.
-            self._analyse(part, UNKNOWN_STATE)
+        for child in node.children:
+            self._analyse(child, UNKNOWN_STATE)
         return make_unknown_flow(UNKNOWN_NAME, node.path)
 
     def _analyse_child(self, child: Child, state: FlowState) -> Flow:
@@ -92,14 +87,14 @@ class FlowAnalysis:
         skill = self.find_skill(node.skill)
         if skill is None:
             return make_unknown_flow(node.skill, node.path)
-        before, after = skill.tool_state
-        state = state.apply_precondition(before, node.path)
+        precondition, postcondition = skill.tool_state
+        state = state.apply_precondition(precondition, node.path)
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
-        end = state.with_arm_moved() if skill.moves else state
-        success = end.with_variables(outputs).apply_success(after, node.path)
+        final_state = state.with_arm_moved() if skill.moves else state
+        success = final_state.with_variables(outputs).apply_success(postcondition, node.path)
 
         def compute_end_state(reason: str) -> FlowState:
-            return end.apply_failure(skill.tool_left.get(reason), node.path)
+            return final_state.apply_failure(skill.tool_left.get(reason), node.path)
 
         failures = {
             PossibleFailure(node.skill, reason, node.path): compute_end_state(reason)
@@ -112,6 +107,6 @@ class FlowAnalysis:
         # One use may be entered in several states, for example in a loop.
         end_states = (self.body_end_states.get(node.path), flow.success)
         self.body_end_states[node.path] = join_states(end_states)
-        # Returned variables count as written: if they are not, the error is reported at the subtree only.
+        # `find_unwritten_returns` reports unwritten returned variables, so they count as written here.
         success = flow.success and flow.success.with_variables(node.returned_variables)
         return replace(flow, success=success)

@@ -23,7 +23,7 @@ _CONTAINER_TYPES = (tuple, list, dict, frozenset, set)
 
 
 class WrongType(Exception):
-    """A value does not have the declared type; the message continues a sentence that starts with its name.
+    """A value does not fit its declaration; the message is the predicate of a sentence: `must be a list`.
 
     Attributes:
         code: Code of the finding.
@@ -44,7 +44,7 @@ def is_plain_type(declared: object) -> bool:
 
 
 def find_input_problem(value: object, port: Port) -> str:
-    """Return an error message without the name of the input; "" if the constant `value` is allowed."""
+    """Return an error message (predicate of a sentence) if an input does not accept a constant, else ""."""
     if value is None and is_assignable(type(None), port.type):
         return ""
     # Items are created during a run, so a file cannot contain an item.

@@ -1,7 +1,4 @@
-"""Grammar of mission files: the keys, the kinds of their values, and their meaning.
-
-Parser, checks, JSON Schema and documentation are derived from this module.
-"""
+"""Grammar of mission files: keys, kinds of values and meanings, for parser, schema and documentation."""
 
 from __future__ import annotations
 

@@ -45,10 +45,9 @@ def get_mission_node(child: Child) -> Node:
 
 
 def make_inspection_instance(node: InnerNode) -> ControlNode:
-    """Return a control node that is never executed, for checks and the diagnosis.
+    """Return a control node with `ChildPlaceholder`s as children, for checks and the diagnosis.
 
-    Its children are instances of `ChildPlaceholder`. A constant is valid even if the mission gives an invalid
-    value, which `check_constants` reports.
+    Valid constants replace invalid constants of the mission, which `check_constants` reports.
     """
     context = NodeContext(node.path, cast("Clock", None), Blackboard(), node.label)
     return make_instance(node, context, ChildPlaceholder)
@@ -72,7 +71,7 @@ def has_valid_constants(node: InnerNode) -> bool:
 
 
 def find_upper_bound(owner: InnerNode | SectionNode, key: Key) -> int | None:
-    """Return the upper bound of a constant, which is the number of nodes under `max_key`; None: no bound."""
+    """Return the upper bound of a constant, which is the number of nodes under `key.max_key`, or None."""
     return len(list_nodes(owner.values[key.max_key])) if key.max_key in owner.values else None
 
 

@@ -44,14 +44,6 @@ class Subtree:
 
 
 @dataclass(frozen=True)
-class Library:
-    """Name of a library, and its subtrees by name."""
-
-    name: str
-    subtrees: Mapping[str, Subtree]
-
-
-@dataclass(frozen=True)
 class MissionParam:
     """A constant of the mission.
 

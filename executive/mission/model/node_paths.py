@@ -44,16 +44,13 @@ def get_type_name(node: Node) -> str:
     return "unknown"
 
 
-def _assign_path(node: Node, parent: str, slot: str, name: str | None = None) -> Node:
+def _assign_path(node: Node, parent_path: str, slot: str, name: str | None = None) -> Node:
     """Return the node with its path and the paths of its descendants.
 
-    Args:
-        node: Node without path.
-        parent: Path of the parent.
-        slot: Key of the parent that contains the node, or "".
-        name: Name of the node in its path; None: the name of the node, or no name for a list.
+    `slot` is the key of the parent that contains the node, or "". `name` is the last part of the path; by
+    default `get_path_name(node)`, and no name for a list.
     """
-    path = _join(parent, slot)
+    path = _join(parent_path, slot)
     if name is not None or not _is_list(node):
         path = _join(path, name or get_path_name(node))
     match node:
@@ -69,12 +66,9 @@ def _assign_path(node: Node, parent: str, slot: str, name: str | None = None) ->
 def _assign_value_paths(
     owner: InnerNode | SectionNode, path: str, section_slot: str = ""
 ) -> dict[str, KeyValue]:
-    """Return the values of the keys, in which all nodes have paths.
+    """Return the values of the keys, in which all nodes have paths; `path` is the path of the control node.
 
-    Args:
-        owner: Control node, or a section of a control node.
-        path: Path of the control node.
-        section_slot: Key of the control node that contains the section `owner`, or "".
+    If `owner` is a section, `section_slot` is the key of the control node that contains the section.
     """
     values: dict[str, KeyValue] = {}
     for key, value in iterate_keys(owner):
@@ -97,8 +91,7 @@ def _assign_value_paths(
     return values
 
 
-def _assign_list_paths(nodes: tuple[Node, ...], parent: str) -> tuple[Node, ...]:
-    """Return the nodes of a list with unique paths."""
+def _assign_list_paths(nodes: tuple[Node, ...], parent_path: str) -> tuple[Node, ...]:
     counts = Counter(map(get_path_name, nodes))
 
     def get_unique_name(index: int, node: Node) -> str:
@@ -106,11 +99,11 @@ def _assign_list_paths(nodes: tuple[Node, ...], parent: str) -> tuple[Node, ...]
         has_own_name = bool(node.label) or isinstance(node, SkillNode | UseNode)
         return name if has_own_name and counts[name] == 1 else f"{index}:{name}"
 
-    return tuple(_assign_path(node, parent, "", get_unique_name(i, node)) for i, node in enumerate(nodes, 1))
+    names = [get_unique_name(index, node) for index, node in enumerate(nodes, 1)]
+    return tuple(_assign_path(node, parent_path, "", name) for node, name in zip(nodes, names, strict=True))
 
 
 def _is_list(node: Node) -> bool:
-    """Return True for a list without a keyword."""
     return isinstance(node, InnerNode) and node.is_list
 
 

@@ -48,7 +48,7 @@ class SkillNode(Node):
     Attributes:
         skill: Name of the skill.
         settings: Values of params and ports in the mission, by name.
-        variables_by_port: Variable of each port without a setting; a missing port has a variable of its name.
+        variables_by_port: Variables of ports without a setting; by default, a variable has the port's name.
     """
 
     skill: str
@@ -58,11 +58,7 @@ class SkillNode(Node):
 
 @dataclass(frozen=True)
 class UnknownNode(Node):
-    """A node with an error that a finding reports.
-
-    Attributes:
-        parts: Nodes below this node that have no errors.
-    """
+    """A node with an error that a finding reports; `parts` are the valid nodes below this node."""
 
     parts: tuple[Node, ...] = ()
 

@@ -17,8 +17,8 @@ class Literal:
     Attributes:
         value: Plain value: None, boolean, number, string, list or mapping.
         span: Position of the value.
-        origin: Reference that the value has replaced, as `$attempts in line 12`; "" without a reference.
-        reference_span: Position of the replaced reference, or None.
+        origin: Reference that expansion replaced by the value: `$attempts in line 12`; "" for no reference.
+        reference_span: Position of this reference, or None.
         element_spans: Positions of the elements, if the value is a list.
     """
 
@@ -30,7 +30,7 @@ class Literal:
 
     @property
     def origin_note(self) -> str:
-        """The origin in brackets, for the end of a sentence about the value; "" without a reference."""
+        """The origin in brackets, for the end of a sentence about the value; "" for no reference."""
         return f" (value of {self.origin})" if self.origin else ""
 
     def get_element_span(self, index: int) -> Span:
@@ -40,7 +40,7 @@ class Literal:
 
 @dataclass(frozen=True)
 class Reference:
-    """`$name`: a param, an argument or a variable. After expansion, every reference is a variable."""
+    """`$name`: a param, an argument or a variable; after expansion always a variable."""
 
     name: str
     span: Span

@@ -20,8 +20,8 @@ class Wire:
         skill: Name of the skill.
         port: Port of the skill.
         variable: Name of the variable.
-        span: Position of the variable in the mission; position of the skill if the mission names no variable.
-        is_explicit: True if the mission names the variable; False if the variable has the name of the port.
+        span: Position of the variable, or of the skill if the mission does not name the variable.
+        is_explicit: True if the mission names the variable; otherwise, the variable has the port's name.
     """
 
     skill: str
@@ -56,7 +56,7 @@ def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:
 
 
 def find_control_node_outputs(node: Node) -> Iterator[tuple[Key, LocatedName]]:
-    """Yield each key of a control node for an output variable, and the variable."""
+    """Yield each key of a control node that names an output variable, and the variable."""
     if isinstance(node, InnerNode):
         for key, value in iterate_keys(node):
             if isinstance(value, LocatedName):

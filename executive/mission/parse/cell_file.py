@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os.path
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -43,7 +43,7 @@ class CellFile:
     Attributes:
         config: Validated content, or None if the file has errors.
         source: Text of the cell file.
-        root: Merged YAML tree of the file and its bases, for the positions of findings; None if invalid YAML.
+        root: YAML tree of the file merged with its bases, for positions of findings; None if YAML is invalid.
         findings: Errors in the file and its bases.
     """
 
@@ -84,18 +84,16 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
         return CellFile(None, source, None, tuple(reader.findings))
     root, override_findings = override_cell(root, overrides)
     override_findings += _find_overridden_base(overrides)
-    validated = validate(root, CellConfig)
-    findings = (*reader.findings, *override_findings, *validated.findings)
-    file = CellFile(validated.model, source, root, findings)
-    if validated.model is None:
+    config, validation_errors = validate(root, CellConfig)
+    findings = (*reader.findings, *override_findings, *validation_errors)
+    file = CellFile(config, source, root, findings)
+    if config is None:
         return file
-    overlaps = (file.make_error(keys, "layout", text) for keys, text in find_overlaps(validated.model))
-    model_files = tuple(_list_model_files(file, validated.model, reader.folders))
-    outside = tuple(_find_model_files_outside(file, model_files))
-    findings = (*findings, *_find_unknown_poses(file, validated.model), *outside, *overlaps)
-    # Without config, no caller can open a model file outside the folder.
-    config = None if outside else _resolve_model_files(validated.model, model_files)
-    return CellFile(config, source, root, findings)
+    overlap_errors = (file.make_error(keys, "layout", message) for keys, message in find_overlaps(config))
+    resolved_config, outside_errors = _resolve_model_files(file, config, reader.folders)
+    findings = (*findings, *_find_unknown_poses(file, config), *outside_errors, *overlap_errors)
+    # After an error, `config` is None, so that no caller opens a model file outside the folder.
+    return CellFile(None if outside_errors else resolved_config, source, root, findings)
 
 
 class _CellFileReader:
@@ -110,10 +108,10 @@ class _CellFileReader:
         self.folders: dict[Source, Path] = {}
         self.findings: list[Finding] = []
 
-    def read_tree(self, path: Path, source: Source, derived: tuple[Path, ...]) -> YamlNode | None:
-        """Return the YAML tree of a file merged with its base, or None if one of them is invalid.
+    def read_tree(self, path: Path, source: Source, previous_files: tuple[Path, ...]) -> YamlNode | None:
+        """Return the YAML tree of a file merged with its base, or None if a file is invalid.
 
-        `derived` are the files that are based on this file, the cell file first.
+        `previous_files` is the chain of bases from the cell file to the file that names `path` as its base.
         """
         self.folders[source] = path.parent
         root, findings = parse_yaml(source)
@@ -124,14 +122,14 @@ class _CellFileReader:
         # Validation reports a base that is not a string.
         if not isinstance(reference, YamlScalar) or not isinstance(reference.value, str):
             return root
-        base = self._read_base(reference, (*derived, path))
+        base = self._read_base(reference, (*previous_files, path))
         if base is None:
             return None
-        own = tuple(_merge_entry(entry, base) for entry in root.entries if entry.key.text != BASE_KEY)
-        return _complete(replace(root, entries=own), base)
+        entries = tuple(_merge_entry(entry, base) for entry in root.entries if entry.key.text != BASE_KEY)
+        return _inherit_entries(replace(root, entries=entries), base)
 
     def _read_base(self, reference: YamlScalar, files: tuple[Path, ...]) -> YamlMapping | None:
-        """Return the YAML tree of the base file that `files[-1]` names, or None if it cannot be read."""
+        """Return the YAML tree of the base of `files[-1]`, or None if the base cannot be read."""
         try:
             path = find_file_below(files[-1].parent, reference.text, ("cells", ""))
             if any(file.samefile(path) for file in files):
@@ -151,43 +149,46 @@ class _CellFileReader:
 
 
 def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:
-    """Return an entry of a file; an entry `detectors` is merged with the detectors of the base.
+    """Return an entry of a file; the value of `detectors` becomes the detectors of the file and of the base.
 
-    A detector of the same kind in both files takes its missing keys from the base; a detector of another kind
-    takes none. A detector without value is removed. The detectors of the file come first.
+    A detector without value removes the detector of the base. The detectors of the file come first.
     """
-    own, inherited = entry.value, base.get(DETECTORS_KEY)
-    is_detectors = entry.key.text == DETECTORS_KEY
-    if not is_detectors or not isinstance(own, YamlMapping) or not isinstance(inherited, YamlMapping):
+    detectors, base_detectors = entry.value, base.get(DETECTORS_KEY)
+    if not (isinstance(detectors, YamlMapping) and isinstance(base_detectors, YamlMapping)):
         return entry
-    merged = []
-    for detector in own.entries:
-        base_detector = inherited.get(detector.key.text)
+    if entry.key.text != DETECTORS_KEY:
+        return entry
+    entries = []
+    for detector in detectors.entries:
+        base_detector = base_detectors.get(detector.key.text)
         if base_detector is None or to_python_value(detector.value) is not None:
-            merged.append(replace(detector, value=_merge_detector(detector.value, base_detector)))
-    return replace(entry, value=_complete(replace(own, entries=tuple(merged)), inherited, own.keys))
+            entries.append(replace(detector, value=_merge_detector(detector.value, base_detector)))
+    detectors_of_file = replace(detectors, entries=tuple(entries))
+    return replace(entry, value=_inherit_entries(detectors_of_file, base_detectors, detectors.keys))
 
 
-def _merge_detector(own: YamlNode, base: YamlNode | None) -> YamlNode:
-    """Return a detector, with its missing keys taken from the base if both have the same kind."""
-    if not isinstance(own, YamlMapping) or not isinstance(base, YamlMapping):
-        return own
-    kind, base_kind = own.get("kind"), base.get("kind")
+def _merge_detector(detector: YamlNode, base_detector: YamlNode | None) -> YamlNode:
+    """Return a detector of a file; if the kinds are equal, it inherits missing keys from the base."""
+    if not isinstance(detector, YamlMapping) or not isinstance(base_detector, YamlMapping):
+        return detector
+    kind, base_kind = detector.get("kind"), base_detector.get("kind")
     is_same_kind = kind is None or (
         base_kind is not None and to_python_value(kind) == to_python_value(base_kind)
     )
-    return _complete(own, base) if is_same_kind else own
+    return _inherit_entries(detector, base_detector) if is_same_kind else detector
 
 
-def _complete(own: YamlMapping, base: YamlMapping, excluded: tuple[str, ...] = ()) -> YamlMapping:
-    """Return a mapping, with its missing entries taken from the base, except entries with `excluded` keys."""
-    skipped = {*own.keys, *excluded}
-    inherited = (entry for entry in base.entries if entry.key.text not in skipped)
-    return replace(own, entries=(*own.entries, *inherited))
+def _inherit_entries(
+    mapping: YamlMapping, base: YamlMapping, excluded_keys: tuple[str, ...] = ()
+) -> YamlMapping:
+    """Return a mapping with its missing entries from the base, except entries with an excluded key."""
+    keys = {*mapping.keys, *excluded_keys}
+    base_entries = (entry for entry in base.entries if entry.key.text not in keys)
+    return replace(mapping, entries=(*mapping.entries, *base_entries))
 
 
 def _find_overridden_base(overrides: Mapping[str, str]) -> Iterator[Finding]:
-    """Yield an error if an override changes the base, because only the cell file may do this."""
+    """Yield an error if an override changes the base, which only the cell file may set."""
     key = f"{CELL_PREFIX}{BASE_KEY}"
     if key in overrides:
         span = make_override_source(key, overrides[key]).make_span(1, 1, len(key))
@@ -204,34 +205,25 @@ def _find_unknown_poses(file: CellFile, config: CellConfig) -> Iterator[Finding]
                 yield file.make_error(("cameras", name, "scan_poses", index), "unknown-pose", message)
 
 
-def _list_model_files(
+def _resolve_model_files(
     file: CellFile, config: CellConfig, folders: Mapping[Source, Path]
-) -> Iterator[tuple[KeyPath, Path, str]]:
-    """Yield each model file of an object: its keys, the folder of the file that names it, and its path."""
+) -> tuple[CellConfig, list[Finding]]:
+    """Return the cell with absolute paths of existing model files, and errors about outside model files.
+
+    A path is relative to the folder of the cell file or base that contains the path.
+    """
     assert file.root is not None
-    for label, kind in config.objects.items():
-        for key, model in (("urdf", kind.urdf), ("mesh", kind.mesh)):
-            if model:
-                keys = ("objects", label, key)
-                yield keys, folders.get(find_span(file.root, keys).source, folders[file.source]), model
-
-
-def _resolve_model_files(config: CellConfig, model_files: Iterable[tuple[KeyPath, Path, str]]) -> CellConfig:
-    """Return the cell with absolute paths of the model files that exist; other paths are unchanged."""
-    objects = dict(config.objects)
-    for (_, label, key), folder, model in model_files:
-        if os.path.isfile(path := folder / model):
-            kind = objects[str(label)]
-            objects[str(label)] = kind.model_copy(update={str(key): str(path.resolve())})
-    return config.model_copy(update={"objects": objects})
-
-
-def _find_model_files_outside(
-    file: CellFile, model_files: Iterable[tuple[KeyPath, Path, str]]
-) -> Iterator[Finding]:
-    """Yield an error for each model file outside the folder of the file that names it."""
-    for keys, folder, model in model_files:
-        if is_outside_path(model):
-            yield file.make_error(keys, "outside", f'"{model}" must be a relative path without ".."')
-        elif os.path.isfile(folder / model) and has_outside_link(folder, model):
-            yield file.make_error(keys, "outside", f'"{model}" is a link to a file outside {folder}')
+    objects, errors = dict(config.objects), []
+    for label, model in config.objects.items():
+        for key, path in (("urdf", model.urdf), ("mesh", model.mesh)):
+            keys = ("objects", label, key)
+            folder = folders.get(find_span(file.root, keys).source, folders[file.source])
+            if path and is_outside_path(path):
+                message = f'"{path}" must be a relative path without ".."'
+                errors.append(file.make_error(keys, "outside", message))
+            elif path and os.path.isfile(folder / path):
+                objects[label] = objects[label].model_copy(update={key: str((folder / path).resolve())})
+                if has_outside_link(folder, path):
+                    message = f'"{path}" is a link to a file outside {folder}'
+                    errors.append(file.make_error(keys, "outside", message))
+    return config.model_copy(update={"objects": objects}), errors

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from executive.mission.model.nodes import InnerNode, KeyValue, Node, SectionNode, UnknownNode, list_nodes
@@ -38,6 +37,12 @@ def find_shorthand_key(owner: KeyClass) -> Key | None:
     return next((key for key in owner.keys.values() if key.is_shorthand), None)
 
 
+def has_optional_body(node_class: KeyClass) -> bool:
+    """Return True if the keyword of a node may stand alone, without a value."""
+    shorthand_key = find_shorthand_key(node_class)
+    return shorthand_key is not None and not shorthand_key.is_required
+
+
 def find_inner_keys(owner: KeyClass) -> Mapping[str, Key]:
     """Return the keys of the mapping below a keyword; no keys if the value must not be a mapping."""
     inner_keys = {name: key for name, key in owner.keys.items() if not key.is_sibling}
@@ -49,36 +54,23 @@ def find_sibling_keys(owner: KeyClass) -> Mapping[str, Key]:
     return {name: key for name, key in owner.keys.items() if key.is_sibling}
 
 
-@dataclass(frozen=True)
-class ControlEntry:
-    """A control node in the YAML tree.
+def read_control_node(
+    parser: NodeParser, mapping: YamlMapping, entry: YamlEntry, label: str, node_class: type[ControlNode]
+) -> Node:
+    """Return the control node of a mapping, or an unknown node if the children or a variable are invalid.
 
-    Attributes:
-        mapping: Mapping that contains the keyword and its sibling keys.
-        keyword: Keyword of the control node.
-        span: Position of the keyword.
-        label: Value of `as`, or "".
-        value: Value of the keyword.
+    `entry` is the entry of the mapping with the keyword; the other entries have sibling keys.
     """
-
-    mapping: YamlMapping
-    keyword: str
-    span: Span
-    label: str
-    value: YamlNode
-
-
-def read_control_node(parser: NodeParser, entry: ControlEntry, node_class: type[ControlNode]) -> Node:
-    """Return the control node of an entry, or an unknown node if the children or a variable are invalid."""
     key_reader = _KeyReader(parser)
-    keyword, span, sibling_keys = entry.keyword, entry.span, find_sibling_keys(node_class)
+    keyword, span, sibling_keys = entry.key.text, entry.key.span, find_sibling_keys(node_class)
     values = key_reader.read_inner_keys(keyword, span, entry.value, node_class)
-    siblings = MappingReader(keyword, span, entry.mapping, entry.mapping.keys, parser.findings)
+    siblings = MappingReader(keyword, span, mapping, mapping.keys, parser.findings)
     for name, key in sibling_keys.items():
         if (value := siblings.get(name)) is not None:
             key_reader.read_key(siblings, key, value, value.span, values)
     any_of = node_class.any_of
-    if key_reader.is_mapping_valid and any_of and not any(_has_key(entry, name) for name in any_of):
+    given_keys = {*mapping.keys, *(entry.value.keys if isinstance(entry.value, YamlMapping) else ())}
+    if key_reader.is_mapping_valid and any_of and given_keys.isdisjoint(any_of):
         level = f" at the level of {keyword}" if set(any_of) <= set(sibling_keys) else ""
         alternatives = " or ".join(f'"{name}"' for name in any_of)
         parser.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
@@ -87,21 +79,15 @@ def read_control_node(parser: NodeParser, entry: ControlEntry, node_class: type[
         return make_unknown_node(span)
     if missing & {KeyKind.VARIABLE, KeyKind.ELEMENTS}:
         children = [node for value in values.values() for node in list_nodes(value)]
-        return UnknownNode(span, entry.label, tuple(children))
-    return InnerNode(span, entry.label, node_class, values)
-
-
-def _has_key(entry: ControlEntry, key: str) -> bool:
-    """Return True if a key is written below the keyword or at the level of the keyword."""
-    mappings = (entry.value, entry.mapping)
-    return any(isinstance(node, YamlMapping) and key in node.keys for node in mappings)
+        return UnknownNode(span, label, tuple(children))
+    return InnerNode(span, label, node_class, values)
 
 
 class _KeyReader:
     """Reader of the keys of one control node.
 
     Attributes:
-        is_mapping_valid: False if the value of the node or of a section is no mapping, but must be a mapping.
+        is_mapping_valid: False if the node or a section has another value where a mapping is required.
     """
 
     def __init__(self, parser: NodeParser) -> None:
@@ -109,17 +95,18 @@ class _KeyReader:
         self.is_mapping_valid = True
 
     def read_inner_keys(self, name: str, span: Span, value: YamlNode, owner: KeyClass) -> dict[str, KeyValue]:
-        """Return the values of the keys of `owner` in `value`, which is the value of the key `name`."""
+        """Return the values of the keys of `owner`; `value` is the YAML node below the keyword `name`."""
         values: dict[str, KeyValue] = {}
-        shorthand, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
-        is_list_required = shorthand is not None and shorthand.kind is KeyKind.NODES
-        # A mapping contains the inner keys, even if a node, which can be a mapping, may follow the keyword.
-        is_short = isinstance(value, YamlSequence) or not (is_list_required or isinstance(value, YamlMapping))
-        if shorthand is not None and (is_short or not inner_keys):
-            # The value is read like the value of the omitted key.
-            complete = YamlMapping(span, (YamlEntry(YamlScalar(span, name, shorthand.name), value),))
-            reader = MappingReader(name, span, complete, [shorthand.name], self.parser.findings)
-            self.read_key(reader, shorthand, value, span, values)
+        shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
+        is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
+        # A mapping is read as inner keys, although it could also be a node as the value of the shorthand key.
+        is_wrong_list = is_list_required and isinstance(value, YamlScalar)
+        has_inner_keys = isinstance(value, YamlMapping) or is_wrong_list
+        if shorthand_key is not None and not (has_inner_keys and inner_keys):
+            key_node = YamlScalar(span, name, shorthand_key.name)
+            explicit_mapping = YamlMapping(span, (YamlEntry(key_node, value),))
+            reader = MappingReader(name, span, explicit_mapping, [shorthand_key.name], self.parser.findings)
+            self.read_key(reader, shorthand_key, value, span, values)
             return values
         reader = MappingReader(name, span, value, inner_keys, self.parser.findings)
         self.is_mapping_valid = self.is_mapping_valid and reader.is_mapping
@@ -166,7 +153,7 @@ class _KeyReader:
         return nodes or None
 
     def _read_variable(self, reader: MappingReader, key: str) -> LocatedName | None:
-        """Return the variable that a key names; a wrong `$` before the name is an error, but is ignored."""
+        """Return the output variable of a key; for `$name`, add an error and return the variable `name`."""
         variable = LocatedName(reader.read_text(key), reader.get_value_span(key))
         if NAME_PATTERN.fullmatch(variable.name):
             return variable

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import GrammarKey
-from executive.mission.model.mission import Argument, Library, Mission, Route, Subtree
+from executive.mission.model.mission import Argument, Mission, Route, Subtree
 from executive.mission.model.values import LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
 from executive.mission.parse.node_parser import NodeParser
@@ -21,7 +21,7 @@ _MISSION_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
 def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodeParser) -> Mission:
-    """Return the content of a mission file without invalid parts; add errors to the findings of `parser`."""
+    """Return the valid content of a mission file; add errors to the findings of `parser`."""
     reader = _make_file_reader("the mission", root, grammar.MISSION_KEYS, parser)
     tree = reader.get("tree")
     return Mission(
@@ -41,7 +41,7 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
 def _make_file_reader(
     owner: str, root: YamlNode, keys: Mapping[str, GrammarKey], parser: NodeParser
 ) -> MappingReader:
-    """Return the reader of the mapping `root` of a file, after errors about missing keys."""
+    """Return the reader of a file with the mapping `root`; add errors about missing keys."""
     reader = MappingReader(owner, replace(root.span, length=1), root, keys, parser.findings)
     for name, key in keys.items():
         if key.is_required:
@@ -80,7 +80,7 @@ def _read_routes(reader: MappingReader) -> tuple[Route, ...]:
 
 
 def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> tuple[LocatedName, ...]:
-    """Return the texts in a list; for each other item, add an error whose message begins with `rule`."""
+    """Return the texts in a list; for each item of another type, add an error that begins with `rule`."""
     names = []
     for item in items:
         if isinstance(item, YamlScalar) and isinstance(item.value, str):
@@ -90,11 +90,10 @@ def _read_names(reader: MappingReader, items: Iterable[YamlNode], rule: str) -> 
     return tuple(names)
 
 
-def parse_library(root: YamlNode, parser: NodeParser) -> Library:
-    """Return the content of a library file without invalid parts; add errors to the findings of `parser`."""
+def parse_library(root: YamlNode, parser: NodeParser) -> dict[str, Subtree]:
+    """Return the valid subtrees of a library file by name; add errors to the findings of `parser`."""
     reader = _make_file_reader("the library", root, grammar.LIBRARY_KEYS, parser)
-    name = reader.read_text("library")
-    return Library(name, _read_subtrees(reader, parser, name or "library"))
+    return _read_subtrees(reader, parser, reader.read_text("library") or "library")
 
 
 def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "") -> dict[str, Subtree]:

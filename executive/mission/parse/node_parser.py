@@ -10,10 +10,9 @@ from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, UnknownNode, UseNode
 from executive.mission.parse.control import (
-    ControlEntry,
     find_inner_keys,
-    find_shorthand_key,
     find_sibling_keys,
+    has_optional_body,
     make_unknown_node,
     read_control_node,
 )
@@ -37,10 +36,7 @@ _SKILL_PATTERN = re.compile(r"[A-Z][A-Za-z0-9]*")
 
 
 class NodeParser:
-    """Parser of the nodes in a mission and its libraries, which adds errors to `findings`.
-
-    An invalid node becomes an unknown node, so that parsing continues.
-    """
+    """Parser of nodes, which adds errors to `findings` and replaces an invalid node by an unknown node."""
 
     def __init__(self, findings: list[Finding], skills: Skills, node_classes: ControlNodes) -> None:
         self.findings, self._skills, self._node_classes = findings, skills, node_classes
@@ -87,8 +83,7 @@ class NodeParser:
     def _read_word(self, node: YamlScalar) -> Node:
         word = node.text
         node_class = self._node_classes.get(word)
-        shorthand = find_shorthand_key(node_class) if node_class is not None else None
-        if node_class is not None and shorthand is not None and not shorthand.is_required:
+        if node_class is not None and has_optional_body(node_class):
             return InnerNode(node.span, "", node_class, {})
         if isinstance(node.value, str) and _SKILL_PATTERN.fullmatch(word):
             return SkillNode(node.span, "", word, {})
@@ -144,8 +139,7 @@ class NodeParser:
         if name == grammar.USE_KEYWORD:
             return self._read_use(node, entry, label)
         if name in self._node_classes:
-            control_entry = ControlEntry(node, name, entry.key.span, label, entry.value)
-            return read_control_node(self, control_entry, self._node_classes[name])
+            return read_control_node(self, node, entry, label, self._node_classes[name])
         params = self._skills[name].params if name in self._skills else {}
         settings = read_settings(entry.value, name, self.findings, next(iter(params), "name"))
         return SkillNode(entry.key.span, label, name, settings)

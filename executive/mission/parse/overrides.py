@@ -20,10 +20,7 @@ def make_override_source(key: str, value: str) -> Source:
 
 
 def parse_override(key: str, value: str, is_text: bool = False) -> tuple[YamlNode | None, list[Finding]]:
-    """Return the YAML node of an override, or None after an error, and the findings.
-
-    If `is_text` is True, the value is a text, not YAML.
-    """
+    """Return the YAML node of an override, or None after an error, and the findings."""
     source = make_override_source(key, value)
     span = source.make_span(1, len(key) + 2, max(1, len(value)))
     if is_text:

@@ -106,13 +106,16 @@ def _add_library(
     parser.findings += yaml_findings
     if root is None:
         return None
-    for name, subtree in parse_library(root, parser).subtrees.items():
-        first = subtrees.setdefault(name, subtree)
-        if first is subtree:
+    for name, subtree in parse_library(root, parser).items():
+        first_subtree = subtrees.setdefault(name, subtree)
+        if first_subtree is subtree:
             continue
-        # The error is in the mission file: at the subtree with the same name, or at the path of the library.
-        span, other_span = (reference.span, first.span) if first.library else (first.span, subtree.span)
+        # The error is in the mission file: at the subtree with the name, or at the path of the library.
+        if first_subtree.library:
+            span, other_span = reference.span, first_subtree.span
+            hint = "Delete one of the libraries from the list."
+        else:
+            span, other_span, hint = first_subtree.span, subtree.span, "Rename one of them."
         message = f'there are two subtrees "{name}"; the other is in {other_span.describe_place(span.source)}'
-        hint = "Delete one of the libraries from the list." if first.library else "Rename one of them."
         parser.add_error(span, "duplicate-tree", message, hint)
     return source.text

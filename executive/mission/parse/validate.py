@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from types import NoneType
-from typing import Generic, TypeVar, get_args, get_origin
+from typing import TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -25,6 +24,7 @@ from executive.mission.text.yaml_text import (
 )
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
+"""Type of the content of a file."""
 
 _CODES_BY_ERROR_TYPE = {
     "value_error": "wrong-value",
@@ -38,26 +38,20 @@ KeyPath = tuple[str | int, ...]
 """Keys and list indices from the root of a file to a value."""
 
 
-@dataclass(frozen=True)
-class ValidationResult(Generic[ModelT]):
-    """Validated content of a file, or None if the findings contain errors."""
+def validate(root: YamlNode, model: type[ModelT]) -> tuple[ModelT | None, list[Finding]]:
+    """Return the content of a file as an instance of `model`, or None and the errors.
 
-    model: ModelT | None
-    findings: tuple[Finding, ...]
-
-
-def validate(root: YamlNode, model: type[ModelT]) -> ValidationResult[ModelT]:
-    """Return the content of a file as an instance of `model`, without conversions except integer to float."""
+    The only type conversion is from integer to float.
+    """
     findings = list(_find_infinite_numbers(root))
     if findings:
-        return ValidationResult(None, tuple(findings))
+        return None, findings
     try:
         # In strict mode, pydantic converts lists to tuples and integers to floats only from JSON.
         content = model.model_validate_json(json.dumps(to_python_value(root)), strict=True)
     except ValidationError as error:
-        errors = error.errors(include_url=False)
-        return ValidationResult(None, tuple(_make_finding(root, model, each) for each in errors))
-    return ValidationResult(content, ())
+        return None, [_make_finding(root, model, details) for details in error.errors(include_url=False)]
+    return content, []
 
 
 def find_span(root: YamlNode, path: KeyPath, at_key: bool = False) -> Span:
@@ -66,12 +60,12 @@ def find_span(root: YamlNode, path: KeyPath, at_key: bool = False) -> Span:
     For a list or mapping, and if `at_key` is True, the position is that of the key.
     """
     node, span = root, root.span
-    for step in path:
-        if isinstance(node, YamlMapping) and (entry := node.get_entry(str(step))):
+    for key in path:
+        if isinstance(node, YamlMapping) and (entry := node.get_entry(str(key))):
             node = entry.value
             span = node.span if isinstance(node, YamlScalar) and not at_key else entry.key.span
-        elif isinstance(node, YamlSequence) and isinstance(step, int) and step < len(node.items):
-            node = node.items[step]
+        elif isinstance(node, YamlSequence) and isinstance(key, int) and key < len(node.items):
+            node = node.items[key]
             span = node.span
         else:
             break
@@ -80,8 +74,7 @@ def find_span(root: YamlNode, path: KeyPath, at_key: bool = False) -> Span:
 
 def join_keys(path: KeyPath) -> str:
     """Return a path as a text: `bins.red.size[0]` for `("bins", "red", "size", 0)`."""
-    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
-    return text.removeprefix(".")
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path).removeprefix(".")
 
 
 def _make_finding(root: YamlNode, model: type[BaseModel], error: ErrorDetails) -> Finding:
@@ -111,9 +104,9 @@ def _make_finding(root: YamlNode, model: type[BaseModel], error: ErrorDetails) -
 def _find_type(model: object, path: KeyPath) -> object:
     """Return the declared type of the value at `path`, or None if it is unknown."""
     declared: object = model
-    for step in path:
+    for key in path:
         if isinstance(declared, type) and issubclass(declared, BaseModel):
-            field = declared.model_fields.get(str(step))
+            field = declared.model_fields.get(str(key))
             declared = _remove_none(field.annotation) if field else None
         elif get_origin(declared) is dict:
             declared = get_args(declared)[1]

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import GrammarKey
-from executive.mission.parse.control import find_inner_keys, find_shorthand_key
+from executive.mission.parse.control import find_inner_keys, find_shorthand_key, has_optional_body
 from executive.mission.parse.mapping_reader import NAME_PATTERN
 from executive.mission.parse.params import PARAM_TYPES
 from executive.mission.schema.types import (
@@ -29,18 +29,16 @@ from executive.tree.node_registry import ControlNodes
 Skills: TypeAlias = Mapping[str, type[Skill]]
 
 _NAME = NAME_PATTERN.pattern
+"""Regular expression of a name, for use in longer expressions."""
 
 
 def make_mission_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
-    """Return the schema of a mission file that may use these skills and control nodes.
-
-    Its definition `library` is the schema of a library file.
-    """
+    """Return the schema of a mission file; its definition `library` is the schema of a library file."""
     return _make_file_schema("A mission", grammar.MISSION_KEYS, skills, node_classes)
 
 
 def make_library_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
-    """Return the schema of a library file whose subtrees may use these skills and control nodes."""
+    """Return the schema of a library file."""
     return _make_file_schema("A library", grammar.LIBRARY_KEYS, skills, node_classes)
 
 
@@ -70,25 +68,24 @@ def _make_file_schema(
 
 
 def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
-    """Return the schema of a node: a word, a list, or a mapping with one head and its sibling keys.
+    """Return the schema of a node: a name, a list, or a mapping with one name (skill or keyword) as a key.
 
-    The head is the skill or keyword. It selects the schema of the mapping by `dependencies`: unlike with
-    alternatives, an editor can then mark each invalid key and complete the valid keys.
+    The name selects the schema of the other keys by `dependencies`, because editors mark invalid keys and
+    complete valid keys in `dependencies`, but not in alternatives.
     """
     label: Schema = {**_make_reference("label"), "description": grammar.LABEL_KEY.doc}
-    heads = [*skills, *node_classes, grammar.USE_KEYWORD]
+    names = [*skills, *node_classes, grammar.USE_KEYWORD]
     nodes_without_body = [
         {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ARRAY_ITEM}
         for word, node_class in node_classes.items()
-        if (shorthand := find_shorthand_key(node_class)) is not None and not shorthand.is_required
+        if has_optional_body(node_class)
     ]
     siblings: dict[str, Schema] = {grammar.USE_KEYWORD: _make_properties(grammar.USE_SIBLINGS)}
     requirements: dict[str, Schema] = {}
     for word, node_class in node_classes.items():
         keys = {name: key for name, key in node_class.keys.items() if key.is_sibling}
         siblings[word] = {name: _make_key_schema(key) for name, key in keys.items()}
-        any_of = node_class.any_of
-        requirements[word] = _require_any_of(any_of) if set(any_of) & set(keys) else {}
+        requirements[word] = _require_any_of(node_class.any_of) if set(node_class.any_of) & set(keys) else {}
     return {
         "title": "A node",
         "anyOf": [
@@ -99,16 +96,16 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
         ],
         "minItems": 1,
         "dependencies": {
-            head: {
-                "properties": {head: _make_reference(head), "as": label, **siblings.get(head, {})},
+            name: {
+                "properties": {name: _make_reference(name), "as": label, **siblings.get(name, {})},
                 "additionalProperties": False,
-                **requirements.get(head, {}),
+                **requirements.get(name, {}),
             }
-            for head in heads
+            for name in names
         },
-        "if": {"anyOf": [{"required": [head]} for head in heads]},
+        "if": {"anyOf": [{"required": [name]} for name in names]},
         "else": {
-            "properties": {**{head: _make_reference(head) for head in heads}, "as": label},
+            "properties": {**{name: _make_reference(name) for name in names}, "as": label},
             "additionalProperties": False,
             "minProperties": 1,
             "dependencies": {"as": {"minProperties": 2}},
@@ -129,7 +126,6 @@ def _make_control_node_schema(node_class: type[ControlNode]) -> Schema:
 
 
 def _get_first_line(node_class: type[ControlNode]) -> str:
-    """Return the first line of the docstring of a control node."""
     return (inspect.getdoc(node_class) or "").partition("\n")[0]
 
 
@@ -213,21 +209,23 @@ def _make_reference(name: str) -> Schema:
     return {"$ref": f"#/definitions/{name}"}
 
 
-def _map_names_to(value: Schema) -> Schema:
+def _map_names(value_schema: Schema) -> Schema:
     """Return the schema of a mapping from names to values."""
     return {
         "type": ["object", "null"],
-        "patternProperties": {f"^{_NAME}$": value},
+        "patternProperties": {f"^{_NAME}$": value_schema},
         "additionalProperties": False,
     }
 
 
-def _allow_list(text: Schema) -> Schema:
-    """Return the schema of a text with the schema `text`, or of a list of such texts."""
-    return {**text, "type": ["string", "array"], "items": {"type": "string", **text}, "minItems": 1}
+def _allow_list(text_schema: Schema) -> Schema:
+    """Return the schema of a text or of a list of texts; `text_schema` applies to each text."""
+    items = {"type": "string", **text_schema}
+    return {**text_schema, "type": ["string", "array"], "items": items, "minItems": 1}
 
 
 _WORD: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
+"""Schema of a name that may contain hyphens."""
 
 _SCHEMAS_BY_KIND: Mapping[str, Schema] = {
     "node": _make_reference("node"),
@@ -238,12 +236,12 @@ _SCHEMAS_BY_KIND: Mapping[str, Schema] = {
     "words": {**_allow_list({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
     "list": allow_reference({"type": "array"}),
     "value": {},
-    "values": _map_names_to({}),
-    "variables": _map_names_to(REFERENCE),
+    "values": _map_names({}),
+    "variables": _map_names(REFERENCE),
     "paths": _allow_list({}),
-    "params": _map_names_to(_make_reference("param")),
+    "params": _map_names(_make_reference("param")),
     "routes": {"type": ["object", "null"], "additionalProperties": _allow_list({})},
-    "trees": _map_names_to(_make_reference("tree")),
-    "args": {**_map_names_to({}), "type": ["object", "array", "null"], "items": {"type": "string", **_WORD}},
+    "trees": _map_names(_make_reference("tree")),
+    "args": {**_map_names({}), "type": ["object", "array", "null"], "items": {"type": "string", **_WORD}},
 }
 """Schema of the value of a key, by `GrammarKey.kind`."""

@@ -15,10 +15,10 @@ from executive.mission.model.conversion import is_plain_type
 from executive.skill import Direction, Param, Port, Skill
 
 Schema: TypeAlias = JsonSchemaValue
-"""A JSON Schema, or a part of one."""
+"""A JSON Schema or a subschema."""
 
 NO_ARRAY_ITEM: Schema = {"allOf": [True]}
-"""Allows every value; prevents that yaml-language-server offers "- (array item)" for an alternative."""
+"""Subschema that allows every value, but stops the suggestion "- (array item)" of yaml-language-server."""
 
 REFERENCE: Schema = {"$ref": "#/definitions/reference"}
 """Schema of a reference `$name`."""
@@ -57,10 +57,7 @@ def make_type_schema(declared: object) -> Schema:
 
 
 def make_cell_schema() -> Schema:
-    """Return the schema of a cell file.
-
-    With a `base`, no other key is required, and a detector may be empty or lack its `kind`.
-    """
+    """Return the schema of a cell file; with a `base`, other keys, detectors and their kinds are optional."""
     cell = CellConfig.model_json_schema(schema_generator=Draft07, ref_template="#/definitions/{model}")
     sections, required = cell.pop("$defs"), cell.pop("required")
     detector = sections["DetectorConfig"]
@@ -112,18 +109,19 @@ def list_failures(skills: Mapping[str, type[Skill]]) -> list[str]:
 
 
 def _document_skill(skill: type[Skill]) -> Schema:
-    """Return the descriptions of a skill that an editor shows: its docstring, ports and reasons."""
+    """Return the description of a skill for editors, with its docstring, ports and reasons."""
     docstring = inspect.getdoc(skill) or ""
-    names_by_verb = {
+    names_by_relation = {
         "reads": [port.name for port in skill.ports.values() if port.direction is Direction.IN],
         "writes": [port.name for port in skill.ports.values() if port.direction is Direction.OUT],
         "may fail with": skill.reasons,
     }
-    facts = [
-        (verb, ", ".join(f"`{name}`" for name in names)) for verb, names in names_by_verb.items() if names
+    list_items = [
+        f"* {relation} " + ", ".join(f"`{name}`" for name in names)
+        for relation, names in names_by_relation.items()
+        if names
     ]
-    items = [f"* {verb} {listed}" for verb, listed in facts]
-    markdown = "\n\n".join(part for part in (docstring, "\n".join(items)) if part)
+    markdown = "\n\n".join(part for part in (docstring, "\n".join(list_items)) if part)
     return {"description": docstring.partition("\n")[0], "markdownDescription": markdown}
 
 
@@ -132,7 +130,7 @@ def _make_param_schema(param: Param) -> Schema:
     bounds = {"minimum": param.ge, "maximum": param.le}
     schema |= {key: bound for key, bound in bounds.items() if bound is not None}
     if param.choices is not None:
-        # A param for names in the cell accepts other values than its choices.
+        # A param for a name in the cell accepts the names in the cell file and the choices.
         schema["examples" if param.refers else "enum"] = list(param.choices)
     if not param.is_required:
         schema["default"] = to_jsonable_python(param.default)

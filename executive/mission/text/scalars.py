@@ -1,7 +1,4 @@
-"""Values of plain YAML scalars by the core schema of YAML 1.2.2 (section 10.3.2).
-
-PyYAML implements YAML 1.1, in which `no` is false, `1e-3` a text, `12:30` the number 750 and `010` eight.
-"""
+"""Values of plain YAML scalars by the core schema of YAML 1.2.2; in YAML 1.1 (PyYAML), `no` is false."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Parser of YAML text to a tree of nodes with their positions in the text.
 
-The parser supports mappings with text keys, sequences and scalars of YAML 1.2. It rejects tags and merge keys
-and limits the size of the tree, so that a file can neither execute code nor exhaust the memory.
-The node of an alias has the position of its anchor.
+The parser rejects tags and merge keys and limits the size of the tree, so that a file can neither execute
+code nor exhaust the memory. The node of an alias has the position of the anchor.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from executive.mission.text.scalars import ScalarValue, convert_scalar
 _MAX_DEPTH = 50
 """Maximum depth of the nesting of lists and mappings."""
 _SURROGATE = re.compile("[\ud800-\udfff]")
-"""Half of a character in UTF-16, which UTF-8 cannot encode."""
+"""Half of a UTF-16 character, which an escape sequence can produce, but UTF-8 cannot encode."""
 _MAX_NODE_COUNT = 20_000
-"""Maximum number of keys and values; the keys and values of an anchor count once more for each alias."""
+"""Maximum number of keys and values, in which each alias counts like a copy of its anchor."""
 _ADVICE_BY_MESSAGE = {
     "mapping values are not allowed here": (
         "Is a colon missing at the end of the line above, or are braces, as in Detect: {view: full}? "
@@ -36,7 +35,7 @@ _ADVICE_BY_MESSAGE = {
 }
 """Advice on syntax errors, by the start of PyYAML's message."""
 _DEPTH_MESSAGE = f"lists and mappings are nested more than {_MAX_DEPTH} levels deep"
-"""Message for a nesting deeper than `_MAX_DEPTH`."""
+"""Message of a finding about the depth."""
 _LINE_LENGTH = 1000
 """Length of a span [characters] that reaches the end of the line."""
 
@@ -135,18 +134,18 @@ def parse_yaml(source: Source) -> tuple[YamlNode | None, list[Finding]]:
 
 
 class _IncompleteTree(Exception):
-    """An error, which the findings contain, prevents a complete tree."""
+    """The tree is incomplete because of an error in the findings."""
 
 
 class _Composer:
-    """Composes the tree of nodes from PyYAML's events, and collects findings."""
+    """Composer of the tree of nodes from PyYAML's events, which collects findings."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
         self.findings: list[Finding] = []
         # Unlike the parser of libyaml, the Python parser has the same messages in every installation.
         self._events: Iterator[yaml.Event] = yaml.parse(source.text, Loader=yaml.SafeLoader)
-        # For each anchor: its node, and the number of keys and values in the node.
+        # Node of each anchor, and number of keys and values in the node.
         self._anchors: dict[str, tuple[YamlNode, int]] = {}
         self._node_count = 0
 
@@ -189,11 +188,7 @@ class _Composer:
         return node
 
     def _count_nodes(self, count: int, event: yaml.Event) -> None:
-        """Add to the number of keys and values.
-
-        Raises:
-            _IncompleteTree: The file has more than `_MAX_NODE_COUNT` keys and values.
-        """
+        """Add to the number of keys and values; raise `_IncompleteTree` above `_MAX_NODE_COUNT`."""
         self._node_count += count
         if self._node_count > _MAX_NODE_COUNT:
             message = f"the file has more than {_MAX_NODE_COUNT} keys and values, including those of aliases"
@@ -214,7 +209,6 @@ class _Composer:
     def _read_scalar(self, event: yaml.ScalarEvent) -> YamlScalar:
         text, span = event.value, self._make_span(event)
         if _SURROGATE.search(text):
-            # An escape sequence can produce a surrogate, which cannot be encoded in UTF-8.
             self._add_error(span, "yaml", "a surrogate (U+D800 to U+DFFF) is no character")
             text = _SURROGATE.sub("?", text)
         return YamlScalar(span, convert_scalar(text) if event.implicit[0] else text, text)
