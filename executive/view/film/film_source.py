@@ -15,11 +15,8 @@ from executive.replay.input_log import InputLog
 class FilmSource:
     """Record of a run in a simulated cell, as the source of a film.
 
-    Args:
-        directory: The run directory.
-
     Attributes:
-        directory: The run directory.
+        directory: Run directory.
         events: Events of the journal in order, without the events that a resumption discarded.
         start: Event of the start of the run.
         nodes: Nodes of the tree.
@@ -50,11 +47,7 @@ class FilmSource:
 
 
 def _require_world_log(directory: RunDirectory) -> None:
-    """Check that the record contains the log of a simulated world, `world.log`.
-
-    Raises:
-        InputError: The log is missing, or the cell is not simulated.
-    """
+    """Raise an InputError if the record does not contain the log of a simulated world."""
     if not directory.world_log.exists():
         raise InputError(
             f'the run in "{directory.path}" cannot be filmed: it has no world.log, from which its world is '

@@ -97,11 +97,7 @@ GIF = FilmFormat(".gif", 10.0, 2.0, write_gif)
 
 
 def choose_format(file: Path | None, is_gif: bool) -> FilmFormat:
-    """Return the file format of a film.
-
-    Args:
-        file: File of the film, from the command line, or None.
-        is_gif: True if the user requested a GIF.
+    """Return the format that the suffix of a file requires; without a file, GIF if `is_gif`, else MP4.
 
     Raises:
         InputError: The suffix of the file is unknown or contradicts `is_gif`.

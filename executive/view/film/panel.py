@@ -39,14 +39,7 @@ _SWATCH_SIZE = 9
 
 
 def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state: FilmRunState) -> None:
-    """Draw the active nodes of a run and their children, one per row.
-
-    Args:
-        image: Image to draw on.
-        box: Left, top, right and bottom of the region to draw in [pixel].
-        nodes: Nodes of the whole tree.
-        state: State of the run, with the active nodes.
-    """
+    """Draw the active nodes of a run and their children, one per row, in the region `box` of an image."""
     left, top, right, bottom = box
     shown_nodes = select_nodes(nodes, state, int((bottom - top) // NODE_ROW_HEIGHT))
     draw, font = ImageDraw.Draw(image), style.load_font(TEXT_SIZE)
@@ -94,13 +87,9 @@ def compute_items_height(item_count: int) -> int:
 def draw_items(
     image: Image.Image, box: Box, items: Sequence[ItemChanged], bin_colours: Mapping[str, str]
 ) -> None:
-    """Draw at most `MAX_ITEM_ROWS` items, one per row; items in a final state are omitted first.
+    """Draw at most `MAX_ITEM_ROWS` items, one per row, in the region `box` of an image.
 
-    Args:
-        image: Image to draw on.
-        box: Left, top, right and bottom of the region to draw in [pixel].
-        items: Last change of each item.
-        bin_colours: Colour of each bin, by the name of the bin.
+    `items` contains the last change of each item, `bin_colours` the colour of each bin by name.
     """
     left, top, right, _ = box
     draw = ImageDraw.Draw(image)

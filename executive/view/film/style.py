@@ -60,11 +60,7 @@ def wrap_text(text: str, font_size: float, max_width: float, max_lines: int) -> 
 def draw_mark(image: Image.Image, status: str, centre: tuple[float, float], size: int) -> None:
     """Draw a status mark: a triangle for RUNNING, a check mark for SUCCESS, a cross for FAILURE, else a dot.
 
-    Args:
-        image: Image to draw on.
-        status: Status of a node, or "" for a node that never ran.
-        centre: Centre of the mark [pixel].
-        size: Width and height of the mark [pixel].
+    `centre` is the position of the mark, `size` the width and height of the mark [pixel].
     """
     left, top = round(centre[0] - size / 2), round(centre[1] - size / 2)
     box = (left, top, left + size, top + size)

@@ -1,4 +1,4 @@
-"""Three-dimensional scene of the cell: a viser server on a Unix socket, which browsers cannot open."""
+"""Three-dimensional scene of the cell: a viser server behind a Unix socket."""
 
 from __future__ import annotations
 
@@ -21,21 +21,19 @@ BACKGROUND = (243, 245, 248)
 
 
 class LiveScene:
-    """A viser server that shows shapes, some of which are attached to moving bodies.
+    """Viser server that shows fixed shapes and shapes on moving bodies.
 
-    Args:
-        path: Unix socket of the server; no other socket is opened, because viser does not check who connects.
-        shapes: The shapes, which are attached to a body or fixed in the world.
+    The server opens only the Unix socket `socket_path`, because viser has no access control.
     """
 
-    def __init__(self, path: Path, shapes: Sequence[Shape]) -> None:
-        with _serve_on_unix_socket(path):
+    def __init__(self, socket_path: Path, shapes: Sequence[Shape]) -> None:
+        with _serve_on_unix_socket(socket_path):
             self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         self._bodies: dict[str, viser.FrameHandle] = {}
         scene = self._server.scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
-        # Shadows and reflections are off, because they are slow in browsers without a graphics card.
+        # Browsers without a graphics card draw shadows and reflections slowly.
         scene.configure_default_lights(cast_shadow=False)
         scene.configure_environment_map(None)
         scene.add_light_ambient("/light", intensity=1.6)
@@ -43,13 +41,11 @@ class LiveScene:
         self._server.initial_camera.position = CAMERA_POSITION
         self._server.initial_camera.look_at = CAMERA_TARGET
         self._server.gui.configure_theme(control_width="small", show_logo=False, show_share_button=False)
-        # The control panel of viser is hidden: the page itself has the buttons.
+        # The page has its own buttons instead of the control panel of viser.
         self._server.gui.main_panel.minimize()
         for number, shape in enumerate(shapes):
             if shape.body and shape.body not in self._bodies:
-                self._bodies[shape.body] = self._server.scene.add_frame(
-                    _make_scene_path(shape.body), show_axes=False
-                )
+                self._bodies[shape.body] = scene.add_frame(_make_scene_path(shape.body), show_axes=False)
             parent = _make_scene_path(shape.body) if shape.body else "/fixed"
             self._add_shape(f"{parent}/{number}", shape)
 
@@ -64,35 +60,39 @@ class LiveScene:
                     frame.position, frame.wxyz = np.array(pose[:3]), np.array(pose[3:])
 
     def _add_shape(self, name: str, shape: Shape) -> None:
+        """Add a shape to the scene; the parent of the shape is the first part of its path `name`."""
         scene, colour = self._server.scene, shape.colour
-        pose: dict[str, Any] = {"position": shape.X_BS.position, "wxyz": np.roll(shape.X_BS.quaternion, 1)}
+        radius, height = shape.size[0] / 2, shape.size[2]
+        quaternion = np.roll(shape.X_BS.quaternion, 1)  # (x, y, z, w) becomes (w, x, y, z).
+        pose_arguments: dict[str, Any] = {"position": shape.X_BS.position, "wxyz": quaternion}
         if shape.kind == "box":
-            scene.add_box(name, color=colour, dimensions=shape.size, **pose)
+            scene.add_box(name, color=colour, dimensions=shape.size, **pose_arguments)
         elif shape.kind == "cylinder":
-            scene.add_cylinder(name, radius=shape.size[0] / 2, height=shape.size[2], color=colour, **pose)
+            scene.add_cylinder(name, radius=radius, height=height, color=colour, **pose_arguments)
         elif shape.kind == "sphere":
-            scene.add_icosphere(name, radius=shape.size[0] / 2, color=colour, **pose)
+            scene.add_icosphere(name, radius=radius, color=colour, **pose_arguments)
         else:
             mesh = trimesh.load_mesh(shape.file, process=False, skip_materials=True)
             vertices = np.asarray(mesh.vertices) * shape.size
-            scene.add_mesh_simple(name, vertices, np.asarray(mesh.faces), color=colour, **pose)
+            scene.add_mesh_simple(name, vertices, np.asarray(mesh.faces), color=colour, **pose_arguments)
 
 
 @contextlib.contextmanager
-def _serve_on_unix_socket(path: Path) -> Iterator[None]:
-    """Make viser servers created in this context listen on a Unix socket; viser has no option for this."""
-    serve = websockets.asyncio.server.serve
+def _serve_on_unix_socket(socket_path: Path) -> Iterator[None]:
+    """Make viser, which has no option for a Unix socket, listen on a Unix socket in this context."""
+    original_serve = websockets.asyncio.server.serve
 
     def serve_on_socket(handler: Any, host: Any, port: Any, **options: Any) -> Any:
         del host, port
-        return serve(handler, unix=True, path=str(path), **options)
+        return original_serve(handler, unix=True, path=str(socket_path), **options)
 
     websockets.asyncio.server.serve = serve_on_socket  # type: ignore[assignment, misc]
     try:
         yield
     finally:
-        websockets.asyncio.server.serve = serve  # type: ignore[misc]
+        websockets.asyncio.server.serve = original_serve  # type: ignore[misc]
 
 
 def _make_scene_path(body: str) -> str:
+    """Return the path of a body in the scene; spaces and slashes in its name are replaced."""
     return "/bodies/" + body.replace(" ", "_").replace("/", "_")

@@ -15,7 +15,7 @@ from executive.geometry import Pose
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """End of the run: status, message, run directory, and file of the report or ""."""
+    """Outcome of a run: status, message, run directory, and file of the report or ""."""
 
     status: str
     message: str
@@ -25,29 +25,29 @@ class RunOutcome:
 
 @dataclass(frozen=True)
 class PageChange:
-    """Change of the page that does not follow from an event; None for an unchanged value.
+    """Change of the page without an event of the run; unchanged values are None.
 
     Attributes:
         clock: Current time on the clock of the run [s].
         tree: Drawing of the tree as an SVG document.
-        paused: True if the run is paused.
-        note: Sentence about the record of the run.
-        result: End of the run.
+        is_paused: True if the run is paused.
+        note: Message about the record of the run.
+        result: Outcome of the run.
     """
 
     clock: float | None = None
     tree: str | None = None
-    paused: bool | None = None
+    is_paused: bool | None = None
     note: str | None = None
     result: RunOutcome | None = None
 
 
 @dataclass(frozen=True)
 class CameraImage:
-    """Frame without its depth image, and the event with the detections in the frame."""
+    """Frame without its depth image, and the event with the detections in this frame."""
 
     frame: Frame
-    look: FrameSearched
+    search: FrameSearched
 
 
 BodyPoses = Mapping[str, Sequence[float]]
@@ -56,7 +56,7 @@ BodyPoses = Mapping[str, Sequence[float]]
 
 @dataclass(frozen=True)
 class SceneChange:
-    """Change of the three-dimensional scene: all shapes at the start, later the poses of the bodies."""
+    """Change of the three-dimensional scene: either all shapes, or new poses of all bodies."""
 
     shapes: Sequence[Shape] | None = None
     body_poses: BodyPoses | None = None
@@ -68,24 +68,24 @@ Message = TimedEvent | PageChange | CameraImage | SceneChange
 
 @dataclass(frozen=True)
 class PageCommand:
-    """Command of a watcher (a browser that shows the page), or information about the watchers.
+    """Command of a browser that shows the page, or a report of the server about the browsers.
 
     Attributes:
         name: `pause`, `resume`, `step`, `stop`, `request`; `render_on_cpu` if the browser renders on the CPU;
-            `watchers` if the number of watchers changed.
+            `browsers` if the number of browsers changed.
         text: For `request`: the requested class, `rescan` or `quit`.
-        watcher_count: For `watchers`: number of watchers.
-        is_cpu_rendering: For `watchers`: True if a browser renders on the CPU, and so slows down the run.
+        browser_count: For `browsers`: number of browsers.
+        is_cpu_rendering: For `browsers`: True if a browser renders on the CPU, and so slows down the run.
     """
 
     name: str
     text: str = ""
-    watcher_count: int = 0
+    browser_count: int = 0
     is_cpu_rendering: bool = False
 
 
 def encode_poses(poses: Mapping[str, Pose]) -> BodyPoses:
-    """Return the poses of bodies by name as positions and quaternions."""
+    """Return positions [m] and quaternions of bodies by name; reorder (x, y, z, w) to (w, x, y, z)."""
     return {
         name: (*X_WB.position.tolist(), *np.roll(X_WB.quaternion, 1).tolist()) for name, X_WB in poses.items()
     }

@@ -7,10 +7,10 @@ const CLASS_COLOURS = ["#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#
 const SCROLL_PERIOD = 400; // minimum time between two scrolls of the tree [ms]
 const MAX_TARGET_DISTANCE = 0.03; // maximum distance between the target and its detection [m]
 
-const find = (id) => document.getElementById(id);
-const state = { nodes: {}, items: {}, paused: false, has_ended: false }; // all values that the server sent
-const groups = new Map(); // SVG group of each node by its path
-const classes = []; // object classes in the order of their first detection
+const getElement = (id) => document.getElementById(id);
+const state = { nodes: {}, items: {}, is_paused: false, has_ended: false }; // all values that the server sent
+const nodeGroups = new Map(); // SVG group of each node, by the path of the node
+const detectedClasses = []; // object classes in the order of their first detection
 let lastScrollTime = 0;
 
 const address = new URL("live", location.href);
@@ -24,8 +24,8 @@ socket.onclose = () => {
   if (!state.result) showRunStatus("failure", "connection lost");
   for (const button of document.querySelectorAll("button")) button.disabled = true;
 };
-find("whole").onchange = () => document.querySelector("#tree .scroll").classList.toggle("whole", find("whole").checked);
-for (const command of ["pause", "resume", "step", "stop"]) find(command).onclick = () => send({ name: command });
+getElement("whole").onchange = () => document.querySelector("#tree .scroll").classList.toggle("whole", getElement("whole").checked);
+for (const command of ["pause", "resume", "step", "stop"]) getElement(command).onclick = () => send({ name: command });
 
 function send(command) {
   if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
@@ -38,54 +38,54 @@ function rendersOnCpu() {
 }
 
 function applyChanges(changes) {
-  const { nodes, items, ...others } = changes;
-  Object.assign(state, others);
+  const { nodes, items, ...values } = changes;
+  Object.assign(state, values);
   if ("tree" in changes) showTree(changes.tree);
   for (const [path, node] of Object.entries(nodes ?? {})) {
     state.nodes[path] = node;
     showNodeStatus(path, node);
-    // Only failures of skills are shown, because control nodes only pass them on.
-    const group = groups.get(path);
+    // A failure of a control node only repeats the failure of a skill.
+    const group = nodeGroups.get(path);
     if (node.status === "failure" && node.failure && group?.classList.contains("skill")) {
-      find("message").textContent = `${path.split("/").pop().split(":").pop()}: ${node.failure}`;
+      getElement("message").textContent = `${path.split("/").pop().split(":").pop()}: ${node.failure}`;
     }
   }
   Object.assign(state.items, items);
   if ("run" in changes) {
-    find("mission").textContent = `${changes.run.mission}, seed ${changes.run.seed}`;
+    getElement("mission").textContent = `${changes.run.mission}, seed ${changes.run.seed}`;
     document.title = `${changes.run.mission} · executive`;
   }
-  if ("clock" in changes) find("clock").textContent = `${changes.clock.toFixed(1)} s`;
+  if ("clock" in changes) getElement("clock").textContent = `${changes.clock.toFixed(1)} s`;
   if (items) showItems();
   if ("look" in changes || "decision" in changes || (items && state.look)) showCamera();
   if ("choices" in changes) showChoices(changes.choices);
-  if (changes.note) find("message").textContent = changes.note;
-  if (nodes) scrollToRunning();
+  if (changes.note) getElement("message").textContent = changes.note;
+  if (nodes) scrollToRunningSkill();
   if ("result" in changes) showResult(changes.result);
   else if (!state.result) {
-    const status = state.paused ? "paused" : state.choices ? "waiting for a request" : "running";
+    const status = state.is_paused ? "paused" : state.choices ? "waiting for a request" : "running";
     showRunStatus(state.has_ended ? "invalid" : "running", state.has_ended ? "ending" : status);
   }
-  find("pause").disabled = state.paused || state.has_ended;
-  find("resume").disabled = !state.paused || state.has_ended;
-  find("step").disabled = find("stop").disabled = state.has_ended;
+  getElement("pause").disabled = state.is_paused || state.has_ended;
+  getElement("resume").disabled = !state.is_paused || state.has_ended;
+  getElement("step").disabled = getElement("stop").disabled = state.has_ended;
 }
 
 function showRunStatus(statusClass, text) {
-  find("head").className = statusClass;
-  find("status").textContent = text;
+  getElement("head").className = statusClass;
+  getElement("status").textContent = text;
 }
 
 function showTree(svg) {
   const tree = document.importNode(new DOMParser().parseFromString(svg, "image/svg+xml").documentElement, true);
   document.querySelector("#tree .scroll").replaceChildren(tree);
-  groups.clear();
-  for (const group of tree.querySelectorAll("g.node")) groups.set(group.dataset.path, group);
+  nodeGroups.clear();
+  for (const group of tree.querySelectorAll("g.node")) nodeGroups.set(group.dataset.path, group);
   for (const [path, node] of Object.entries(state.nodes)) showNodeStatus(path, node);
 }
 
 function showNodeStatus(path, node) {
-  const group = groups.get(path);
+  const group = nodeGroups.get(path);
   if (!group) return;
   group.classList.remove(...STATUS_CLASSES);
   group.classList.add(node.status);
@@ -97,11 +97,11 @@ function showNodeStatus(path, node) {
   if (node.status === "running" && group.nextElementSibling) group.parentNode.append(group);
 }
 
-function scrollToRunning() {
+function scrollToRunningSkill() {
   const now = performance.now();
-  if (!find("follow").checked || now - lastScrollTime < SCROLL_PERIOD) return;
-  const running = [...groups.values()].filter((g) => g.classList.contains("skill") && g.classList.contains("running"));
-  const target = running[0];
+  if (!getElement("follow").checked || now - lastScrollTime < SCROLL_PERIOD) return;
+  const isRunningSkill = (group) => group.classList.contains("skill") && group.classList.contains("running");
+  const target = [...nodeGroups.values()].find(isRunningSkill);
   if (!target) return;
   lastScrollTime = now;
   const container = document.querySelector("#tree .scroll");
@@ -109,7 +109,7 @@ function scrollToRunning() {
   const view = container.getBoundingClientRect();
   const isVisible = box.left >= view.left && box.right <= view.right && box.top >= view.top && box.bottom <= view.bottom;
   if (isVisible) return;
-  // The scroll has no animation, which would slow down the run if the drawing is large.
+  // An animated scroll of a large drawing would slow down the run.
   container.scrollTo({
     left: container.scrollLeft + box.left - view.left - 0.62 * view.width,
     top: container.scrollTop + box.top - view.top - 0.4 * view.height,
@@ -118,7 +118,7 @@ function scrollToRunning() {
 
 function showItems() {
   const rows = Object.values(state.items).filter((item) => item.state !== "phantom");
-  find("items").querySelector("tbody").replaceChildren(...rows.map((item) => {
+  getElement("items").querySelector("tbody").replaceChildren(...rows.map((item) => {
     const row = document.createElement("tr");
     row.className = item.state;
     for (const text of [item.item, item.label, item.state, item.bin, item.reason]) {
@@ -136,13 +136,13 @@ function showCamera() {
   const targetIndex = findTarget(look);
   look.detections.forEach((detection, index) => drawing.append(...drawDetection(detection, index === targetIndex)));
   document.querySelector("#look .picture").replaceChildren(drawing);
-  find("frame").textContent = `${look.camera}, frame ${look.frame} at ${look.stamp.toFixed(2)} s, by ${look.detector}`;
+  getElement("frame").textContent = `${look.camera}, frame ${look.frame} at ${look.stamp.toFixed(2)} s, by ${look.detector}`;
 }
 
 function drawDetection(detection, isTarget) {
   const [left, top, right, bottom] = detection.box;
-  if (!classes.includes(detection.label)) classes.push(detection.label);
-  const colour = CLASS_COLOURS[classes.indexOf(detection.label) % CLASS_COLOURS.length];
+  if (!detectedClasses.includes(detection.label)) detectedClasses.push(detection.label);
+  const colour = CLASS_COLOURS[detectedClasses.indexOf(detection.label) % CLASS_COLOURS.length];
   const box = makeElement("rect", { x: left, y: top, width: right - left, height: bottom - top, class: isTarget ? "target" : "" });
   box.style.stroke = colour;
   const label = makeElement("text", { x: left, y: top - 4 });
@@ -151,13 +151,14 @@ function drawDetection(detection, isTarget) {
   return [box, label];
 }
 
-// Return the index of the detection of the selected target, or -1.
+// Return the index of the detection nearest to the selected target, or -1.
 function findTarget(look) {
   const item = state.decision && state.items[state.decision.item];
   if (!item || !item.position || item.state === "placed") return -1;
-  const distance = (detection) => (detection.position ? Math.hypot(detection.position[0] - item.position[0], detection.position[1] - item.position[1]) : Infinity);
-  const nearest = look.detections.reduce((best, detection, index) => (best < 0 || distance(detection) < distance(look.detections[best]) ? index : best), -1);
-  return nearest >= 0 && distance(look.detections[nearest]) < MAX_TARGET_DISTANCE ? nearest : -1;
+  const [itemX, itemY] = item.position;
+  const distances = look.detections.map(({ position }) => (position ? Math.hypot(position[0] - itemX, position[1] - itemY) : Infinity));
+  const minDistance = Math.min(...distances);
+  return minDistance < MAX_TARGET_DISTANCE ? distances.indexOf(minDistance) : -1;
 }
 
 function makeElement(tag, attributes) {
@@ -167,7 +168,7 @@ function makeElement(tag, attributes) {
 }
 
 function showChoices(choices) {
-  const panel = find("request");
+  const panel = getElement("request");
   panel.hidden = !choices;
   for (const button of panel.querySelectorAll("button")) button.remove();
   const texts = choices ? [...choices, "rescan", "quit"] : [];
@@ -181,7 +182,7 @@ function showChoices(choices) {
 function showResult(result) {
   const statusClass = { SUCCESS: "success", FAILURE: "failure", FAULT: "failure" }[result.status] ?? "invalid";
   showRunStatus(statusClass, result.status);
-  const panel = find("outcome");
+  const panel = getElement("outcome");
   panel.hidden = false;
   panel.className = statusClass;
   const lines = [

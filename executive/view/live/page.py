@@ -1,4 +1,4 @@
-"""Live page: a view that sends messages to the server process of the page, and runs its commands."""
+"""View of a run in browsers: sends messages to the page server, and runs the commands of browsers."""
 
 from __future__ import annotations
 
@@ -46,16 +46,16 @@ BATCH_PERIOD = 0.03
 SHUTDOWN_TIMEOUT = 3.0
 """Maximum time to wait for the end of the server process [s]."""
 MAX_QUEUED_MESSAGES = 32
-"""Length of the queue above which images (about 1 MB each) and poses are dropped."""
+"""Length of the queue from which images (about 1 MB each) and poses are dropped."""
 REQUIRED_PACKAGES = ("aiohttp", "trimesh", "viser")
 """Optional dependencies of the project that the live page needs."""
 
 
 class LivePage:
-    """Shows a run in browsers that open `address`, and runs their commands; implements `View`.
+    """View that shows a run in browsers, and runs the commands of the browsers.
 
-    While no browser shows the page, only events are sent, which are small. An error of the page does not
-    affect the run.
+    While no browser shows the page, images and poses are not sent. An error of the page does not affect the
+    run.
 
     Attributes:
         address: Address of the page; every user who knows the address can watch and control the run.
@@ -86,12 +86,12 @@ class LivePage:
         self._run: Run | None = None
         self._visuals: Visuals | None = None
         self._is_closed = False
-        self._watcher_count = 0
+        self._browser_count = 0
         self._next_pose_time = 0.0
         self._pose_period = POSE_PERIOD
         self._was_paused = False
         self._last_frame: Frame | None = None
-        self._last_look: CameraImage | None = None
+        self._last_camera_image: CameraImage | None = None
         self.problem = ""
         """Description of the first error of the page, or ""."""
         # The token is sent through the pipe, because every user of the machine can read process arguments.
@@ -108,29 +108,29 @@ class LivePage:
         nodes = make_outline(run.root)
         mission = run.mission
         self._run = run
-        with self._record_errors():
+        with self._catch_errors():
             self._visuals = run.workcell.visuals()
-        # Every node gets an empty line, in which the page writes the counts of the node.
-        empty_notes = {node.path: NodeResult("", ("",)) for node in nodes}
+        # The page writes the counts of a node into the empty line of its result.
+        empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(SceneChange(shapes=shapes))
-        self._enqueue(PageChange(tree=draw_svg(nodes, mission, empty_notes)))
+        self._enqueue(PageChange(tree=draw_svg(nodes, mission, empty_results)))
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
-    def __call__(self, timed: TimedEvent) -> None:
+    def __call__(self, timed_event: TimedEvent) -> None:
         """Send an event that changes the page."""
-        event = timed.event
-        with self._record_errors():
+        event = timed_event.event
+        with self._catch_errors():
             if isinstance(event, FrameCaptured):
-                # The page does not show the depth, which is three times as large as the rest.
+                # The page does not show the depth image, which is the largest part of a frame.
                 self._last_frame = replace(event.frame, depth=None)
             elif isinstance(event, FrameSearched) and self._last_frame is not None:
-                self._last_look = CameraImage(self._last_frame, event)
-                if self._watcher_count and self._is_queue_short:
-                    self._enqueue(self._last_look)
+                self._last_camera_image = CameraImage(self._last_frame, event)
+                if self._browser_count and self._is_queue_short:
+                    self._enqueue(self._last_camera_image)
             elif not isinstance(event, InputRead):
-                self._enqueue(timed)
+                self._enqueue(timed_event)
 
     def close(self) -> None:
         """Do nothing: the page stays open until `finish` is called."""
@@ -159,30 +159,32 @@ class LivePage:
         self._error_file.close()
 
     def _send_state(self) -> None:
-        """Send the time, the poses and whether the run is paused, if they are due; called between ticks."""
+        """Send pause state, time and poses once per pose period; called between the ticks of the run."""
         now = time.monotonic()
         if now < self._next_pose_time or self._run is None:
             return
         self._next_pose_time = now + self._pose_period
-        with self._record_errors():
+        with self._catch_errors():
             if self._run.control.is_paused != self._was_paused:
                 self._was_paused = not self._was_paused
-                self._enqueue(PageChange(paused=self._was_paused))
-            if self._watcher_count and self._is_queue_short and self._visuals is not None:
+                self._enqueue(PageChange(is_paused=self._was_paused))
+            if self._browser_count and self._is_queue_short and self._visuals is not None:
                 self._enqueue(PageChange(clock=self._run.now))
                 self._enqueue(SceneChange(body_poses=encode_poses(self._visuals.poses())))
 
     @property
     def _is_queue_short(self) -> bool:
+        """True if images and poses may be queued."""
         return self._queue.qsize() < MAX_QUEUED_MESSAGES
 
     def _enqueue(self, message: Message) -> None:
+        """Queue a message for the server, unless the server has ended."""
         if not self._is_closed:
             self._queue.put(message)
 
     @contextlib.contextmanager
-    def _record_errors(self) -> Iterator[None]:
-        """Store an exception as the problem of the page instead of raising it, so that the run continues."""
+    def _catch_errors(self) -> Iterator[None]:
+        """Store an exception in `problem` instead of raising it, so that the run continues."""
         try:
             yield
         except Exception as error:
@@ -191,18 +193,18 @@ class LivePage:
     def _send_messages(self) -> None:
         """Send the queued messages in batches, up to the end marker None."""
         assert self._server.stdin is not None
-        must_end = False
+        is_last_batch = False
         with contextlib.suppress(BrokenPipeError), self._server.stdin as pipe:
-            while not must_end:
+            while not is_last_batch:
                 batch = [self._queue.get()]
                 while not self._queue.empty():
                     batch.append(self._queue.get())
-                must_end = None in batch
+                is_last_batch = None in batch
                 pickle.dump(
                     [message for message in batch if message is not None], pipe, pickle.HIGHEST_PROTOCOL
                 )
                 pipe.flush()
-                if not must_end:
+                if not is_last_batch:
                     time.sleep(BATCH_PERIOD)
         self._is_closed = True
 
@@ -213,20 +215,21 @@ class LivePage:
         return lines[-1] if lines else f"exit status {self._server.returncode}"
 
     def _read_commands(self) -> None:
-        """Run the commands of the page until its server ends."""
+        """Run the commands that the server writes to stdout, until the server ends."""
         assert self._server.stdout is not None
         for line in self._server.stdout:
-            with self._record_errors():
+            with self._catch_errors():
                 self._run_command(PageCommand(**json.loads(line)))
-        self._watcher_count, self._is_closed = 0, True
+        self._browser_count, self._is_closed = 0, True
 
     def _run_command(self, command: PageCommand) -> None:
+        """Run a command; most command names are the names of methods of `RunControl`."""
         control = None if self._run is None else self._run.control
-        if command.name == "watchers":
-            self._watcher_count = command.watcher_count
+        if command.name == "browsers":
+            self._browser_count = command.browser_count
             self._pose_period = CPU_RENDERING_POSE_PERIOD if command.is_cpu_rendering else POSE_PERIOD
-            if self._watcher_count and self._last_look is not None:
-                self._enqueue(self._last_look)
+            if self._browser_count and self._last_camera_image is not None:
+                self._enqueue(self._last_camera_image)
         elif control is not None and command.name == "request":
             control.add_request(command.text)
         elif control is not None:

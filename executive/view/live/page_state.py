@@ -1,4 +1,4 @@
-"""State of the live page, and the changes since the last message to the browsers."""
+"""State of the live page, and changes since the last message to the browsers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from typing import cast
 import numpy as np
 
 from executive import events
-from executive.cell.frame import Frame
 from executive.record.timeline.timeline import Timeline
 from executive.view.live.messages import CameraImage, Message, PageChange
 
@@ -19,20 +18,20 @@ JPEG_QUALITY = 80
 OCCLUSION_DARKENING = 0.45
 """Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
 
-Json = dict[str, object]
-"""JSON object for `page.js`: nodes by path, items by name, and one key for each other part of the page."""
+JsonObject = dict[str, object]
+"""JSON object, by key."""
 
 
 class PageState:
     """State of the live page, updated by the messages of a run.
 
     Attributes:
-        values: All values that the page shows, as JSON.
+        values: All values for `page.js` by key: nodes by path, items by name, and other values.
     """
 
     def __init__(self) -> None:
-        self.values: Json = {"paused": False, "has_ended": False, "nodes": {}, "items": {}}
-        self._changes: Json = {}
+        self.values: JsonObject = {"is_paused": False, "has_ended": False, "nodes": {}, "items": {}}
+        self._changes: JsonObject = {}
         self._timeline = Timeline(has_history=False)
 
     def apply(self, message: Message) -> None:
@@ -43,13 +42,13 @@ class PageState:
                 self._set_values(clock=message.clock)
                 self._apply_event(message.event)
             case CameraImage():
-                self._set_values(look=_encode_look(message.frame, message.look))
+                self._set_values(look=_encode_camera_image(message))
             case PageChange():
                 values = asdict(message)
                 self._set_values(**{name: values[name] for name in values if values[name] is not None})
 
-    def take_changes(self) -> Json:
-        """Return the values that changed since the last call; empty if there are none."""
+    def take_changes(self) -> JsonObject:
+        """Return the values that changed since the last call, by key."""
         changes, self._changes = self._changes, {}
         return changes
 
@@ -70,26 +69,31 @@ class PageState:
             case events.RunEnded():
                 self._set_values(choices=None, has_ended=True)
 
-    def _describe_node(self, path: str) -> Json:
-        last, counts = self._timeline.activation_by_path[path], self._timeline.end_counts.get(path, Counter())
+    def _describe_node(self, path: str) -> JsonObject:
+        """Return the status of a node, its last failure, its item, and the number of its ends by status."""
+        activation = self._timeline.activation_by_path[path]
+        end_counts = self._timeline.end_counts.get(path, Counter())
         statuses = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
         return {
-            **{name: counts[status] for name, status in statuses.items()},
-            "status": last.status.lower(), "failure": last.failure, "item": last.item,
+            **{name: end_counts[status] for name, status in statuses.items()},
+            "status": activation.status.lower(), "failure": activation.failure, "item": activation.item,
         }  # fmt: skip
 
     def _set_values(self, **values: object) -> None:
+        """Set values of the state by key, and store them as changes."""
         self.values |= values
         self._changes |= values
 
-    def _set_entry(self, key: str, name: str, value: Json) -> None:
+    def _set_entry(self, key: str, name: str, value: JsonObject) -> None:
+        """Set an entry of `nodes` or `items`, and store it as a change."""
         for values in (self.values, self._changes):
-            entries = cast("Json", values.setdefault(key, {}))
+            entries = cast("JsonObject", values.setdefault(key, {}))
             entries[name] = value
 
 
-def _encode_look(frame: Frame, look: events.FrameSearched) -> Json:
+def _encode_camera_image(camera_image: CameraImage) -> JsonObject:
     """Return the detections in a frame and its image as JPEG, darkened where the arm occludes the scene."""
+    frame, search = camera_image.frame, camera_image.search
     import cv2
 
     image = cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR)
@@ -101,5 +105,6 @@ def _encode_look(frame: Frame, look: events.FrameSearched) -> Json:
     return {
         "source": "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode(),
         "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
-        "detector": look.detector, "stamp": frame.stamp, "detections": [vars(one) for one in look.confident],
+        "detector": search.detector, "stamp": frame.stamp,
+        "detections": [vars(detection) for detection in search.confident],
     }  # fmt: skip

@@ -23,7 +23,7 @@ from executive.view.live.server import Server
 
 
 def main() -> None:
-    """Serve the page until standard input ends; the first argument is the descriptor of the open socket."""
+    """Serve the page on the socket whose descriptor is the command-line argument, until stdin ends."""
     listener = socket.socket(fileno=int(sys.argv[1]))
     # The run reads commands from stdout, so text that libraries print is redirected to stderr.
     commands = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
@@ -39,10 +39,13 @@ def main() -> None:
     os._exit(0)
 
 
-async def _serve(listener: socket.socket, path: Path, write_command: Callable[[PageCommand], None]) -> None:
+async def _serve(
+    listener: socket.socket, scene_socket: Path, write_command: Callable[[PageCommand], None]
+) -> None:
+    """Serve the page, and apply the pickled batches of messages from stdin; the first contains the token."""
     loop, input_ended = asyncio.get_running_loop(), asyncio.Event()
     (token, port), *first_messages = pickle.load(sys.stdin.buffer)
-    page_state, scene_proxy = PageState(), SceneProxy(path)
+    page_state, scene_proxy = PageState(), SceneProxy(scene_socket)
     server = Server(page_state, scene_proxy, write_command, token, port)
 
     def apply_batch(batch: list[Message]) -> None:
@@ -68,8 +71,8 @@ async def _serve(listener: socket.socket, path: Path, write_command: Callable[[P
     runner = web.AppRunner(server.app, access_log=None)
     await runner.setup()
     await web.SockSite(runner, listener).start()
-    sending = asyncio.create_task(server.send_periodically())
+    sender = asyncio.create_task(server.send_periodically())
     threading.Thread(target=read_batches, daemon=True).start()
     await input_ended.wait()
-    sending.cancel()
-    await server.end()
+    sender.cancel()
+    await server.close()

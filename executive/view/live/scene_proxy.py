@@ -1,4 +1,4 @@
-"""Proxy between the server of the page and the server of the scene, which starts at the first request."""
+"""Proxy that forwards requests of browsers to the scene server, and starts this server when needed."""
 
 from __future__ import annotations
 
@@ -24,24 +24,21 @@ MAX_MESSAGE_SIZE = 64 * 1024 * 1024
 """Maximum size of a message of the scene, which may contain a mesh [bytes]."""
 
 Connection = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
+"""WebSocket connection with a browser or with the scene server."""
 
 
 class SceneProxy:
-    """Stores shapes and poses until the scene exists, and forwards requests to the server of the scene.
+    """Forwards requests to the Unix socket of the scene server; stores shapes and poses until its start."""
 
-    Args:
-        path: Unix socket of the server of the scene.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, socket_path: Path) -> None:
+        self._socket_path = socket_path
         self._shapes: asyncio.Future[Sequence[Shape]] = asyncio.get_running_loop().create_future()
         self._body_poses: Mapping[str, Sequence[float]] = {}
         self._scene: LiveScene | None = None
         self._start_lock = asyncio.Lock()
 
     def set_shapes(self, shapes: Sequence[Shape]) -> None:
-        """Set the shapes of the scene, without which the server of the scene does not start."""
+        """Set the shapes of the scene; the scene server starts after this call."""
         self._shapes.set_result(shapes)
 
     def set_body_poses(self, poses: Mapping[str, Sequence[float]]) -> None:
@@ -51,18 +48,18 @@ class SceneProxy:
             self._scene.set_body_poses(poses)
 
     async def forward_file(self, request: web.Request) -> web.Response:
-        """Forward the request for a file to the server of the scene, and return the response."""
+        """Forward the request for a file to the scene server, and return the response."""
         async with await self.open_session() as session:
-            answer = await session.get(f"http://scene/{request.match_info['file']}")
+            response = await session.get(f"http://scene/{request.match_info['file']}")
             return web.Response(
-                status=answer.status,
-                body=await answer.read(),
-                content_type=answer.content_type,
+                status=response.status,
+                body=await response.read(),
+                content_type=response.content_type,
                 headers={"Content-Security-Policy": CONTENT_POLICY},
             )
 
     async def forward_messages(self, request: web.Request) -> web.WebSocketResponse:
-        """Forward WebSocket messages between browser and scene until one of the two connections ends."""
+        """Forward WebSocket messages between browser and scene server until one connection ends."""
         header = request.headers.get("Sec-WebSocket-Protocol", "")
         protocols = [name.strip() for name in header.split(",") if name.strip()]
         browser = web.WebSocketResponse(protocols=protocols, max_msg_size=MAX_MESSAGE_SIZE)
@@ -82,23 +79,25 @@ class SceneProxy:
         return browser
 
     async def open_session(self) -> aiohttp.ClientSession:
-        """Return a session with the server of the scene; the first call starts it, once shapes are set."""
+        """Return a session with the scene server; wait for the shapes and start the server if necessary."""
         shapes = await asyncio.shield(self._shapes)
         async with self._start_lock:
             if self._scene is None:
-                # The start takes 1.5 s (imports and meshes); in a thread it does not block other requests.
-                self._scene = await asyncio.to_thread(_make_scene, self._path, shapes)
+                # The start takes 1.5 s (imports and meshes), which would block other requests.
+                self._scene = await asyncio.to_thread(_make_scene, self._socket_path, shapes)
                 self._scene.set_body_poses(self._body_poses)
-        return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(self._path)))
+        return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(self._socket_path)))
 
 
-def _make_scene(path: Path, shapes: Sequence[Shape]) -> LiveScene:
+def _make_scene(socket_path: Path, shapes: Sequence[Shape]) -> LiveScene:
+    """Import viser and start the scene server."""
     from executive.view.live.live_scene import LiveScene
 
-    return LiveScene(path, shapes)
+    return LiveScene(socket_path, shapes)
 
 
 async def _forward(source: Connection, target: Connection) -> None:
+    """Forward the messages from `source` to `target` until a connection ends."""
     async for message in source:
         if message.type is WSMsgType.BINARY:
             await target.send_bytes(message.data)

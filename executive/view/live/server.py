@@ -1,4 +1,4 @@
-"""Server of the live page: access control, files, messages to browsers and commands from browsers."""
+"""Server of the live page: access control, files, messages to browsers, and commands from browsers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CONTENT_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""Content security policy of the page: everything comes from this server."""
+"""Content security policy of the page, which loads everything from this server."""
 SECURITY_HEADERS = {
     # The address contains the token, which links and caches must not reveal.
     "Referrer-Policy": "no-referrer",
@@ -31,6 +31,9 @@ SECURITY_HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
 }
+"""Headers of every response."""
+HEARTBEAT_PERIOD = 10.0
+"""Period at which a WebSocket connection is tested [s]."""
 SHUTDOWN_TIMEOUT = 0.5
 """Maximum time to wait until the browsers have received the last message [s]."""
 COMMANDS = ("pause", "resume", "step", "stop", "render_on_cpu")
@@ -43,19 +46,16 @@ _FILES = {
     "page.css": ("live/page.css", "text/css"),
     "colours.css": ("colours.css", "text/css"),
 }
+"""Path in `executive/view` and content type of each served file, by the last part of its address."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+"""Function that answers a request."""
 
 
 class Server:
-    """Serves same-origin requests that contain the token.
+    """Answers requests from the page whose path starts with the token.
 
-    Args:
-        page_state: State of the page.
-        scene_proxy: Proxy to the server of the scene.
-        send_command: Callback that receives the commands of clients, and the number of clients.
-        token: First part of the path of every request.
-        port: Port of the server.
+    `send_command` receives the commands of browsers, and reports about the browsers.
     """
 
     def __init__(
@@ -67,17 +67,17 @@ class Server:
         self._token = token
         # The name `localhost` could lead to another server, at [::1].
         self._host = f"127.0.0.1:{port}"
-        # Socket of each client, with True if the browser renders on the CPU.
-        self._clients: dict[web.WebSocketResponse, bool] = {}
+        # Value: True if the browser renders on the CPU.
+        self._browsers: dict[web.WebSocketResponse, bool] = {}
         self.app = web.Application(middlewares=[self._check_access])
-        self.app.router.add_get("/{token}/live", self._serve_client)
+        self.app.router.add_get("/{token}/live", self._serve_browser)
         self.app.router.add_get("/{token}/scene", scene_proxy.forward_messages)
         self.app.router.add_get("/{token}/scene/{file:.*}", scene_proxy.forward_file)
         self.app.router.add_get("/{token}/{file:.*}", self._serve_file)
 
     @web.middleware
     async def _check_access(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Refuse a request without the token or from another page; called before every handler."""
+        """Refuse a request with an access error; otherwise handle the request and add `SECURITY_HEADERS`."""
         if problem := find_access_error(request, self._token, self._host):
             raise web.HTTPForbidden(text=f"{problem}\n", headers=SECURITY_HEADERS)
         response = await handler(request)
@@ -87,13 +87,13 @@ class Server:
         return response
 
     async def send_changes(self) -> None:
-        """Send the changes of the page since the last call to all clients."""
+        """Send the changes of the page since the last call to all browsers."""
         changes = self._page_state.take_changes()
-        if changes and self._clients:
+        if changes and self._browsers:
             text = json.dumps(changes)
-            for client in list(self._clients):
+            for browser in list(self._browsers):
                 with contextlib.suppress(ConnectionError):
-                    await client.send_str(text)
+                    await browser.send_str(text)
 
     async def send_periodically(self) -> None:
         """Send the changes of the page once per `MESSAGE_PERIOD`, until the task is cancelled."""
@@ -101,14 +101,15 @@ class Server:
             await asyncio.sleep(MESSAGE_PERIOD)
             await self.send_changes()
 
-    async def end(self) -> None:
+    async def close(self) -> None:
         """Send the last changes, and close all connections."""
         await self.send_changes()
-        closing = [asyncio.create_task(client.close()) for client in self._clients]
-        if closing:
-            await asyncio.wait(closing, timeout=SHUTDOWN_TIMEOUT)
+        close_tasks = [asyncio.create_task(browser.close()) for browser in self._browsers]
+        if close_tasks:
+            await asyncio.wait(close_tasks, timeout=SHUTDOWN_TIMEOUT)
 
     async def _serve_file(self, request: web.Request) -> web.Response:
+        """Return a file of the page."""
         name = request.match_info["file"]
         if name not in _FILES:
             raise web.HTTPNotFound(text="there is no such file\n")
@@ -117,35 +118,35 @@ class Server:
         headers = {"Content-Security-Policy": CONTENT_POLICY}
         return web.Response(text=text, content_type=content_type, headers=headers)
 
-    async def _serve_client(self, request: web.Request) -> web.WebSocketResponse:
-        """Send the state of the page to a client, register it for changes, and receive its commands."""
-        socket = web.WebSocketResponse(max_msg_size=MAX_MESSAGE_SIZE, heartbeat=10)
+    async def _serve_browser(self, request: web.Request) -> web.WebSocketResponse:
+        """Send the state of the page to a browser, register it for changes, and receive its commands."""
+        socket = web.WebSocketResponse(max_msg_size=MAX_MESSAGE_SIZE, heartbeat=HEARTBEAT_PERIOD)
         await socket.prepare(request)
         await socket.send_str(json.dumps(self._page_state.values))
-        self._clients[socket] = False
-        self._report_clients()
+        self._browsers[socket] = False
+        self._report_browsers()
         try:
             async for message in socket:
                 command = parse_command(message.data) if message.type is WSMsgType.TEXT else None
                 if command is not None and command.name == "render_on_cpu":
-                    self._clients[socket] = True
-                    self._report_clients()
+                    self._browsers[socket] = True
+                    self._report_browsers()
                 elif command is not None:
                     self._send_command(command)
         finally:
-            del self._clients[socket]
-            self._report_clients()
+            del self._browsers[socket]
+            self._report_browsers()
         return socket
 
-    def _report_clients(self) -> None:
-        """Report the number of clients to the run, and whether a browser renders on the CPU."""
-        is_cpu_rendering = any(self._clients.values())
-        self._send_command(PageCommand("watchers", "", len(self._clients), is_cpu_rendering))
+    def _report_browsers(self) -> None:
+        """Report to the run how many browsers show the page, and whether a browser renders on the CPU."""
+        is_cpu_rendering = any(self._browsers.values())
+        self._send_command(PageCommand("browsers", "", len(self._browsers), is_cpu_rendering))
 
 
 def find_access_error(request: web.Request, token: str, host: str) -> str:
-    """Return an error message for a request without this token and host, or from another page; else ""."""
-    # Host names are refused, to prevent DNS rebinding.
+    """Return an error message for a request with a wrong host, token or origin; "" for other requests."""
+    # A host name in place of the address may be an attack by DNS rebinding.
     if request.headers.get("Host") != host:
         return "the page must be opened by the address of this machine"
     given_token, _, _ = request.path.removeprefix("/").partition("/")
@@ -154,7 +155,7 @@ def find_access_error(request: web.Request, token: str, host: str) -> str:
     origin = request.headers.get("Origin")
     if origin is not None and origin != f"http://{host}":
         return "another page may neither read nor control this run"
-    # Browsers always send the origin of a page that opens a WebSocket.
+    # Every browser sends the origin of a page that opens a WebSocket.
     if origin is None and request.headers.get("Upgrade", "").lower() == "websocket":
         return "a WebSocket request must contain the origin of its page"
     return ""

@@ -13,7 +13,7 @@ from executive.run.run_control import RunControl
 
 POLL_PERIOD = 0.1
 """Maximum time until the reading thread notices that it must end [s]."""
-PAUSE_KEYS, STEP_KEY = "p ", "s"
+PAUSE_KEYS, STEP_KEY = ("p", " "), "s"
 """Keys that pause or continue a run, and key that runs one control step."""
 HELP = "p pause, s step, Ctrl-C stop"
 """Text about the keys while the run is not paused."""
@@ -22,28 +22,23 @@ HELP_PAUSED = "paused: p continue, s step, Ctrl-C stop"
 
 
 class KeyReader:
-    """Reads single keys of a terminal in a thread, and controls a run; Ctrl-C still sends a signal.
+    """Thread that reads single keys from the file descriptor of a terminal, and controls a run."""
 
-    Args:
-        file: File descriptor of the terminal.
-        control: Control of the run.
-    """
-
-    def __init__(self, file: int, control: RunControl) -> None:
-        self._file = file
+    def __init__(self, descriptor: int, control: RunControl) -> None:
+        self._descriptor = descriptor
         self._control = control
         self._saved_attributes: list[Any] | None = None
         self._must_stop = threading.Event()
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Start to read keys, if the thread does not run yet."""
+        """Start the thread, unless it is running; Ctrl-C sends a signal while the thread is running."""
         if self._thread is not None:
             return
-        self._saved_attributes = termios.tcgetattr(self._file)
-        tty.setcbreak(self._file)
+        self._saved_attributes = termios.tcgetattr(self._descriptor)
+        tty.setcbreak(self._descriptor)
         self._must_stop.clear()
-        self._thread = threading.Thread(target=self._read, name="keys", daemon=True)
+        self._thread = threading.Thread(target=self._read_keys, name="keys", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -54,21 +49,24 @@ class KeyReader:
         self._thread.join()
         self._thread = None
         assert self._saved_attributes is not None
-        termios.tcsetattr(self._file, termios.TCSADRAIN, self._saved_attributes)
+        termios.tcsetattr(self._descriptor, termios.TCSADRAIN, self._saved_attributes)
 
-    def _read(self) -> None:
+    def _read_keys(self) -> None:
+        """Handle keys until the thread must stop or the terminal is closed."""
         while not self._must_stop.is_set():
-            if select.select([self._file], [], [], POLL_PERIOD)[0]:
+            if select.select([self._descriptor], [], [], POLL_PERIOD)[0]:
                 try:
-                    key = os.read(self._file, 1).decode("ascii", "ignore")
-                except OSError:  # The terminal was closed.
+                    key = os.read(self._descriptor, 1).decode("ascii", "ignore")
+                except OSError:
                     return
                 if not key:
                     return
                 self._handle_key(key)
 
     def _handle_key(self, key: str) -> None:
-        if key in PAUSE_KEYS:
-            (self._control.resume if self._control.is_paused else self._control.pause)()
-        elif key == STEP_KEY:
+        if key == STEP_KEY:
             self._control.step()
+        elif key in PAUSE_KEYS and self._control.is_paused:
+            self._control.resume()
+        elif key in PAUSE_KEYS:
+            self._control.pause()

@@ -13,16 +13,13 @@ if TYPE_CHECKING:
     from executive.run.run import Run
 
 STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
-"""Texts for the status of a node that has ended."""
+"""Text for each status of a node that has ended."""
 
 
 class LineView:
     """Writes a line when a skill starts or ends, a control node decides, or the state of an item changes.
 
-    Starts and ends of control nodes are not written, because they follow from the lines of their skills.
-
-    Attributes:
-        timeline: Timeline of the run.
+    Starts and ends of control nodes are not written, because the lines of their skills imply them.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -37,12 +34,12 @@ class LineView:
         self._names_by_path = {node.path: node.name for node in nodes}
         self._skill_names_by_path = find_skill_names(nodes)
 
-    def __call__(self, timed: events.TimedEvent) -> None:
+    def __call__(self, timed_event: events.TimedEvent) -> None:
         """Write the line of an event, if it has one."""
-        if text := self._describe_event(timed.event):
-            self._stream.write(f"{timed.clock:9.2f} s  {text}\n")
+        if text := self._describe_event(timed_event.event):
+            self._stream.write(f"{timed_event.clock:9.2f} s  {text}\n")
             self._stream.flush()
-        self.timeline(timed)
+        self.timeline(timed_event)
 
     def close(self) -> None:
         """Do nothing: every line is already flushed."""
@@ -52,6 +49,7 @@ class LineView:
         self._stream.write(f"note: {message}\n")
 
     def _describe_event(self, event: events.Event) -> str:
+        """Return the text about an event; "" if the event has no line."""
         match event:
             case events.RunStarted():
                 return f"{event.mission} starts, seed {event.seed}"
@@ -60,20 +58,21 @@ class LineView:
             case events.FaultInjected():
                 return f"injected fault: {event.name}"
             case events.NodeStarted() if event.skill:
-                return f"{self._format_skill(event)} ..."
+                return f"{self._describe_skill(event)} ..."
             case events.NodeEnded() if event.skill:
                 details = "".join(f": {text}" for text in (event.reason, event.message) if text)
-                return f"{self._format_skill(event)} {STATUS_TEXTS[event.status]}{details}"
+                return f"{self._describe_skill(event)} {STATUS_TEXTS[event.status]}{details}"
             case events.BranchChosen():
-                after = f", after {event.reason}" if event.reason else ""
-                return f"{self._names_by_path[event.node]}: {event.choice}{after}"
+                reason_text = f", after {event.reason}" if event.reason else ""
+                return f"{self._names_by_path[event.node]}: {event.choice}{reason_text}"
             case events.RequestGiven():
                 return f"request: {event.request}"
             case events.ItemChanged():
                 return self._describe_change(event)
         return ""
 
-    def _format_skill(self, event: events.NodeStarted | events.NodeEnded) -> str:
+    def _describe_skill(self, event: events.NodeStarted | events.NodeEnded) -> str:
+        """Return the name of the skill of an event, with its item."""
         return self._skill_names_by_path[event.node] + (f" [{event.item}]" if event.item else "")
 
     def _describe_change(self, change: events.ItemChanged) -> str:

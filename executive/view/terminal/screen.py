@@ -28,20 +28,15 @@ _STATUS_MARKS = {
     "FAILURE": ("✗", "red"),
     "INVALID": ("·", "dim"),
 }
+"""Character and style of the mark of a node, by the status of the node."""
 _STATE_STYLES = {"placed": "green", "rejected": "red", "lost": "red", "held": "yellow", "dropped": "yellow"}
+"""Style of the text of an item state; the text of any other state has no style."""
 
 
 class TerminalView:
-    """Live view that a thread redraws ten times per second.
+    """Live view that a separate thread draws, so that a slow terminal does not slow down the run.
 
-    The tick thread only updates the timeline, so a slow terminal does not slow down the run.
-
-    Args:
-        console: The terminal.
-        keyboard: File descriptor from which keys are read; None: the run cannot be controlled by keys.
-
-    Attributes:
-        timeline: Timeline of the run.
+    If `keyboard`, the file descriptor of a terminal, is not None, keys on this terminal control the run.
     """
 
     def __init__(self, console: Console, keyboard: int | None = None) -> None:
@@ -62,18 +57,20 @@ class TerminalView:
         self._control = run.control
         if self._keyboard is not None:
             self._key_reader = KeyReader(self._keyboard, run.control)
-        self._set_visible(True)
+        self._show()
 
-    def __call__(self, timed: TimedEvent) -> None:
+    def __call__(self, timed_event: TimedEvent) -> None:
         """Update the view by an event; hide the view while the operator is asked for a request."""
-        if isinstance(timed.event, OperatorAsked | RequestGiven):
-            self._set_visible(isinstance(timed.event, RequestGiven))
+        if isinstance(timed_event.event, OperatorAsked):
+            self._hide()
+        elif isinstance(timed_event.event, RequestGiven):
+            self._show()
         with self._lock:
-            self.timeline(timed)
+            self.timeline(timed_event)
 
     def close(self) -> None:
         """Hide the view, so that the caller can print a summary."""
-        self._set_visible(False)
+        self._hide()
 
     def show_message(self, message: str) -> None:
         """Write a message about the record of the run on a separate line."""
@@ -83,40 +80,47 @@ class TerminalView:
     def render(self) -> RenderableType:
         """Return the drawing of the current state of the run."""
         with self._lock:
-            page = Table.grid(padding=(0, 4))
-            page.add_row(self._render_tree(), self._render_items())
+            grid = Table.grid(padding=(0, 4))
+            grid.add_row(self._render_tree(), self._render_items())
             start_event = self.timeline.started
             title = "" if start_event is None else f"{start_event.mission}  seed {start_event.seed}"
             header = Text(f"{title}  {self.timeline.clock:.1f} s", style="bold")
             if self._key_reader is not None:
-                paused = self._control is not None and self._control.is_paused
-                header.append(f"   {HELP_PAUSED if paused else HELP}", style="yellow" if paused else "dim")
-            return Group(header, page)
+                is_paused = self._control is not None and self._control.is_paused
+                help_text, style = (HELP_PAUSED, "yellow") if is_paused else (HELP, "dim")
+                header.append(f"   {help_text}", style=style)
+            return Group(header, grid)
 
-    def _set_visible(self, is_visible: bool) -> None:
-        """Show the view and read keys, or hide the view and stop reading keys."""
+    def _show(self) -> None:
+        """Show the view, and start to read keys."""
+        self._live.start()
+        if self._key_reader is not None:
+            self._key_reader.start()
+
+    def _hide(self) -> None:
+        """Hide the view, and stop reading keys."""
         try:
-            (self._live.start if is_visible else self._live.stop)()
+            self._live.stop()
         finally:
             if self._key_reader is not None:
-                (self._key_reader.start if is_visible else self._key_reader.stop)()
+                self._key_reader.stop()
 
     def _render_tree(self) -> RenderableType:
-        """Return a drawing of the running nodes and their children; a whole tree does not fit."""
-        shown_nodes = select_active_nodes(
-            self._nodes, {running.node for running in self.timeline.find_running_activations()}
-        )
+        """Return a drawing of the running nodes and their children; the whole tree may be too large."""
+        running_paths = {activation.node for activation in self.timeline.find_running_activations()}
+        shown_nodes = select_active_nodes(self._nodes, running_paths)
         lines = Text()
         for node, prefix in zip(shown_nodes, draw_line_prefixes(shown_nodes), strict=True):
-            last = self.timeline.activation_by_path.get(node.path)
-            mark, style = _STATUS_MARKS.get(last.status if last else "", ("·", "dim"))
-            note = escape_control_characters(last.reason_or_item) if last else ""
+            activation = self.timeline.activation_by_path.get(node.path)
+            mark, style = _STATUS_MARKS.get(activation.status if activation else "", ("·", "dim"))
+            note = escape_control_characters(activation.reason_or_item) if activation else ""
             lines.append(prefix, style="dim")
             lines.append(f"{mark} {node.name}", style=style)
             lines.append(f"  {note}\n", style="dim")
         return lines
 
     def _render_items(self) -> RenderableType:
+        """Return a table of the items."""
         table = Table(box=None, header_style="dim", padding=(0, 1))
         for column in ("item", "class", "state", "bin"):
             table.add_column(column)

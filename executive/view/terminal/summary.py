@@ -1,4 +1,4 @@
-"""Summary of a run on a terminal: its end, its times, its items, and the explanation of a failure."""
+"""Texts about a run for the terminal: command to repeat the run, summary, and outcomes of the items."""
 
 from __future__ import annotations
 
@@ -14,33 +14,25 @@ from executive.record.result import Result, describe_disagreement
 
 
 def format_repeat_command(
-    mission: str,
-    seed: int,
-    overrides: Mapping[str, object],
-    requests: Iterable[str] = (),
+    mission: str, seed: int, overrides: Mapping[str, object], requests: Iterable[str] = (),
     scene: Path | None = None,
-) -> str:
+) -> str:  # fmt: skip
     """Return the command line that repeats a run exactly.
 
-    Args:
-        mission: Name or file of the mission.
-        seed: Seed of the run.
-        overrides: Params that were given on the command line, by name.
-        requests: Requests of the operator, in order.
-        scene: Scene file of the run, or None.
+    `overrides` contains the params from the command line by name, `requests` the requests of the operator.
     """
-    words = ["executive", "run", mission, "--seed", str(seed)]
+    arguments = ["executive", "run", mission, "--seed", str(seed)]
     for key, value in overrides.items():
-        words += ["--set", f"{key}={value}"]
+        arguments += ["--set", f"{key}={value}"]
     for request in requests:
-        words += ["--request", request]
-    words += [] if scene is None else ["--scene", str(scene)]
-    return shlex.join(words)
+        arguments += ["--request", request]
+    arguments += [] if scene is None else ["--scene", str(scene)]
+    return shlex.join(arguments)
 
 
 def describe_end(status: str, reason: str, node: str, message: str) -> str:
-    """Return status, reason, path of the node, and message in one line; empty arguments are omitted."""
-    # The reason of a fault or a halt is not written, because it repeats the status.
+    """Return a line with status, reason, path of the node, and message; empty arguments are omitted."""
+    # The reason of a fault or a halt repeats the status.
     reason_text = f" {reason}" if reason and reason.upper() != status else ""
     node_text = f" at {node}" if node else ""
     message_text = f": {message}" if message else ""
@@ -48,45 +40,40 @@ def describe_end(status: str, reason: str, node: str, message: str) -> str:
 
 
 def format_summary(
-    result: Result, items: Iterable[ItemChanged], repeat_command: str, report: str = ""
+    result: Result, items: Iterable[ItemChanged], repeat_command: str, report_file: str = ""
 ) -> str:
-    """Return a text with the end of a run, its times, and its items by bin or by state.
+    """Return a text with the end of a run, the times, and the items by bin or by state.
 
     The diagnosis of a run that did not succeed is at the end, because users read the last lines first.
-
-    Args:
-        result: Result of the run.
-        items: Last change of each item.
-        repeat_command: The command that repeats the run.
-        report: File of the report, or "".
+    `items` contains the last change of each item; `report_file` is "" if there is no report.
     """
     times = f"{result.robot_time_s:.1f} s on the robot's clock, {result.wall_time_s:.1f} s by the wall clock"
     groups = sorted(group_items_by_outcome(items).items())
     outcomes = [f"  {outcome}: {', '.join(names)}" for outcome, names in groups]
-    if unknown := describe_unknown_labels(result.unknown_labels):
-        outcomes.append(f"  {unknown}")
-    outcomes += [f"  assumed error rates: {doubt}" for doubt in result.assumption_reasons]
+    if labels_text := describe_unknown_labels(result.unknown_labels):
+        outcomes.append(f"  {labels_text}")
+    outcomes += [f"  assumed error rates: {reason}" for reason in result.assumption_reasons]
     warning = wrap_lines(describe_disagreement(result), "", "  ", max_lines=3)
     if result.diagnosis is not None:
-        diagnosis = format_diagnosis(result.diagnosis, result.run, repeat_command, report)
+        diagnosis = format_diagnosis(result.diagnosis, result.run, repeat_command, report_file)
         lines = [times, *outcomes, "", *diagnosis]
     else:
         end = describe_end(result.status, result.reason, result.node, result.message)
         lines = [end, times, f"{result.run}  (repeat: {repeat_command})", *outcomes]
-        lines += [f"report: {report}"] if report else []
+        lines += [f"report: {report_file}"] if report_file else []
         if result.status == "INCOMPLETE":
             lines.append(f"after you have moved the remaining objects: {make_resume_command(result.run)}")
     return "\n".join([*warning, *lines]) + "\n"
 
 
 def describe_place_on_table(item: ItemChanged) -> str:
-    """Return a text with the position of an item that was left on the table; "" for other items."""
-    is_left = item.state in ("rejected", "skipped")
-    return "x {:.2f} m, y {:.2f} m".format(*item.position) if is_left else ""
+    """Return the position of an item that was rejected or skipped, as text; "" for other items."""
+    is_on_table = item.state in ("rejected", "skipped")
+    return "x {:.2f} m, y {:.2f} m".format(*item.position) if is_on_table else ""
 
 
 def group_items_by_outcome(items: Iterable[ItemChanged]) -> dict[str, list[str]]:
-    """Return the placed items by bin, and texts about the other items (with position and reason) by state.
+    """Return names of placed items by bin, and descriptions of the other items by state.
 
     Phantoms, which are detections without an object, are only counted.
     """

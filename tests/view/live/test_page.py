@@ -167,7 +167,7 @@ def test_a_hanging_page_receives_a_limited_queue_and_costs_a_few_seconds(monkeyp
     page = LivePage()
     asyncio.run(_answered(page.address))
     page._server.send_signal(signal.SIGSTOP)
-    page._watcher_count = 1
+    page._browser_count = 1
     image = np.zeros((480, 640, 3), np.uint8)
     frame = Frame(1, "overhead", image, None, np.eye(3), Pose.identity(), 0.0, None, 0)
     for tick in range(200):
@@ -181,7 +181,7 @@ def test_a_hanging_page_receives_a_limited_queue_and_costs_a_few_seconds(monkeyp
 def test_what_goes_wrong_with_it_is_said_and_the_run_goes_on() -> None:
     page = LivePage()
     try:
-        for page._watcher_count in (0, 1, 1):
+        for page._browser_count in (0, 1, 1):
             page(at(1, FrameCaptured(object())))
             page(at(1, frame_searched()))
         assert page.problem == (

@@ -86,7 +86,7 @@ def test_who_comes_late_is_shown_everything_and_then_only_news() -> None:
         "a": "running", "b": "failure",
     }  # fmt: skip
     assert list(shown.pop("items")) == ["cube-1"]
-    assert shown == {"paused": False, "has_ended": False, "tree": "<svg/>", "clock": 1.5}
+    assert shown == {"is_paused": False, "has_ended": False, "tree": "<svg/>", "clock": 1.5}
 
 
 def test_an_image_is_shown_with_what_the_arm_hides_darker() -> None:

@@ -138,11 +138,11 @@ def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> No
         origin = {"Origin": site.address}
         async with site.session.ws_connect(f"{site.address}/{TOKEN}/live", headers=origin) as socket:
             assert (await socket.receive_json())["run"] == {"mission": "sort", "seed": 3}
-            assert site.wishes == [PageCommand("watchers", watcher_count=1)]
+            assert site.wishes == [PageCommand("browsers", browser_count=1)]
             site.page_state.take_changes()
-            site.page_state.apply(PageChange(paused=True))
+            site.page_state.apply(PageChange(is_paused=True))
             await site.server.send_changes()
-            assert await socket.receive_json() == {"paused": True}
+            assert await socket.receive_json() == {"is_paused": True}
             wishes = (
                 '{"name": "render_on_cpu"}',
                 '{"name": "pause"}',
@@ -154,12 +154,12 @@ def test_a_watcher_receives_the_state_then_changes_and_may_send_commands() -> No
             while site.wishes[-1] != PageCommand("stop"):
                 await asyncio.sleep(0)
             site.page_state.apply(PageChange(note="over"))
-            await site.server.end()
+            await site.server.close()
             assert await socket.receive_json() == {"note": "over"}
             assert (await socket.receive()).type is aiohttp.WSMsgType.CLOSE
-        while site.wishes[-1] != PageCommand("watchers"):
+        while site.wishes[-1] != PageCommand("browsers"):
             await asyncio.sleep(0)
-        assert site.wishes[1] == PageCommand("watchers", watcher_count=1, is_cpu_rendering=True)
+        assert site.wishes[1] == PageCommand("browsers", browser_count=1, is_cpu_rendering=True)
         assert site.wishes[2:-1] == [
             PageCommand("pause"),
             PageCommand("request", "cube"),
