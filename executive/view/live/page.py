@@ -118,9 +118,9 @@ class LivePage:
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
-    def __call__(self, timed_event: TimedEvent) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Send an event that changes the page."""
-        event = timed_event.event
+        event = timed.event
         with self._catch_errors():
             if isinstance(event, FrameCaptured):
                 # The page does not show the depth image, which is the largest part of a frame.
@@ -130,7 +130,7 @@ class LivePage:
                 if self._browser_count and self._is_queue_short:
                     self._enqueue(self._last_camera_image)
             elif not isinstance(event, InputRead):
-                self._enqueue(timed_event)
+                self._enqueue(timed)
 
     def close(self) -> None:
         """Do nothing: the page stays open until `finish` is called."""

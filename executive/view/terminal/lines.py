@@ -34,12 +34,12 @@ class LineView:
         self._names_by_path = {node.path: node.name for node in nodes}
         self._skill_names_by_path = find_skill_names(nodes)
 
-    def __call__(self, timed_event: events.TimedEvent) -> None:
+    def __call__(self, timed: events.TimedEvent) -> None:
         """Write the line of an event, if it has one."""
-        if text := self._describe_event(timed_event.event):
-            self._stream.write(f"{timed_event.clock:9.2f} s  {text}\n")
+        if text := self._describe_event(timed.event):
+            self._stream.write(f"{timed.clock:9.2f} s  {text}\n")
             self._stream.flush()
-        self.timeline(timed_event)
+        self.timeline(timed)
 
     def close(self) -> None:
         """Do nothing: every line is already flushed."""

@@ -59,14 +59,14 @@ class TerminalView:
             self._key_reader = KeyReader(self._keyboard, run.control)
         self._show()
 
-    def __call__(self, timed_event: TimedEvent) -> None:
+    def __call__(self, timed: TimedEvent) -> None:
         """Update the view by an event; hide the view while the operator is asked for a request."""
-        if isinstance(timed_event.event, OperatorAsked):
+        if isinstance(timed.event, OperatorAsked):
             self._hide()
-        elif isinstance(timed_event.event, RequestGiven):
+        elif isinstance(timed.event, RequestGiven):
             self._show()
         with self._lock:
-            self.timeline(timed_event)
+            self.timeline(timed)
 
     def close(self) -> None:
         """Hide the view, so that the caller can print a summary."""
