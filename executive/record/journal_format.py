@@ -35,6 +35,7 @@ _KEYS_BY_KIND: Mapping[str, KeysView[str]] = {
 """Keys in the line of an event, by the kind of the event."""
 
 _ADAPTER_BY_KIND: Mapping[str, TypeAdapter[Event]] = {k: TypeAdapter(cls) for k, cls in EVENT_CLASSES.items()}
+"""Decoder of the fields of an event, by the kind of the event."""
 
 
 def make_journal_schema() -> dict[str, JsonValue]:
@@ -107,8 +108,7 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
     """Return the events in the lines of a journal.
 
     Raises:
-        InputError: A line contains no event, or the time of an event contradicts its control step; the
-            message begins with `file_name` and the number of the line.
+        InputError: A line contains no event, or the time of an event contradicts its control step.
     """
     events: list[TimedEvent] = []
     control_period = clock_offset = 0.0

@@ -41,7 +41,7 @@ class PictureRecorder:
         self._drawer = PictureDrawer(folder)
         self._timeline = Timeline(has_history=False)
         self._last_frame: Frame | None = None
-        self._looks: dict[int, tuple[Frame, FrameSearched]] = {}
+        self._look_by_frame_id: dict[int, tuple[Frame, FrameSearched]] = {}
         self._selected_frame_id: int | None = None
         self._undrawn_frame_id: int | None = None
         self._picture_count = 0
@@ -77,11 +77,12 @@ class PictureRecorder:
         """Store a look with its frame, and remove the oldest look if the store is full."""
         if self._last_frame is None or self._last_frame.id != look.frame:
             return
-        self._looks[look.frame] = self._last_frame, look
+        self._look_by_frame_id[look.frame] = self._last_frame, look
         self._undrawn_frame_id = look.frame
-        if len(self._looks) > MAX_STORED_LOOKS:
+        if len(self._look_by_frame_id) > MAX_STORED_LOOKS:
             # The look of the last selection is kept, because it is drawn again if the item is missed.
-            del self._looks[next(frame_id for frame_id in self._looks if frame_id != self._selected_frame_id)]
+            other_ids = (id for id in self._look_by_frame_id if id != self._selected_frame_id)
+            del self._look_by_frame_id[next(other_ids)]
 
     def _draw_failure(self, timed: TimedEvent, failure: NodeEnded) -> None:
         """Draw the selection of the item of a failed skill, or else the last look if it was not yet drawn."""
@@ -97,7 +98,7 @@ class PictureRecorder:
         """Queue the picture of a frame with the target that was selected in it, and with a failure."""
         if frame_id == self._undrawn_frame_id:
             self._undrawn_frame_id = None
-        look = self._looks.get(frame_id)
+        look = self._look_by_frame_id.get(frame_id)
         if look is None:
             self._missing_picture_counts[f"of looks before the last {MAX_STORED_LOOKS}"] += 1
         elif self._picture_count == MAX_PICTURES:
@@ -116,6 +117,7 @@ class PictureRecorder:
         selection: TargetSelected | None,
         failure: NodeEnded | None,
     ) -> PictureContent:
+        """Return the content of the picture of a look, from the state of the run."""
         frame, search = look
         timeline = self._timeline
         item = selection.item if selection else ""
@@ -124,7 +126,7 @@ class PictureRecorder:
         return PictureContent(
             image=frame.image,
             visible=frame.visible,
-            detections=[_to_detection(detected) for detected in search.confident],
+            detections=[_to_detection(each) for each in search.confident],
             selected=_find_selected_index(selection, search.confident, position),
             mission=timeline.started.mission if timeline.started else "",
             clock=timed.clock,
@@ -177,21 +179,18 @@ def _make_file_name(timed: TimedEvent, selection: TargetSelected | None, failure
 
 
 def _find_selected_index(
-    selection: TargetSelected | None, detected: Sequence[DetectedObject], position: Sequence[float] | None
+    selection: TargetSelected | None, objects: Sequence[DetectedObject], position: Sequence[float] | None
 ) -> int | None:
-    """Return the index of the detection of the selected item, or None if the index is unknown.
-
-    The detection that is nearest to the position of the item is returned, whatever its label: the ledger
-    derives the class of an item from all looks.
-    """
+    """Return the index of the object nearest to `position` of the selected item; None if it is unknown."""
     if selection is None:
         return None
-    if position is not None and detected:
-        return min(range(len(detected)), key=lambda index: math.dist(detected[index].position, position))
-    indices = [index for index, each in enumerate(detected) if each.label == selection.label]
+    # The label is not compared: the ledger derives the class of an item from all looks.
+    if position is not None and objects:
+        return min(range(len(objects)), key=lambda index: math.dist(objects[index].position, position))
+    indices = [index for index, each in enumerate(objects) if each.label == selection.label]
     return indices[0] if len(indices) == 1 else None
 
 
-def _to_detection(detected: DetectedObject) -> Detection:
-    left, top, right, bottom = detected.box
-    return Detection(detected.label, detected.confidence, (left, top, right, bottom))
+def _to_detection(detected_object: DetectedObject) -> Detection:
+    left, top, right, bottom = detected_object.box
+    return Detection(detected_object.label, detected_object.confidence, (left, top, right, bottom))

@@ -43,8 +43,8 @@ def read_mission_of_run(
 
     # The recorded cell file already contains the overrides of the cell.
     overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
-    given_cell = RecordedCell(read_cell(path), Path(start.base) / "cell.yaml")
-    return load_mission(mission or path / "mission.yaml", skills, overrides, recorded_cell=given_cell)
+    recorded_cell = RecordedCell(read_cell(path), Path(start.base) / "cell.yaml")
+    return load_mission(mission or path / "mission.yaml", skills, overrides, recorded_cell=recorded_cell)
 
 
 def read_cell(path: Path) -> CellConfig:

@@ -133,7 +133,7 @@ class RecordedRun:
     """A run with its recorder and its views.
 
     Attributes:
-        run: The run.
+        run: Run without views and recorder.
         loaded: Mission of the run.
         skills: Installed skills by name.
         directory: The run directory.
@@ -156,15 +156,13 @@ class RecordedRun:
         self._timeline = Timeline(has_history=False)
 
     def execute(self, seed: int, start_time: float) -> Result:
-        """Execute the run, write its result into the run directory, and return the result.
-
-        `start_time` is the value of `time.perf_counter()` before the assembly of the run [s].
+        """Execute the run, write its result, and return it; `start_time` is from `time.perf_counter()` [s].
 
         Raises:
             ExecutiveError: The result cannot be written.
         """
-        outcome, audit = self._execute_with_observers()
-        result = self._make_result(seed, outcome, audit, time.perf_counter() - start_time)
+        run_end, audit = self._execute_with_observers()
+        result = self._make_result(seed, run_end, audit, time.perf_counter() - start_time)
         problems = [self.recorder.problem]
         try:
             write_result(self.directory.result, result)
@@ -179,33 +177,34 @@ class RecordedRun:
         return result
 
     def _make_result(
-        self, seed: int, outcome: RunEnded, audit: Mapping[str, int] | None, wall_time: float
+        self, seed: int, run_end: RunEnded, audit: Mapping[str, int] | None, wall_time: float
     ) -> Result:
+        """Return the result from the end of the run, the true object counts, and the wall time [s]."""
         workcell, path, timeline = self.run.workcell, self.directory.path, self._timeline
         accounts = workcell.accounts
         item_counts = accounts.count_states()
         return Result(
             mission=self.loaded.mission.name,
-            status=outcome.status,
-            reason=outcome.reason,
-            message=outcome.message,
-            node=outcome.node,
-            held_item=outcome.held_item,
+            status=run_end.status,
+            reason=run_end.reason,
+            message=run_end.message,
+            node=run_end.node,
+            held_item=run_end.held_item,
             seed=seed,
             items=ItemCounts(**item_counts),
             unknown_labels=accounts.unknown_labels,
             assumption_reasons=accounts.assumption_reasons,
-            is_table_empty=outcome.is_table_empty,
-            audit=None if audit is None else make_audit(item_counts, audit, outcome.is_table_empty),
+            is_table_empty=run_end.is_table_empty,
+            audit=None if audit is None else make_audit(item_counts, audit, run_end.is_table_empty),
             planning=timeline.planning,
             requests=list_requests(timeline),
-            ticks=outcome.ticks,
-            robot_time_s=outcome.robot_time,
+            ticks=run_end.ticks,
+            robot_time_s=run_end.robot_time,
             wall_time_s=round(wall_time, 3),
             trace=self.recorder.trace,
             run=str(path),
             diagnosis=diagnose(
-                timeline, outcome, self.loaded, self.skills, path, lambda: workcell.cell.arm.at_rest
+                timeline, run_end, self.loaded, self.skills, path, lambda: workcell.cell.arm.at_rest
             ),
         )
 

@@ -76,8 +76,7 @@ def replay_run(
 ) -> ReplayResult:
     """Replay a recorded run with the installed skills, and compare its decisions with the journal.
 
-    The inputs from arm, tool, camera, detectors and operator come from the journal. The replay ends at the
-    first difference.
+    All inputs come from the journal. The replay ends at the first difference.
 
     Args:
         path: The run directory.
@@ -125,12 +124,9 @@ class _Comparison:
 
     Attributes:
         equal_count: Number of equal decisions.
-        difference: First recorded and first replayed decision that differ. Each is None if the record or the
-            replay has no further decision; both are None without a difference.
-        missing_input_message: Message about an input without a recorded value before the first difference,
-            or "".
-        is_complete: False if a decision in a recorded control step differs, or if the replay ended before the
-            last recorded decision.
+        difference: First recorded and first replayed decision that differ; None for a missing decision.
+        missing_input_message: Message about an input without a recorded value at the difference, or "".
+        is_complete: True if the replay repeated all recorded control steps.
         run: Run of the replay; the comparison stops it at the first difference.
     """
 
@@ -160,7 +156,7 @@ class _Comparison:
             return
         self._has_found_difference = True
         self.missing_input_message = self.run.replayed_cell.missing_input_message
-        # In the steps after the record, the replay only halts its skills.
+        # After the last recorded step, the replay only halts its skills.
         self.is_complete = decision.tick > self._log.last_tick
         if self._has_recorded_end or any(map(self._is_in_complete_step, filter(None, (recorded, decision)))):
             self.difference = (recorded, decision)

@@ -34,10 +34,10 @@ def resume_run(
 ) -> Result:
     """Resume the run in a directory, and return its result.
 
-    The replay of the journal up to the interruption restores the tree, the variables and the ledger; a
-    simulated world is rebuilt from its log, with the arm braking. Then the sensor of the tool determines
-    whether the tool holds its item, the positions of all items on the table are invalid until the next look
-    (image with its detections), and each interrupted skill is restarted.
+    The replay of the journal up to the interruption restores the tree, the variables and the ledger. A
+    simulated world is rebuilt from its log, with the arm braking. The sensor of the tool then determines
+    whether the tool holds its item, all positions of items are invalid until the next look, and each
+    interrupted skill is restarted.
 
     If the run ended as INCOMPLETE, the tree is restarted, and rejected and skipped items are searched again;
     placed items stay placed. If the run ended as SUCCESS or FAILURE without a result file, the result is
@@ -86,9 +86,7 @@ def resume_run(
             run.control.pause()
         replayed_events = run.replayed_cell.log.events
         recorder.add_to_trace(replayed_events)
-        earlier_events = [
-            timed for timed in replayed_events if isinstance(timed.event, EVENTS_WITHOUT_REPLAY)
-        ]
+        earlier_events = [each for each in replayed_events if isinstance(each.event, EVENTS_WITHOUT_REPLAY)]
         message = _describe_missing_commands(run.replayed_cell)
         recorded_run = RecordedRun(
             run, loaded, skills, directory, recorder, record.views, earlier_events, message
@@ -97,7 +95,7 @@ def resume_run(
 
 
 def _check_end(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
-    """Check the end of a run; return True if it ended as SUCCESS or FAILURE and lacks only its result file.
+    """Return True if a run ended as SUCCESS or FAILURE and lacks only its result file.
 
     Raises:
         InputError: The end of the run prevents a resumption.

@@ -93,7 +93,7 @@ class RunDirectory:
             InputError: A file cannot be written; each existing file is complete.
         """
         with convert_os_errors(f'write to the run directory "{self.path}"'):
-            # A library must not replace a file of the record: mission and cell are therefore written later.
+            # Mission and cell are written later, so that no library replaces them.
             for relative_path, text in (libraries or {}).items():
                 path = self.path / relative_path
                 if path not in (self.journal, self.result) and self.pictures not in path.parents:

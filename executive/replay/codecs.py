@@ -25,8 +25,8 @@ class Codec(NamedTuple):
     """Pair of functions that convert the values of an input to JSON and back.
 
     Attributes:
-        encode: Converts a value that the cell returned to a JSON value.
-        decode: Converts the JSON value to the type that the cell returned.
+        encode: Function that converts a value from the cell to a JSON value.
+        decode: Function that converts the JSON value to the type from the cell.
     """
 
     encode: Callable[[Any], Any]
@@ -96,8 +96,8 @@ def encode_detection(detection: Detection) -> list[Any]:
 
 def decode_detection(value: Any) -> Detection:
     """Return the detection that `encode_detection` encoded."""
-    label, confidence, box, rival = value
-    return Detection(label, confidence, tuple(box), rival)
+    label, confidence, box, second_confidence = value
+    return Detection(label, confidence, tuple(box), second_confidence)
 
 
 def encode_answer(answer: Answer) -> dict[str, Any]:
@@ -113,10 +113,10 @@ def encode_answer(answer: Answer) -> dict[str, Any]:
 
 def decode_answer(value: Any) -> Answer:
     """Return the answer that `encode_answer` encoded."""
-    found, doubtful, unknown = (
+    confident, doubtful, unknown = (
         tuple(map(decode_detection, value[key])) for key in ("confident", "doubtful", "unknown")
     )
-    return Answer(value["detector"], found, ErrorRates(*value["reliability"]), doubtful, unknown)
+    return Answer(value["detector"], confident, ErrorRates(*value["reliability"]), doubtful, unknown)
 
 
 def encode_observations(observations: Sequence[Observation]) -> list[Any]:
@@ -136,8 +136,8 @@ def encode_observations(observations: Sequence[Observation]) -> list[Any]:
 def decode_observations(value: Any) -> list[Observation]:
     """Return the observations that `encode_observations` encoded."""
     return [
-        Observation(decode_detection(detection), decode_array(position), std, confident, contradiction)
-        for detection, position, std, confident, contradiction in value
+        Observation(decode_detection(detection), decode_array(position), std, is_confident, contradiction)
+        for detection, position, std, is_confident, contradiction in value
     ]
 
 
@@ -149,6 +149,7 @@ def _encode_mask(mask: NDArray[np.bool_]) -> str:
 
 
 def _decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
+    """Return the mask `(height, width)` that `_encode_mask` encoded."""
     if not text:
         return np.ones((height, width), np.bool_)
     packed_bits = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8)
@@ -171,3 +172,4 @@ FRAME = Codec(encode_frame, decode_frame)
 ANSWER = Codec(encode_answer, decode_answer)
 OBSERVATIONS = Codec(encode_observations, decode_observations)
 MOTION = Codec(attrgetter("duration"), RecordedMotion)
+"""Codec of planned motions; the other codecs are named after the type that they convert."""

@@ -22,16 +22,11 @@ from executive.events import (
 UNKNOWN_ACTION = "unknown"
 """Value of `Interruption.last_action` if the journal may lack commands to arm or tool."""
 _COMMAND_EVENTS = (ToolCommanded, MotionPlanned)
-"""Kinds of events that precede commands: a `ToolCommanded` or `MotionPlanned` precedes each command."""
+"""Kinds of events of which one precedes each command to arm or tool."""
 
 
 class RecordedInput(NamedTuple):
-    """A value that a run read from its cell.
-
-    Attributes:
-        tick: Control step in which the value was read.
-        reading: Event with the value.
-    """
+    """Event with a value that a run read from its cell, and number of the control step of the reading."""
 
     tick: int
     reading: InputRead
@@ -43,8 +38,7 @@ class Interruption:
 
     Attributes:
         complete_step_count: Number of control steps before the interruption that the resumed run keeps.
-        last_action: Last action of the tool before the interruption, `open` or `close`; "" without an action;
-            `UNKNOWN_ACTION` if the journal may lack commands to arm or tool.
+        last_action: Last action of the tool, `open` or `close`; "" without an action, or `UNKNOWN_ACTION`.
         restarts_tree: True if the run ended as INCOMPLETE; the resumption then restarts the tree.
         resume_tick: First control step after the resumption.
     """
@@ -56,12 +50,7 @@ class Interruption:
 
 
 class Halt(NamedTuple):
-    """Halt of a run.
-
-    Attributes:
-        tick: Control step of the halt.
-        is_tree_ticked: True if the tree was ticked in this step before the halt.
-    """
+    """Halt of a run in control step `tick`, after the tree was ticked in this step if `is_tree_ticked`."""
 
     tick: int
     is_tree_ticked: bool
@@ -125,7 +114,7 @@ class InputLog:
 
     @property
     def last_action(self) -> str:
-        """Last action of the tool, `open` or `close`; "" if there was none."""
+        """Last action of the tool, `open` or `close`; "" without an action."""
         events = (timed.event for timed in reversed(self.events))
         return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
@@ -159,8 +148,7 @@ class InputLog:
     def _may_lack_command(self, last_command_tick: int, is_truncated: bool) -> bool:
         """Return True if the log may lack the last command to arm or tool.
 
-        The log contains all commands before its last control step, because events are written in order. If
-        the process was killed in the last step, the log may lack the event that precedes a command.
+        Events are written in order, so that only commands in and after the last logged step may be missing.
         `is_truncated` is True if this step is incomplete and the cell executed later steps.
         """
         if last_command_tick != self.last_tick:

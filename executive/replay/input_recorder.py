@@ -1,8 +1,4 @@
-"""Recorder of the inputs of a run: the values that the run reads from its cell.
-
-Each value that differs from the last value of the same input becomes an event. A replay of these values
-repeats all decisions of the tree, its skills and the ledger, without the cell.
-"""
+"""Recorder of the inputs of a run: the values that the run reads from its cell."""
 
 from __future__ import annotations
 

@@ -24,8 +24,7 @@ class InputFormat(NamedTuple):
     """Name and codec of a recorded input.
 
     Attributes:
-        name: Name of the input in the journal, in which `{detector}` represents the name of the detector, and
-            `{0}` the first argument of the access.
+        name: Name in the journal; contains `{detector}` for a detector and `{0}` for the first argument.
         codec: Codec of the value.
     """
 
@@ -72,10 +71,7 @@ _CODEC_BY_PATTERN = {
     re.sub(r"{\w+}", "*", input_format.name): input_format.codec
     for input_format in sorted(INPUT_FORMATS.values(), key=lambda input_format: -len(input_format.name))
 }
-"""Codec of each input by a pattern for its name (`detector.*.ready`).
-
-The longest patterns are first, because `detector.*` also matches `detector.yolo.ready`.
-"""
+"""Codec by pattern of input names (`detector.*`), the longest first: `detector.*.ready` is more specific."""
 
 
 def find_input_format(access: Access) -> InputFormat:
@@ -101,10 +97,7 @@ def check_input(name: str, value: JsonValue) -> None:
 
 
 def make_recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
-    """Return a copy of the cell with a recorder of its inputs, and with the clock of the run.
-
-    The copy emits an event before each action of the tool.
-    """
+    """Return a copy of the cell with recorded inputs, events of the actions of the tool, and `clock`."""
 
     def read_and_record(access: Access) -> Any:
         if access.role == "tool" and access.name in COMMANDS:

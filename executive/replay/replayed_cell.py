@@ -21,16 +21,14 @@ from executive.replay.recorded_cell import RECORDED_ROLES, find_input_format
 class ReplayedCell(CellWrapper):
     """Work cell that returns recorded inputs and ignores commands, up to the last interruption of the run.
 
-    After the last interruption, all reads and commands go to the inner cell. The ledger of the inner cell is
-    used from the start.
+    After the last interruption, all reads and commands go to the inner cell. The ledger is always the ledger
+    of the inner cell.
 
     Args:
         inner: Cell on which the run continues after the last interruption.
-        log: The recorded inputs.
-        last_interruption: Interruption at the end of the log, or None if the run is only replayed.
 
     Attributes:
-        log: The recorded inputs before the last interruption.
+        log: Recorded inputs before the last interruption.
         last_interruption: Interruption at the end of the log, or None if the run is only replayed.
         pending_interruption: Interruption at this control step; None after `resume`, or without interruption.
         is_live: True if all reads and commands go to the inner cell.
@@ -91,7 +89,7 @@ class ReplayedCell(CellWrapper):
 
     @contextmanager
     def suppress_commands(self) -> Iterator[None]:
-        """Ignore commands in the `with` block, in which reads return the last recorded inputs."""
+        """Ignore commands and return the last recorded inputs in the `with` block."""
         is_live, self.is_live = self.is_live, False
         try:
             yield
@@ -132,6 +130,7 @@ class ReplayedCell(CellWrapper):
         return self._steps * self.log.control_period + offset
 
     def _handle_access(self, access: Access) -> Any:
+        """Return the recorded result of an access to the cell, or the result from the inner cell."""
         if self.is_live:
             return access.proceed()
         return self._replayer.read(*find_input_format(access))

@@ -12,12 +12,11 @@ from executive.manipulation.tool_goals import make_approach, make_bin_goal, sort
 class LookaheadPlanner:
     """Lets the arm plan the motion that the mission will probably need next.
 
-    As soon as the tool holds an item, the planner plans the transit of the item to its bin. During a transit,
-    it plans the approach to the nearest target: in 60 runs of `sort_overhead` and `sort_wrist`, the skill
-    `SelectTarget` selected the nearest target after each of 222 transits.
+    When the tool holds an item, the planner plans the transit of the item to its bin. During a transit, the
+    planner plans the approach to the nearest target: in 60 runs of `sort_overhead` and `sort_wrist`, the
+    skill `SelectTarget` selected the nearest target after each of 222 transits.
 
-    The planner never changes a decision of the run. Its reads of the cell are not recorded, so that a replay
-    needs no planner.
+    The planner changes no decision, and its reads of the cell are not recorded: a replay needs no planner.
 
     Args:
         cell: The real cell, without the recorder of inputs.

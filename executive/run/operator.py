@@ -21,20 +21,20 @@ class ScriptedOperator:
     """Operator that gives the requests in a list, then quits; emits an event for each request.
 
     Args:
-        requests: The requests, each a text that `parse_request` accepts.
+        requests: Texts that `parse_request` accepts.
         choices: Classes that can be requested.
         emit: Function that emits an event.
-        start: Index in `requests` of the first request to give; larger than 0 in a resumed run.
+        index: Index of the first request; larger than 0 in a resumed run.
 
     Raises:
         InputError: A request is invalid.
     """
 
-    def __init__(self, requests: Sequence[str], choices: Sequence[str], emit: Emit, start: int = 0) -> None:
+    def __init__(self, requests: Sequence[str], choices: Sequence[str], emit: Emit, index: int = 0) -> None:
         for text in requests:
             if parse_request(text, choices) == "":
                 raise InputError(f'cannot pick "{text}"; ask for one of: {", ".join(choices)}')
-        self._requests = list(requests)[start:]
+        self._requests = list(requests)[index:]
         self._emit = emit
 
     def ask(self, choices: Sequence[str]) -> str | None:

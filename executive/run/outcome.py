@@ -1,4 +1,4 @@
-"""End of a run: end of its tick loop, final check of its items, and collection of error messages."""
+"""Outcome of a run: end of the tick loop, final check of the items, and messages of exceptions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ HALTED = LoopEnd("HALTED", "halted", "halted by the user")
 
 
 def to_loop_end(failure: Failure | None) -> LoopEnd:
-    """Return the end of the tick loop of a tree that failed with `failure`, or succeeded if it is None."""
+    """Return the end of the tick loop; `failure` is the failure of the tree, or None after its success."""
     if failure is None:
         return LoopEnd("SUCCESS")
     return LoopEnd("FAILURE", str(failure), failure.message, failure.path)
@@ -65,15 +65,13 @@ def check_items(accounts: Accounts) -> LoopEnd:
     return LoopEnd("SUCCESS")
 
 
-def finalize_items(accounts: Accounts, *, completed: bool) -> None:
+def finalize_items(accounts: Accounts, has_tree_succeeded: bool) -> None:
     """Let the ledger set the final state of each item, and check the sum of the counts.
-
-    `completed` is True if the tree succeeded.
 
     Raises:
         Fault: The number of seen items is not the sum of the placed, rejected, skipped and lost items.
     """
-    accounts.close(completed=completed)
+    accounts.close(completed=has_tree_succeeded)
     counts = accounts.count_states()
     if not is_balanced(counts):
         text = ", ".join(f"{count} {state}" for state, count in counts.items())

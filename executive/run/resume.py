@@ -27,19 +27,14 @@ from executive.tree.skill_leaf import SkillLeaf
 class ResumedRun(Run):
     """Run that replays an interrupted run, and then may continue on the real cell.
 
-    If the recorded run was resumed before, the run also repeats the earlier resumptions. Observers receive
-    the events of the replay and of the real cell; recorders receive only the events of the real cell.
+    The replay includes earlier resumptions of the run. Observers receive all events; recorders receive only
+    the events on the real cell.
 
     Args:
-        context: Cell and events of the run.
-        replayed_cell: Work cell of `context`, which replays the recorded run.
-        root: The tree.
-        control: Control with which other threads stop, pause and step the run.
-        mission: Name of the mission.
         is_realtime: True to execute the part on the real cell at the speed of the wall clock.
 
     Attributes:
-        replayed_cell: Work cell that replays the recorded run.
+        replayed_cell: Work cell of `context`, which replays the recorded run.
     """
 
     def __init__(
@@ -62,19 +57,16 @@ class ResumedRun(Run):
         control.call_between_ticks(self._stop_or_resume)
 
     def add_recorder(self, recorder: Observer) -> None:
-        """Call `recorder` with every event of the real cell, before the observers."""
+        """Call `recorder` with every event on the real cell, before the observers."""
         self._recorders.append(recorder)
 
     def _execute_tree(self) -> RunEnded:
-        """Execute the tree, and return its last end.
-
-        If the recorded run ended as INCOMPLETE and was then resumed, the tree is executed again.
-        """
-        outcome = super()._execute_tree()
-        while outcome.status == "INCOMPLETE" and self.replayed_cell.is_tree_restarted:
+        """Execute the tree, again after a recorded resumption of an INCOMPLETE run; return the last end."""
+        run_end = super()._execute_tree()
+        while run_end.status == "INCOMPLETE" and self.replayed_cell.is_tree_restarted:
             self._context.advance()
-            outcome = super()._execute_tree()
-        return outcome
+            run_end = super()._execute_tree()
+        return run_end
 
     def _stop_or_resume(self) -> None:
         """Stop or resume the run in the same control step as the recorded run; called between two ticks."""
@@ -90,16 +82,16 @@ class ResumedRun(Run):
         Raises:
             Fault: The arm did not come to rest.
         """
-        context, replayed = self._context, self.replayed_cell
-        replayed.resume()
-        if replayed.is_live:
-            # No event is recorded before this braking, so that a run that is killed now can be resumed again.
-            brake_arm(replayed.inner.cell, replayed.inner.advance)
+        context, replayed_cell = self._context, self.replayed_cell
+        replayed_cell.resume()
+        if replayed_cell.is_live:
+            # The arm brakes before the first recorded event, so that a killed run can be resumed again.
+            brake_arm(replayed_cell.inner.cell, replayed_cell.inner.advance)
             for recorder in self._recorders:
-                context.add_observer(recorder, first=True)
+                context.add_observer(recorder, is_first=True)
             context.planner, self._is_realtime = self._planner, self._is_realtime_on_cell
-        context.begin_step(replayed.steps)
-        if replayed.is_live:
+        context.begin_step(replayed_cell.steps)
+        if replayed_cell.is_live:
             self._wall_start = time.monotonic() - context.now
             step_count, versions = interruption.complete_step_count, dict(list_versions())
             context.emit(RunResumed(step_count, interruption.last_action, versions))
@@ -108,11 +100,11 @@ class ResumedRun(Run):
             restart_skills(self.root)
         else:
             # A halted skill must not open the tool, because the journal may lack the last motions of the arm.
-            with replayed.suppress_commands(), contextlib.suppress(Fault):
+            with replayed_cell.suppress_commands(), contextlib.suppress(Fault):
                 restart_skills(self.root)
         context.brake_arm()
         if interruption.restarts_tree:
-            replayed.accounts.reopen()
+            replayed_cell.accounts.reopen()
         if self._is_scene_known:
             reconcile_ledger(context.cell, interruption.last_action)
         else:
@@ -130,17 +122,14 @@ class ResumedRun(Run):
 
 
 def restart_skills(root: Behaviour) -> None:
-    """Halt every running skill, so that the next tick starts the skill again.
-
-    Control nodes keep their state, for instance the number of attempts; variables keep their values.
+    """Halt every running skill, so that the next tick starts the skill again; control nodes keep their state.
 
     Raises:
-        Fault: The clean-up of a skill failed; all other running skills are halted before the exception.
+        Fault: The clean-up of a skill failed; nevertheless all running skills are halted.
     """
-    running = [
-        node for node in root.iterate() if isinstance(node, SkillLeaf) and node.status is Status.RUNNING
-    ]
-    if problems := [problem for node in running for problem in halt(node)]:
+    leaves = [node for node in root.iterate() if isinstance(node, SkillLeaf)]
+    running_skills = [leaf for leaf in leaves if leaf.status is Status.RUNNING]
+    if problems := [problem for skill in running_skills for problem in halt(skill)]:
         raise Fault("; ".join(problems))
 
 
@@ -150,8 +139,8 @@ def reconcile_ledger(cell: Cell, last_action: str) -> None:
     During the interruption, a person may have moved objects, and the tool may have dropped its item.
 
     Args:
-        cell: The cell, with its arm at rest.
-        last_action: Last action of the tool, `open` or `close`; "" if there was none.
+        cell: Cell with its arm at rest.
+        last_action: Last action of the tool, `open` or `close`; "" without an action.
     """
     held_item, is_holding = cell.ledger.find_held_item(), cell.tool.holding
     if held_item is None and is_holding:

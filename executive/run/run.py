@@ -25,14 +25,11 @@ class Run:
 
     Args:
         context: Cell and events of the run.
-        root: The tree, which uses the cell and the events of `context`.
-        control: Control with which other threads stop, pause and step the run.
-        mission: Name of the mission.
         start_event: First event of the run; None for a run that continues an interrupted run.
         is_realtime: True to execute the run at the speed of the wall clock.
 
     Attributes:
-        root: The tree.
+        root: Root of the tree, which uses the cell and the events of `context`.
         control: Control with which other threads stop, pause and step the run.
         mission: Name of the mission.
     """
@@ -53,12 +50,13 @@ class Run:
         self._is_realtime = is_realtime
         self._wall_start = 0.0
         """Wall time at time 0 of the run's clock [s]."""
+        # State of tool and table after the run; they keep their initial values if a sensor fails.
         self._held_item = ""
         self._is_table_empty = False
 
     @property
     def tick(self) -> int:
-        """Number of control steps so far."""
+        """Number of executed control steps."""
         return self._context.tick
 
     @property
@@ -72,22 +70,22 @@ class Run:
         return self._context.workcell
 
     def add_observer(self, observer: Observer) -> None:
-        """Call `observer` with every event from now on."""
+        """Call `observer` with every later event."""
         self._context.add_observer(observer)
 
     def add_recorder(self, recorder: Observer) -> None:
-        """Call `recorder` with every event from now on, before the observers."""
-        self._context.add_observer(recorder, first=True)
+        """Call `recorder` with every later event, before the observers."""
+        self._context.add_observer(recorder, is_first=True)
 
     def execute(self) -> RunEnded:
         """Tick the tree until it ends, brake the arm, and return the end of the run.
 
         The first Ctrl-C halts the tree and brakes the arm; a second Ctrl-C ends the process at once.
         """
-        outcome = self._execute_tree()
-        if problems := catch_problems(lambda: self._context.emit(outcome)):
-            outcome = replace(outcome, status="FAULT", reason="fault", message=problems[0], node="")
-        return outcome
+        run_end = self._execute_tree()
+        if problems := catch_problems(lambda: self._context.emit(run_end)):
+            run_end = replace(run_end, status="FAULT", reason="fault", message=problems[0], node="")
+        return run_end
 
     def count_items(self) -> dict[str, int]:
         """Return the number of items by final state; `seen` is the number of all items except phantoms."""
@@ -110,10 +108,10 @@ class Run:
         if loop_end.traceback:
             # The arm brakes before this event is emitted, because a full disk must not prevent the braking.
             problems += catch_problems(lambda: context.emit(FaultRaised(loop_end.traceback)))
-        completed = loop_end.status == "SUCCESS"
+        has_succeeded = loop_end.status == "SUCCESS"
         problems += catch_problems(self._store_held_item)
         problems += catch_problems(self._store_table_state)
-        problems += catch_problems(lambda: finalize_items(self.workcell.accounts, completed=completed))
+        problems += catch_problems(lambda: finalize_items(self.workcell.accounts, has_succeeded))
         if problems and loop_end.status == "FAULT":
             loop_end = replace(loop_end, message="; ".join([loop_end.message, *problems]))
         elif problems:
@@ -161,7 +159,7 @@ class Run:
             self._held_item = cell.ledger.find_held_item() or "something"
 
     def _store_table_state(self) -> None:
-        """Store whether the table is empty by the ledger, and no look showed an undeclared label."""
+        """Store True if the ledger contains no object to sort, and no look showed an undeclared label."""
         ledger = self._context.cell.ledger
         self._is_table_empty = ledger.is_table_empty() and not ledger.unknown_labels
 
@@ -169,5 +167,5 @@ class Run:
         """Return the last event of the run; if the tree succeeded, the items determine the status."""
         if loop_end.status == "SUCCESS":
             loop_end = check_items(self.workcell.accounts)
-        end = (self._is_table_empty, self._held_item, self.tick, round(self.now, 6))
-        return RunEnded(loop_end.status, loop_end.reason, loop_end.message, loop_end.node, *end)
+        cause = (loop_end.status, loop_end.reason, loop_end.message, loop_end.node)
+        return RunEnded(*cause, self._is_table_empty, self._held_item, self.tick, round(self.now, 6))

@@ -1,4 +1,4 @@
-"""Context of a run: work cell, recorder of inputs, number of control steps, and observers."""
+"""Context of a run: work cell, control step, recorder of inputs, and observers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from executive.run.lookahead_planner import LookaheadPlanner
 MAX_BRAKING_TIME = 2.0
 """Maximum time from the command to brake until the arm is at rest [s]."""
 MAX_BRAKING_ATTEMPTS = 4
-"""Maximum number of commands to brake; more than one, because an observer of a command may raise an error."""
+"""Maximum number of commands to brake; a command may fail, because an observer may raise an exception."""
 
 
 class RunContext:
@@ -25,9 +25,9 @@ class RunContext:
     The context is created before the work cell, because the work cell emits events during its creation.
 
     Attributes:
-        tick: Number of control steps so far.
-        workcell: The work cell.
-        cell: Cell for skills; its inputs are recorded, and its clock shows the start of the control step.
+        tick: Number of the current control step.
+        workcell: Work cell of the run.
+        cell: Cell for skills with recorded inputs; its clock shows the start of the control step.
         planner: Planner of the probable next motion, or None.
     """
 
@@ -46,7 +46,7 @@ class RunContext:
 
     @property
     def now(self) -> float:
-        """Time on the run's clock at which this control step began [s]."""
+        """Time on the run's clock at the start of the current control step [s]."""
         return self.tick * self._control_period + self._clock_offset
 
     def connect(self, workcell: Workcell, planner: LookaheadPlanner | None = None) -> None:
@@ -58,9 +58,9 @@ class RunContext:
         clock = StepClock(lambda: self.now, self._control_period)
         self.cell = make_recorded_cell(workcell.cell, self._recorder, clock, self.emit)
 
-    def add_observer(self, observer: Observer, *, first: bool = False) -> None:
-        """Call `observer` with every event from now on; if `first` is True, before all other observers."""
-        self._observers.insert(0 if first else len(self._observers), observer)
+    def add_observer(self, observer: Observer, *, is_first: bool = False) -> None:
+        """Call `observer` with every later event; if `is_first` is True, before all other observers."""
+        self._observers.insert(0 if is_first else len(self._observers), observer)
 
     def emit(self, event: Event) -> None:
         """Pass an event with its control step and time to all observers."""
@@ -95,9 +95,7 @@ class RunContext:
 
 
 def brake_arm(cell: Cell, advance: Callable[[], None]) -> None:
-    """Brake the arm of a cell until it is at rest.
-
-    A failed command to brake is repeated. `advance` executes one control step.
+    """Brake the arm of a cell until it is at rest; `advance` executes one control step.
 
     Raises:
         Fault: The arm is not at rest, or a command to brake failed.

@@ -27,8 +27,8 @@ VACUUM_DECAY_TIME = 0.1
 def recover_scene(cell: Cell) -> Steps:
     """Empty the tool, and observe the table and the bins.
 
-    A camera on the arm also observes each bin from above. Afterwards the ledger knows the place of each
-    detected item; the mission searches for the undetected items, and rejects an item that it does not find.
+    A camera on the arm also observes each bin from above. The ledger then knows the place of each detected
+    item; the mission searches for the other items.
 
     Raises:
         Fault: The tool holds an object that cannot be put down.
@@ -59,7 +59,7 @@ def _put_down(cell: Cell) -> Steps:
     tallest_class = max(cell.classes.values(), key=lambda object_class: object_class.height)
     goal = make_put_down_goal(cell, tallest_class, DROP_HEIGHT)
     problems = []
-    # A load that is taller than the real one may collide at the start; the second plan ignores the load.
+    # The tallest load may collide at the start although the real load does not; the second plan has no load.
     for load in (Load(tallest_class, cell.tool.holding_force), None):
         try:
             yield from _move(cell, goal, Task(load, list_obstacles(cell)))
@@ -74,7 +74,7 @@ def _put_down(cell: Cell) -> Steps:
 
 
 def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
-    """Move to a goal if possible, observe the whole camera image, and return the frame."""
+    """Move to a goal if possible, update the ledger from the whole camera image, and return the frame."""
     with suppress(Unreachable, Blocked):
         yield from _move(cell, goal, Task(obstacles=list_obstacles(cell)))
     frame = cell.camera.capture()

@@ -18,17 +18,16 @@ HALT_SIGNALS = (signal.SIGINT, *TERMINATION_SIGNALS)
 
 @contextmanager
 def handle_signals(
-    numbers: Sequence[int], handler: Callable[[int, FrameType | None], None]
+    signal_numbers: Sequence[int], handler: Callable[[int, FrameType | None], None]
 ) -> Iterator[Callable[[], None]]:
     """Handle signals in the `with` block, and yield a function that restores the previous handlers.
 
-    A signal that the process ignores stays ignored (`nohup`). SIGINT is handled even if it is ignored: a
-    waiting worker process ignores SIGINT, but SIGINT must halt a run in this process. Outside the main thread
-    no signal is handled, because Python does not allow it.
+    A signal that the process ignores stays ignored (`nohup`), except SIGINT: a waiting worker process ignores
+    SIGINT, but SIGINT must halt a run. Python allows no handlers outside the main thread.
     """
     previous_handlers = {}
     if threading.current_thread() is threading.main_thread():
-        for number in numbers:
+        for number in signal_numbers:
             if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN:
                 previous_handlers[number] = signal.signal(number, handler)
 

@@ -25,10 +25,7 @@ def list_versions() -> Mapping[str, str]:
 
 
 def list_requirements(extra: str = "") -> tuple[str, ...]:
-    """Return the packages that this project requires on this Python; empty if the project is not installed.
-
-    Without `extra`, the packages of all extras are omitted; with `extra`, only its packages are returned.
-    """
+    """Return the required packages of this project, or of its `extra`; empty if it is not installed."""
     try:
         requirements = [Requirement(line) for line in metadata.requires(DISTRIBUTION) or ()]
     except metadata.PackageNotFoundError:

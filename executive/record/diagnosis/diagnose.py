@@ -105,10 +105,9 @@ def _list_deciding_readings(run: FailedRun, skills: Mapping[str, type[Skill]]) -
     node, skill_end = run.deciding_node, run.deciding_activation
     if skill_end is None or not isinstance(node, SkillNode):
         return
-    readings, end_tick = skill_end.readings, skill_end.end_tick
-    exceptions = [reading for reading in readings if reading.raised and reading.tick == end_tick]
+    exceptions = [each for each in skill_end.readings if each.raised and each.tick == skill_end.end_tick]
     names = [name for part in skills[node.skill].uses for name in DECIDING_INPUTS.get(part, ())]
-    values = [reading for reading in readings if reading.name in names and not reading.raised]
+    values = [each for each in skill_end.readings if each.name in names and not each.raised]
     yield from reversed(exceptions or values)
 
 
