@@ -30,29 +30,30 @@ FLANGE_OFFSET = 0.045
 """Distance from the origin of link 7 to the outer face of the flange, along the z axis of the link [m]."""
 
 SHOULDER_HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.36, 0.42, 0.40, 0.081 + FLANGE_OFFSET
-"""Dimensions of the arm [m], from pybullet_data kuka_iiwa/model.urdf."""
+"""Lengths between base, shoulder, elbow, wrist and flange [m], from pybullet_data kuka_iiwa/model.urdf."""
 
 FLIPS = np.array([[s, e, w] for s in (1, -1) for e in (1, -1) for w in (1, -1)])
 """Signs of joints 2, 4 and 6 in the eight solutions of one redundancy angle `(8, 3)`."""
 
 _JOINT_6_ANGLES = 120.0, 115.0, 110.0, 105.0, 100.0, 95.0, 90.0  # [degree]
-_LINK_DISTANCES = -0.0132, -0.0059, 0.0012, 0.0079, 0.0141, 0.0195, 0.0237  # [m]
+_LINK_DISTANCES = -0.0132, -0.0059, 0.0012, 0.0079, 0.0141, 0.0195, 0.0237  # [m] at `_JOINT_6_ANGLES`
 
+# A flip changes the unflipped joint positions `q` to `_FLIP_SIGNS * q + _FLIP_OFFSETS`.
 _FLIP_OFFSETS = np.zeros((8, 7))
 _FLIP_OFFSETS[:, [0, 2]] += (FLIPS[:, :1] < 0) * math.pi
 _FLIP_OFFSETS[:, [2, 4]] += (FLIPS[:, 1:2] < 0) * math.pi
 _FLIP_OFFSETS[:, [4, 6]] += (FLIPS[:, 2:] < 0) * math.pi
 _FLIP_SIGNS = np.ones((8, 7))
 _FLIP_SIGNS[:, [1, 3, 5]] = FLIPS
-_TURNS_ABOUT_Z = (True, False, True, False, True, False, True)
+_IS_Z_JOINT = (True, False, True, False, True, False, True)  # The other joints turn about y.
 _ROUNDING_ERROR = 1e-9  # [m]
 
 
 def interpolate_max_joint_6_angle(min_link_distance: float) -> float:
     """Return the maximum angle of joint 6 [rad] at which links 5 and 7 keep a minimum distance [m].
 
-    The distance of these links depends only on joint 6, with an error of up to 0.3 mm. The table was measured
-    on the collision shapes of pybullet_data kuka_iiwa/model.urdf. Angles up to 90 degrees are always allowed.
+    Only joint 6 changes the distance of links 5 and 7, apart from an error of up to 0.3 mm. The distances
+    were measured on the collision shapes of pybullet_data kuka_iiwa/model.urdf. 90° is always allowed.
     """
     return math.radians(float(np.interp(min_link_distance, _LINK_DISTANCES, _JOINT_6_ANGLES)))
 
@@ -79,9 +80,10 @@ class Iiwa14:
         self.joint_range = JointRange(lower, upper)
         self._tool_length = tool_length
         self._wrist_to_tool = WRIST_TO_FLANGE + tool_length
-        max_elbow_angle = max(-lower[3], upper[3])
-        min_square = UPPER_ARM**2 + FOREARM**2 + 2 * UPPER_ARM * FOREARM * math.cos(max_elbow_angle)
-        self._min_wrist_distance, self._max_wrist_distance = math.sqrt(min_square), UPPER_ARM + FOREARM
+        cos4 = math.cos(max(-lower[3], upper[3]))
+        # Law of cosines in the triangle of shoulder, elbow and wrist.
+        self._min_wrist_distance = math.sqrt(UPPER_ARM**2 + FOREARM**2 + 2 * UPPER_ARM * FOREARM * cos4)
+        self._max_wrist_distance = UPPER_ARM + FOREARM
 
     def compute_tool_pose(self, q: ArrayLike) -> Pose:
         """Return the tool pose `X_WT` at the joint positions `q` `(7,)` [rad]."""
@@ -99,8 +101,8 @@ class Iiwa14:
     def compute_tcps_and_axes(self, qs: Array) -> tuple[Array, Array]:
         """Return tool centre points `(N, 3)` [m] and tool axes `(N, 3)` at joint positions `(N, 7)` [rad].
 
-        The function rotates two vectors from joint to joint, from the wrist to the base, which takes a fifth
-        of the time of complete frames. Joint 7 has no effect, because its axis is the tool axis.
+        The function transforms both vectors joint by joint from the wrist to the base, which takes a fifth of
+        the time of complete frames. Joint 7 has no effect, because its axis is the tool axis.
         """
         cosines, sines = np.cos(qs.T), np.sin(qs.T)
         zero = np.zeros(len(qs))
@@ -108,19 +110,19 @@ class Iiwa14:
         axis = np.array([cosines[4] * axis[0], sines[4] * axis[0], axis[2]])
         tcp = self._wrist_to_tool * axis
         tcp[2] += FOREARM
-        vectors = np.stack([tcp, axis], axis=1)  # (3, 2, N)
-        vectors = _rotate_about_y(vectors, cosines[3], -sines[3])
-        vectors[2, 0] += UPPER_ARM
+        tcp_and_axis = np.stack([tcp, axis], axis=1)  # (3, 2, N)
+        tcp_and_axis = _rotate_about_y(tcp_and_axis, cosines[3], -sines[3])
+        tcp_and_axis[2, 0] += UPPER_ARM
         for joint in (2, 1, 0):
             rotate = _rotate_about_y if joint == 1 else _rotate_about_z
-            vectors = rotate(vectors, cosines[joint], sines[joint])
-        vectors[2, 0] += SHOULDER_HEIGHT
-        return vectors[:, 0].T, vectors[:, 1].T
+            tcp_and_axis = rotate(tcp_and_axis, cosines[joint], sines[joint])
+        tcp_and_axis[2, 0] += SHOULDER_HEIGHT
+        return tcp_and_axis[:, 0].T, tcp_and_axis[:, 1].T
 
     def find_branch(self, q: ArrayLike) -> BranchKey:
-        """Return index of the flip and redundancy angle [rad] of the joint positions `q` `(7,)` [rad]."""
-        is_negative = np.asarray(q, dtype=float)[[1, 3, 5]] < 0
-        return int(is_negative @ [4, 2, 1]), self.compute_redundancy_angle(q)
+        """Return the branch of `q` `(7,)` [rad]: the index of the flip, and the redundancy angle [rad]."""
+        is_flipped = np.asarray(q, dtype=float)[[1, 3, 5]] < 0  # shoulder, elbow, wrist
+        return int(is_flipped @ [4, 2, 1]), self.compute_redundancy_angle(q)
 
     def compute_redundancy_angle(self, q: ArrayLike) -> float:
         """Return the angle of the elbow about the line from shoulder to wrist [rad]; 0: elbow up."""
@@ -134,13 +136,13 @@ class Iiwa14:
         flip, angle = branch
         return self._solve_angles(X_WT, np.array([angle]))[int(flip), 0]
 
-    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, spacing: float) -> Solutions:
+    def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
         """Return the solutions of a tool pose for all flips and evenly spaced redundancy angles.
 
-        The first redundancy angle is that of the joint positions `q_seed` `(7,)` [rad]. The function raises
-        Unreachable if there is no solution.
+        The first redundancy angle is the angle of the joint positions `q_seed` `(7,)` [rad]. The function
+        raises Unreachable if there is no solution.
         """
-        offsets = np.radians(np.arange(0.0, 360.0, math.degrees(spacing)))
+        offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
         angles = self.compute_redundancy_angle(q_seed) + offsets
         solutions = self._solve_angles(X_WT, angles).reshape(-1, IIWA14_JOINT_COUNT)
         return Solutions(solutions, list(product(range(len(FLIPS)), angles.tolist())))
@@ -154,7 +156,7 @@ class Iiwa14:
         wrist = X_WT.position - self._wrist_to_tool * X_WT.rotation[:, 2]
         shoulder_to_wrist = wrist - (0.0, 0.0, SHOULDER_HEIGHT)
         distance = self._measure_wrist_distance(X_WT, shoulder_to_wrist)
-        n, up, side = _compute_elbow_frame(shoulder_to_wrist)
+        wrist_direction, up, side = _compute_elbow_frame(shoulder_to_wrist)
         cos4 = (distance**2 - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
         q4 = math.acos(min(1.0, max(-1.0, cos4)))
         cos_upper_arm_angle = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
@@ -162,19 +164,19 @@ class Iiwa14:
 
         elbow_direction = np.outer(np.cos(angles), up) + np.outer(np.sin(angles), side)
         # Frame 3: z along the upper arm, y normal to the triangle of shoulder, elbow and wrist.
-        z3 = math.cos(upper_arm_angle) * n + math.sin(upper_arm_angle) * elbow_direction
-        y3 = np.cross(n, elbow_direction)
+        z3 = math.cos(upper_arm_angle) * wrist_direction + math.sin(upper_arm_angle) * elbow_direction
+        y3 = np.cross(wrist_direction, elbow_direction)
         x3 = np.asarray(np.cross(y3, z3), dtype=np.float64)
         x4 = math.cos(q4) * x3 + math.sin(q4) * z3
         z4 = -math.sin(q4) * x3 + math.cos(q4) * z3
         R_47 = np.stack([x4, y3, z4], axis=-2) @ X_WT.rotation
 
-        unflipped = np.empty((len(angles), IIWA14_JOINT_COUNT))
-        unflipped[:, 0], unflipped[:, 1], unflipped[:, 2] = _find_zyz_angles(x3, y3, z3)
-        unflipped[:, 3] = q4
-        columns = R_47.transpose(2, 0, 1)
-        unflipped[:, 4], unflipped[:, 5], unflipped[:, 6] = _find_zyz_angles(*columns)
-        return wrap_angles(unflipped * _FLIP_SIGNS[:, None] + _FLIP_OFFSETS[:, None])
+        unflipped_qs = np.empty((len(angles), IIWA14_JOINT_COUNT))
+        unflipped_qs[:, :3] = _find_zyz_angles(x3, y3, z3)
+        unflipped_qs[:, 3] = q4
+        x7, y7, z7 = R_47.transpose(2, 0, 1)
+        unflipped_qs[:, 4:] = _find_zyz_angles(x7, y7, z7)
+        return wrap_angles(unflipped_qs * _FLIP_SIGNS[:, None] + _FLIP_OFFSETS[:, None])
 
     def _measure_wrist_distance(self, X_WT: Pose, shoulder_to_wrist: Array) -> float:
         """Return the length of the vector from shoulder to wrist `(3,)` [m], or raise Unreachable."""
@@ -197,11 +199,11 @@ class Iiwa14:
         """Return the frames of joints 1 to 7 at `q` `(7,)` [rad], followed by the frame of the tool."""
         frames = []
         R, p = np.eye(3), np.array([0.0, 0.0, SHOULDER_HEIGHT])
-        lengths = {3: UPPER_ARM, 5: FOREARM}
+        lengths = {3: UPPER_ARM, 5: FOREARM}  # [m] before the joint with this index
         angles = np.asarray(q, dtype=float) * (1, 1, 1, -1, 1, 1, 1)
-        for i, (c, s) in enumerate(zip(np.cos(angles), np.sin(angles), strict=True)):
-            p = p + lengths.get(i, 0.0) * R[:, 2]
-            R = R @ _make_rotation(c, s, _TURNS_ABOUT_Z[i])
+        for joint, (c, s) in enumerate(zip(np.cos(angles), np.sin(angles), strict=True)):
+            p = p + lengths.get(joint, 0.0) * R[:, 2]
+            R = R @ _make_rotation(c, s, _IS_Z_JOINT[joint])
             frames.append(Pose(R, p))
         return [*frames, Pose(R, p + self._wrist_to_tool * R[:, 2])]
 
@@ -216,15 +218,15 @@ def _rotate_about_y(v: Array, c: Array, s: Array) -> Array:
     return np.array([c * v[0] + s * v[2], v[1], c * v[2] - s * v[0]])
 
 
-def _make_rotation(c: float, s: float, about_z: bool) -> Array:
+def _make_rotation(c: float, s: float, is_about_z: bool) -> Array:
     """Return the rotation matrix about z, or about y, of the angle with cosine `c` and sine `s`."""
-    if about_z:
+    if is_about_z:
         return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
-def _find_zyz_angles(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-    """Return angles `a`, `b >= 0`, `c` with `Rz(a) Ry(b) Rz(c) = [x y z]`; `x`, `y` and `z` are `(N, 3)`."""
+def _find_zyz_angles(x: Array, y: Array, z: Array) -> Array:
+    """Return `a`, `b >= 0`, `c` `(N, 3)` with `Rz(a) Ry(b) Rz(c) = [x y z]`, from columns `(N, 3)`."""
     sine = np.hypot(z[:, 0], z[:, 1])
     is_singular = sine < 1e-9  # Only the sum or difference of a and c is defined: a is set to 0.
     a = np.where(is_singular, 0.0, np.arctan2(z[:, 1], z[:, 0]))
@@ -233,13 +235,13 @@ def _find_zyz_angles(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]
         np.arctan2(x[:, 1], np.where(z[:, 2] > 0, x[:, 0], -x[:, 0])),
         np.arctan2(y[:, 2], -x[:, 2]),
     )
-    return a, np.arctan2(sine, z[:, 2]), c
+    return np.column_stack([a, np.arctan2(sine, z[:, 2]), c])
 
 
 def _compute_elbow_frame(shoulder_to_wrist: Array) -> tuple[Array, Array, Array]:
-    """Return the unit vector from shoulder to wrist, its normal nearest to up, and its second normal."""
-    n = shoulder_to_wrist / np.linalg.norm(shoulder_to_wrist)
-    up = np.array([0.0, 0.0, 1.0]) if abs(n[2]) < 0.9999 else np.array([1.0, 0.0, 0.0])
-    up = up - (up @ n) * n
+    """Return three orthogonal unit vectors: from shoulder to wrist, as far upwards as possible, sideways."""
+    direction = shoulder_to_wrist / np.linalg.norm(shoulder_to_wrist)
+    up = np.array([0.0, 0.0, 1.0]) if abs(direction[2]) < 0.9999 else np.array([1.0, 0.0, 0.0])
+    up = up - (up @ direction) * direction
     up /= np.linalg.norm(up)
-    return n, up, np.cross(n, up)
+    return direction, up, np.cross(direction, up)

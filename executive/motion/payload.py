@@ -18,8 +18,8 @@ SAFETY_FACTOR = 2.0
 DISTANCE_PER_ACCELERATION = 0.02
 """Factor that converts accelerations to distances in the constraints of the optimizer [m per m/s²]."""
 SAMPLE_STRIDE = 4
-"""Interval between the samples at which the constraints are evaluated; a divisor of `SAMPLES_PER_STEP`."""
-_SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])
+"""Every `SAMPLE_STRIDE`-th sample has a constraint; a divisor of `SAMPLES_PER_STEP`."""
+_SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])  # factors of three samples in `acceleration * time step²`
 _FINITE_DIFFERENCE_STEP = 1e-4  # [rad]
 MIN_LIFT_ACCELERATION = 0.5
 """Lower limit of the maximum acceleration of a lift, even if the seal withstands less [m/s²]."""
@@ -50,7 +50,7 @@ class PayloadLimit:
         return max(self._max_specific_force - GRAVITY, MIN_LIFT_ACCELERATION)
 
     def find_acceleration_fraction(self, trajectory: Trajectory) -> float:
-        """Return the largest factor on the accelerations of a motion, 0 to 1, with the safety factor kept."""
+        """Return the largest fraction of the accelerations, 0 to 1, that keeps the safety factor."""
         centres = self._locate_load(trajectory.samples.q)
         if len(centres) < 4:
             return 1.0
@@ -73,25 +73,28 @@ class PayloadLimit:
             sample_time: Time between two samples [s].
             max_slack: Constraints with a larger slack are omitted [m].
         """
-        # The chosen samples include the ends of the time steps, where the acceleration has its extrema.
-        rows = np.arange(SAMPLE_STRIDE - 1, len(qs) - 1, SAMPLE_STRIDE)[:, None] + np.array([-1, 0, 1])
+        # The constrained samples include the ends of the time steps, where the acceleration has its extrema.
+        # Each row of `samples` contains a constrained sample between its two neighbours.
+        samples = np.arange(SAMPLE_STRIDE - 1, len(qs) - 1, SAMPLE_STRIDE)[:, None] + np.array([-1, 0, 1])
         centres = self._locate_load(qs)
-        acceleration = _SECOND_DIFFERENCE @ centres[rows] / sample_time**2
+        acceleration = _SECOND_DIFFERENCE @ centres[samples] / sample_time**2
         specific_force = acceleration + np.array([0.0, 0.0, GRAVITY])
         magnitude = np.linalg.norm(specific_force, axis=1)
         slack = DISTANCE_PER_ACCELERATION * (self._max_specific_force - magnitude)
-        chosen = np.nonzero(slack < max_slack)[0]
-        rows, direction = rows[chosen], specific_force[chosen] / magnitude[chosen, None]
-        displaced_qs = qs[rows][:, :, None] + _FINITE_DIFFERENCE_STEP * np.eye(qs.shape[1])
+        is_close = slack < max_slack
+        slack, samples, acceleration = slack[is_close], samples[is_close], acceleration[is_close]
+        force_direction = specific_force[is_close] / magnitude[is_close, None]
+        displaced_qs = qs[samples][:, :, None] + _FINITE_DIFFERENCE_STEP * np.eye(qs.shape[1])
         displaced_centres = self._locate_load(displaced_qs.reshape(-1, qs.shape[1]))
         displaced_centres = displaced_centres.reshape(*displaced_qs.shape[:3], 3)
-        jacobian = (displaced_centres - centres[rows][:, :, None]) / _FINITE_DIFFERENCE_STEP
-        projected = np.einsum("k,rkjx,rx->rkj", _SECOND_DIFFERENCE, jacobian, direction)
-        gradients = -DISTANCE_PER_ACCELERATION / sample_time**2 * projected
-        # If the same positions take more time, accelerations fall with the square of the time.
-        along_pull = np.einsum("rx,rx->r", direction, acceleration[chosen])
-        step_derivatives = 2 * DISTANCE_PER_ACCELERATION * along_pull / (SAMPLES_PER_STEP * sample_time)
-        return LinearizedConstraints(slack[chosen], rows, gradients, step_derivatives)
+        jacobian = (displaced_centres - centres[samples][:, :, None]) / _FINITE_DIFFERENCE_STEP
+        # Axes of the arrays: r constraint, k sample, j joint, x coordinate.
+        force_gradients = np.einsum("k,rkjx,rx->rkj", _SECOND_DIFFERENCE, jacobian, force_direction)
+        gradients = -DISTANCE_PER_ACCELERATION / sample_time**2 * force_gradients
+        # If a motion takes more time, its accelerations fall with the square of the time.
+        force_change = np.einsum("rx,rx->r", force_direction, acceleration)
+        step_derivatives = 2 * DISTANCE_PER_ACCELERATION * force_change / (SAMPLES_PER_STEP * sample_time)
+        return LinearizedConstraints(slack, samples, gradients, step_derivatives)
 
     def _locate_load(self, qs: Array) -> Array:
         """Return the centre of the load `(N, 3)` [m] at joint positions `(N, n)` [rad]."""
@@ -100,9 +103,12 @@ class PayloadLimit:
 
 
 def _find_acceleration_fractions(accelerations: Array, max_specific_force: float) -> Array:
-    """Return the largest `k`, 0 to 1, at which `|k a + g|` is within its maximum; `a`: `(N, 3)` [m/s²]."""
-    square = np.sum(accelerations**2, axis=1) + 1e-12
-    product = GRAVITY * accelerations[:, 2]
-    discriminant = product**2 - square * (GRAVITY**2 - max_specific_force**2)
-    fractions = (np.sqrt(np.maximum(discriminant, 0.0)) - product) / square
+    """Return the largest `k`, 0 to 1, for which `|k a + g|` is within its maximum; `a`: `(N, 3)` [m/s²].
+
+    With the maximum `f`, `k` solves the quadratic equation `k² (a a) + 2 k (a g) + g g - f² = 0`.
+    """
+    a_a = np.sum(accelerations**2, axis=1) + 1e-12
+    a_g = GRAVITY * accelerations[:, 2]
+    discriminant = a_g**2 - a_a * (GRAVITY**2 - max_specific_force**2)
+    fractions = (np.sqrt(np.maximum(discriminant, 0.0)) - a_g) / a_a
     return np.clip(np.where(discriminant < 0, 0.0, fractions), 0.0, 1.0)

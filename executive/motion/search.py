@@ -37,7 +37,7 @@ EXTRA_HEIGHTS = (0.0, 0.05, 0.10)
 """Heights of the corners above the travel height, in the order of the attempts [m]."""
 LIFT_OFF_DISTANCE = 5e-4
 """Length of the straight motion upwards that separates a load from the surface below [m]."""
-MIN_COSINE_DOWN = 0.99
+MIN_RISE_COSINE = 0.99
 """Minimum cosine between the tool axis and straight down for a motion that begins with a rise."""
 
 
@@ -76,16 +76,17 @@ class MotionSearch:
             # Without a load, the tool may tilt: the arm must reach named poses from any configuration.
             self._discs = self._discs._replace(min_cosine=-1.0)
         self._payload = PayloadLimit(task.load, kinematics) if task.load else None
-        ends = kinematics.compute_tcps_and_axes(start[None]), self._find_free_end()
-        tcps, axes = map(np.concatenate, zip(*ends, strict=True))
+        start_tcp_and_axis = kinematics.compute_tcps_and_axes(start[None])
+        tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, self._find_free_end(), strict=True))
         self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2])
         self._clearance.relax_end_margins(tcps, axes, self._discs)
+        # Results of `_plan_rise` by its arguments, because all candidates share them.
         self._rises: dict[tuple[float, bool], tuple[list[MotionPiece], JointState]] = {}
         self._departure = departure = self._plan_departure(start, float(tcps[0, 2]))
         self._start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
 
     def list_motions(self) -> Iterator[Trajectory]:
-        """Yield motions, the best first: direct and optimized motions, then motions that stop at corners."""
+        """Yield motions in order of preference: direct and optimized motions, then motions with corners."""
         candidates = list(islice(self._list_candidates(), MAX_CANDIDATES))
         yield from self._list_direct_and_optimized(candidates)
         for extra_height in EXTRA_HEIGHTS:
@@ -110,30 +111,32 @@ class MotionSearch:
         return np.array([[x, y, z + self._end.guarded_length]]), np.array([[0.0, 0.0, -1.0]])
 
     def _list_candidates(self) -> Iterator[Candidate]:
+        """Yield candidates for the end of the motion, the fastest first."""
         if not isinstance(self._end, Goal):
             yield Candidate(0.0, JointState.at_rest(self._end), None, None)
             return
-        length = self._end.guarded_length or self._straight_length
-        yield from find_candidates(self._kinematics, self._limits, self._start, self._end, length)
+        arrival_length = self._end.guarded_length or self._straight_length
+        yield from find_candidates(self._kinematics, self._limits, self._start, self._end, arrival_length)
 
     def _list_direct_and_optimized(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
         """Yield direct motions without collision and optimized detours, the fastest first."""
-        direct, optimizers = self._evaluate_candidates(candidates)
+        direct_motions, optimizers = self._evaluate_candidates(candidates)
         for candidate, optimizer in optimizers:
             optimizer.improve(REFINEMENT_STEP_COUNT)
-            while direct and direct[0][0] <= _compute_total_cost(candidate, optimizer):
-                yield direct.pop(0)[1]
+            while direct_motions and direct_motions[0][0] <= _compute_total_cost(candidate, optimizer):
+                yield direct_motions.pop(0)[1]
             yield from self._sort_optimized(candidate, optimizer)
-        yield from (motion for _, motion in direct)
+        yield from (motion for _, motion in direct_motions)
 
     def _sort_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterable[Trajectory]:
-        """Return the optimized motions to a candidate; with a load, the fastest safe motion first."""
+        """Return the optimized motions to a candidate; with a load, the fastest safe motion is first."""
         motions, payload = self._list_optimized(candidate, optimizer), self._payload
         if payload is None:
             return motions
         return sorted(motions, key=lambda motion: payload.slow_down(motion).duration)
 
     def _list_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterator[Trajectory]:
+        """Yield the optimized motion to a candidate, first in minimum time, then with exact timing."""
         for is_exact in (False, True):
             with contextlib.suppress(JointLimitError):
                 yield self._build_motion(candidate, *optimizer.connect_states(is_exact=is_exact))
@@ -141,14 +144,16 @@ class MotionSearch:
     def _evaluate_candidates(
         self, candidates: Sequence[Candidate]
     ) -> tuple[list[tuple[float, Trajectory]], list[tuple[Candidate, Optimizer]]]:
-        """Return direct motions without collision, and optimizers of the detours to other candidates.
+        """Return pairs `(duration [s], direct motion)` and pairs `(candidate, optimizer)`.
 
-        Both lists begin with the fastest motion. Each direct motion is in a pair `(duration [s], motion)`.
+        The direct motions are free of collision; the optimizers plan detours to the other candidates. Both
+        lists begin with the fastest motion.
         """
-        direct: list[tuple[float, Trajectory]] = []
+        direct_motions: list[tuple[float, Trajectory]] = []
         optimizers: list[tuple[Candidate, Optimizer]] = []
         for candidate in candidates:
-            costs = [duration for duration, _ in direct] + [_compute_total_cost(*pair) for pair in optimizers]
+            costs = [duration for duration, _ in direct_motions]
+            costs += [_compute_total_cost(*pair) for pair in optimizers]
             if min(costs, default=math.inf) <= candidate.min_duration + candidate.arrival_duration:
                 break
             problem = OptimizationProblem(
@@ -159,8 +164,8 @@ class MotionSearch:
                 free_part = self._connector.connect(self._start, candidate.entry)
                 qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
                 if problem.compute_slack(qs).min() >= 0:
-                    motion = self._build_motion(candidate, free_part)
-                    direct.append((free_part.duration + candidate.arrival_duration, motion))
+                    duration = free_part.duration + candidate.arrival_duration
+                    direct_motions.append((duration, self._build_motion(candidate, free_part)))
                     continue
                 corners = self._connect_with_corners(candidate, EXTRA_HEIGHTS[0], is_straight=False)
                 duration = sum(piece.duration for piece in corners)
@@ -168,9 +173,9 @@ class MotionSearch:
                 optimizer = Optimizer(problem, qs, duration)
                 optimizer.improve(INITIAL_STEP_COUNT)
                 optimizers.append((candidate, optimizer))
-        direct.sort(key=lambda pair: pair[0])
+        direct_motions.sort(key=lambda pair: pair[0])
         optimizers.sort(key=lambda pair: _compute_total_cost(*pair))
-        return direct, optimizers
+        return direct_motions, optimizers
 
     def _build_motion(self, candidate: Candidate, *free_part: MotionPiece) -> Trajectory:
         """Return the motion that consists of departure, free part, and arrival."""
@@ -194,26 +199,30 @@ class MotionSearch:
             Unreachable: A corner is out of reach in the branch of the candidate.
             JointLimitError: No motion connects two of the states.
         """
-        connect, height = self._connector.connect, self._travel_height + extra_height
+        height, entry, connect = self._travel_height + extra_height, candidate.entry, self._connector.connect
         if (height, is_straight) not in self._rises:
             self._rises[height, is_straight] = self._plan_rise(height, is_straight)
-        rise, corner = self._rises[height, is_straight]
-        (x, y, z), _ = self._find_tcp(candidate.entry.q)
+        rise, start_corner = self._rises[height, is_straight]
+        (x, y, z), _ = self._locate_tool(entry.q)
         if candidate.branch is None or z >= height:
-            return [*rise, connect(corner, candidate.entry)]
+            return [*rise, connect(start_corner, entry)]
         if is_straight and candidate.arrival is None:
             waypoints = solve_vertical_waypoints(
-                self._kinematics, candidate.entry.q, height - z, WAYPOINT_COUNT, candidate.branch
+                self._kinematics, entry.q, height - z, WAYPOINT_COUNT, candidate.branch
             )
             descent = CartesianLine(waypoints[::-1], height - z, self._limits)
-            return [*rise, connect(corner, JointState.at_rest(waypoints[-1])), descent]
-        goal_corner = self._solve_corner((x, y, height), candidate.branch, candidate.entry.q)
-        return [*rise, connect(corner, goal_corner), connect(goal_corner, candidate.entry)]
+            return [*rise, connect(start_corner, JointState.at_rest(waypoints[-1])), descent]
+        goal_corner = self._solve_corner((x, y, height), candidate.branch, entry.q)
+        return [*rise, connect(start_corner, goal_corner), connect(goal_corner, entry)]
 
     def _plan_rise(self, height: float, is_straight: bool) -> tuple[list[MotionPiece], JointState]:
-        """Return the motion from the start up to a corner at a height [m], and the state at the corner."""
-        q, ((x, y, z), points_down) = self._start.q, self._find_tcp(self._start.q)
-        if not points_down or z >= height:
+        """Return the motion from the start up to a corner at a height [m], and the state at the corner.
+
+        If the tool starts above `height` or does not point down, the corner is the start itself.
+        """
+        q = self._start.q
+        (x, y, z), is_pointing_down = self._locate_tool(q)
+        if not is_pointing_down or z >= height:
             return [], self._start
         if is_straight and self._departure is None:
             waypoints = find_vertical_waypoints(self._kinematics, q, height - z, WAYPOINT_COUNT)
@@ -223,10 +232,10 @@ class MotionSearch:
         corner = self._solve_corner((x, y, height), self._kinematics.find_branch(q), q)
         return [self._connector.connect(self._start, corner)], corner
 
-    def _find_tcp(self, q: Array) -> tuple[Array, bool]:
-        """Return the tool centre point `(3,)` [m], and whether the tool points down."""
+    def _locate_tool(self, q: Array) -> tuple[Array, bool]:
+        """Return the tool centre point `(3,)` [m] at `q` `(n,)` [rad], and True if the tool points down."""
         tcps, axes = self._kinematics.compute_tcps_and_axes(q[None])
-        return tcps[0], bool(-axes[0, 2] > MIN_COSINE_DOWN)
+        return tcps[0], bool(-axes[0, 2] > MIN_RISE_COSINE)
 
     def _solve_corner(
         self, position: tuple[float, float, float], branch: BranchKey, q_seed: Array
@@ -239,8 +248,8 @@ class MotionSearch:
     def _plan_departure(self, start: Array, height: float) -> CartesianLine | None:
         """Return the straight motion upwards from the start, or None if the free part begins at the start.
 
-        The cell file may require a straight departure. A load also departs straight if its seal limits the
-        acceleration, because a load that is pressed on its support or dragged over the support tears off.
+        The cell file may require a straight departure. If the seal limits the acceleration of a load, the
+        load also departs straight, because contact with the support could break the seal.
         """
         length = self._straight_length or (LIFT_OFF_DISTANCE if self._payload else 0.0)
         if not length or height + length > self._travel_height:
