@@ -107,8 +107,7 @@ class ClearanceModel:
     def relax_end_margins(self, tcps: Array, axes: Array, discs: Discs) -> None:
         """Reduce the required distance near the ends of the motion to the smallest distance at an end.
 
-        An arm that starts or ends near an obstacle can thus leave or approach the obstacle. `tcps` `(E, 3)`
-        [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
+        `tcps` `(E, 3)` [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
         """
         end_distances = self._compute_all_distances(tcps, axes, discs).min(axis=(0, 1))
         self._end_margins = np.minimum(end_distances, self._margin)

@@ -81,15 +81,17 @@ class JointLimits:
         return len(self.velocity)
 
 
-def compute_min_time(change: Array, limits: JointLimits) -> Array:
-    """Return the minimum time `(...)` [s] of a motion from rest to rest by `change` `(..., n)` [rad].
+def compute_min_time(displacement: Array, limits: JointLimits) -> Array:
+    """Return the minimum time `(...)` [s] of a motion from rest to rest by `displacement` `(..., n)` [rad].
 
-    Each joint has its own jerk-limited profile, and the slowest joint determines the time. Depending on the
-    distance, a profile reaches the maximum velocity, or only the maximum acceleration, or neither.
+    Each joint has the symmetric seven-phase profile of limited jerk, and the slowest joint determines the
+    time. A long profile reaches the maximum velocity `v`; a medium profile reaches only the maximum
+    acceleration `a`; a short profile reaches only the maximum jerk `j`.
     """
-    d, v, a, j = np.abs(change), limits.velocity, limits.acceleration, limits.jerk
+    d, v, a, j = np.abs(displacement), limits.velocity, limits.acceleration, limits.jerk
     jerk_time = a / j  # [s] from zero to the maximum acceleration
     ramp_time = np.where(v >= a * jerk_time, v / a + jerk_time, 2 * np.sqrt(v / j))  # [s] to maximum velocity
-    trapezoid_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)  # [s] if acceleration reaches its maximum
-    short_time = np.where(d >= 2 * a * jerk_time**2, trapezoid_time, 4 * np.cbrt(d / 2 / j))
-    return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, short_time), axis=-1)
+    medium_time = jerk_time + np.sqrt(jerk_time**2 + 4 * d / a)
+    short_time = 4 * np.cbrt(d / 2 / j)
+    time_below_max_velocity = np.where(d >= 2 * a * jerk_time**2, medium_time, short_time)
+    return np.max(np.where(d >= v * ramp_time, d / v + ramp_time, time_below_max_velocity), axis=-1)

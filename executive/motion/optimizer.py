@@ -1,8 +1,9 @@
 """Trajectory optimization: the fastest motion between two states that avoids all obstacles.
 
-Sequential quadratic programming: each step linearizes the distances of the current motion from the obstacles,
-and solves for the fastest motion nearby. The initial motion approximates a slow collision-free motion that
-stops at corners above the obstacles. It determines on which side the result passes each obstacle.
+Sequential quadratic programming: each step linearizes the distances of the last motion from the obstacles,
+and finds the fastest motion near the last motion. The initial motion approximates a slow motion without
+collision that stops at corners above the obstacles, and determines on which side the result passes each
+obstacle.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ TRUST_RADIUS_FACTOR = 0.9
 """Factor on the maximum change of the accelerations after each step."""
 INITIAL_DURATION_FRACTION = 0.8
 """Duration of the initial motion as a fraction of the duration of the motion that stops at corners."""
-LIMIT_MARGIN = 0.01
+JOINT_RANGE_MARGIN = 0.01
 """Minimum distance from the position limits of the joints [rad]."""
 _FINITE_DIFFERENCE_STEP = 1e-4  # [rad]
 
@@ -46,11 +47,12 @@ class OptimizationProblem:
     """The optimization problem between two states.
 
     Attributes:
-        start, end: States at the start and at the end of the motion.
+        start: State at the start of the motion.
+        end: State at the end of the motion.
         connector: Planner of motions between two states within the joint limits.
         kinematics: Kinematics of the arm.
         clearance: Distances from the obstacles.
-        discs: Discs that enclose the tool and the load.
+        discs: Tool and load.
         payload: Acceleration limit due to the load, or None.
     """
 
@@ -75,35 +77,33 @@ class OptimizationProblem:
     def compute_gradients(self, qs: Array, slack: Array) -> Array:
         """Return the gradients `(N, n)` [m/rad] of the slack `(N,)` at joint positions `(N, n)` [rad]."""
         tcps, axes = self.kinematics.compute_tcps_and_axes(qs)
-        count = qs.shape[1]
-        displaced_qs = (qs[:, None] + _FINITE_DIFFERENCE_STEP * np.eye(count)).reshape(-1, count)
+        joint_count = qs.shape[1]
+        displaced_qs = (qs[:, None] + _FINITE_DIFFERENCE_STEP * np.eye(joint_count)).reshape(-1, joint_count)
         displaced = self.kinematics.compute_tcps_and_axes(displaced_qs)
-        displaced_tcps, displaced_axes = (values.reshape(-1, count, 3) for values in displaced)
-        changes = self.clearance.compute_slack_changes(
-            tcps, axes, self.discs, (displaced_tcps, displaced_axes)
-        )
+        new_tcps, new_axes = (values.reshape(-1, joint_count, 3) for values in displaced)
+        changes = self.clearance.compute_slack_changes(tcps, axes, self.discs, (new_tcps, new_axes))
         gradients = changes / _FINITE_DIFFERENCE_STEP
         range_slack = self._compute_range_slack(qs)
-        row, joint = np.arange(len(qs)), np.argmin(range_slack, axis=1)
-        is_range_nearer = range_slack[row, joint] <= slack
-        row, joint = row[is_range_nearer], joint[is_range_nearer]
+        # Where a range limit is nearest, the slack changes only with the joint at the limit.
+        states = np.flatnonzero(range_slack.min(axis=1) <= slack)
+        joints = np.argmin(range_slack[states], axis=1)
         middle = (self.kinematics.joint_range.lower + self.kinematics.joint_range.upper) / 2
-        gradients[row] = 0.0
-        gradients[row, joint] = -np.sign((qs - middle)[row, joint])
+        gradients[states] = 0.0
+        gradients[states, joints] = -np.sign((qs - middle)[states, joints])
         return gradients
 
     def _compute_range_slack(self, qs: Array) -> Array:
-        """Return the distance of each joint from its limits, less a margin `(N, n)` [rad]."""
-        return -self.kinematics.joint_range.shrink(LIMIT_MARGIN).compute_excess(qs)
+        """Return the distance of each joint from its limits, minus the margin `(N, n)` [rad]."""
+        return -self.kinematics.joint_range.shrink(JOINT_RANGE_MARGIN).compute_excess(qs)
 
 
 class Optimizer:
-    """Searches for the fastest motion between two states, a few steps at a time.
+    """Optimizer of the motion between two states.
 
     Args:
         problem: The optimization problem.
-        initial_qs: Samples `(M, n)` [rad] of a motion between the states, at `SAMPLE_FRACTIONS`.
-        duration: Duration of the sampled motion [s].
+        initial_qs: Samples `(M, n)` [rad] of a motion that stops at corners, at `SAMPLE_FRACTIONS`.
+        duration: Duration of the motion that stops at corners [s].
 
     Attributes:
         cost: Duration of the best motion, plus the cost of its violated constraints [s].
@@ -125,11 +125,13 @@ class Optimizer:
     def improve(self, max_step_count: int) -> None:
         """Take up to `max_step_count` optimization steps."""
         for _ in range(max_step_count):
-            rows = np.nonzero(self._slack < MAX_SLACK)[0]
-            slack = self._slack[rows]
-            gradients = self._problem.compute_gradients(self._last_motion.qs[rows], slack)
-            distances = LinearizedConstraints(slack, rows[:, None], gradients[:, None], np.zeros(len(rows)))
-            constraints = [distances, *self._payload_constraints]
+            samples = np.flatnonzero(self._slack < MAX_SLACK)
+            slack = self._slack[samples]
+            gradients = self._problem.compute_gradients(self._last_motion.qs[samples], slack)
+            distance_constraints = LinearizedConstraints(
+                slack, samples[:, None], gradients[:, None], np.zeros(len(samples))
+            )
+            constraints = [distance_constraints, *self._payload_constraints]
             motion = self._transcription.shorten(self._last_motion, constraints, self._trust_radius)
             if motion is None:
                 return
@@ -153,8 +155,8 @@ class Optimizer:
         """Return the best motion as point-to-point motions between its states.
 
         Args:
-            is_exact: True: connect the states at all half steps, with the timing of the best motion. False:
-                connect the states at all steps in minimum time; the path differs slightly.
+            is_exact: True for the states at all half steps, with the timing of the best motion; False for the
+                states at all steps, in minimum time on a slightly different path.
 
         Raises:
             JointLimitError: No motion connects two of the states.
@@ -164,7 +166,7 @@ class Optimizer:
             _limit_velocity(state, self._problem.connector.limits)
             for state in self._transcription.compute_states(self._best_motion)[:: 1 if is_exact else 2]
         ]
-        return tuple(self._problem.connector.connect(a, b, min_duration) for a, b in pairwise(states))
+        return tuple(self._problem.connector.connect(*ends, min_duration) for ends in pairwise(states))
 
 
 def _limit_velocity(state: JointState, limits: JointLimits) -> JointState:

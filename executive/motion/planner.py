@@ -2,8 +2,8 @@
 
 The planner chooses the branch of the inverse kinematics and, if the yaw of the goal is free, the final yaw.
 It prefers the direct motion, and optimizes a detour if an obstacle blocks the direct motion. Each motion is
-checked for collisions, optionally in a more exact model. The search ends after a number of steps, not after a
-time, so that equal queries have equal results.
+checked for collisions, optionally in a more exact model. The search has a maximum number of steps instead of
+a timeout, so that equal queries have equal results.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from executive.motion.search import MotionSearch
 from executive.motion.trajectory import Trajectory, downsample_path
 
 CollisionCheck = Callable[[Array, Task], None]
-"""Function that raises Blocked if a path `(N, n)` [rad] collides, given load and obstacles of a task."""
+"""Function that raises Blocked if the path `(N, n)` [rad] of a task collides."""
 
 MAX_CHECK_SPACING = math.radians(1.0)
 """Maximum change of a joint between two neighbouring states that are checked for collisions [rad]."""
@@ -42,7 +42,7 @@ class Planner:
     Args:
         config: Content of the cell file.
         kinematics: Kinematics of the arm.
-        check: Additional collision check of each motion, or None.
+        check_collision: Additional collision check of each motion, or None.
 
     Attributes:
         kinematics: Kinematics of the arm.
@@ -50,15 +50,17 @@ class Planner:
     """
 
     def __init__(
-        self, config: CellConfig, kinematics: Kinematics, check: CollisionCheck | None = None
+        self, config: CellConfig, kinematics: Kinematics, check_collision: CollisionCheck | None = None
     ) -> None:
         self.limits = JointLimits.from_config(config.arm.limits)
         self.kinematics = kinematics
         self._config = config
-        self._check = check
+        self._check_collision = check_collision
 
     def plan(self, q_start: ArrayLike, goal: Goal | ArrayLike, task: Task = Task()) -> Trajectory:
-        """Return the fastest motion found from rest at `q_start` `(n,)` [rad] to a goal or joint positions.
+        """Return a fast motion from rest at `q_start` `(n,)` [rad] to a goal or to joint positions `(n,)`.
+
+        With a load, the motion is slowed down until the seal of the load holds.
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.
@@ -66,8 +68,8 @@ class Planner:
         """
         start = np.asarray(q_start, dtype=float)
         end = goal if isinstance(goal, Goal) else np.asarray(goal, dtype=float)
-        trajectory = self._plan(start, end, task)
-        return PayloadLimit(task.load, self.kinematics).slow_down(trajectory) if task.load else trajectory
+        motion = self._find_motion(start, end, task)
+        return PayloadLimit(task.load, self.kinematics).slow_down(motion) if task.load else motion
 
     def require_reachable(self, goal: Goal) -> None:
         """Check that the arm reaches both a goal and the travel height above the goal in the same branch.
@@ -78,10 +80,10 @@ class Planner:
         length = max(0.0, compute_travel_height(self._config) - goal.position[2])
         find_configuration_pairs(self.kinematics, goal, length, np.zeros(self.limits.joint_count))
 
-    def _plan(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
-        search = MotionSearch(
-            self._config, self.kinematics, self.limits, start, end, _make_free_part_task(task)
-        )
+    def _find_motion(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
+        """Return the first motion of the search that passes all checks."""
+        free_task = _make_free_part_task(task)
+        search = MotionSearch(self._config, self.kinematics, self.limits, start, end, free_task)
         errors: list[str] = []
         for motion in search.list_motions():
             try:
@@ -92,8 +94,8 @@ class Planner:
                 return motion
         if not errors:
             raise Blocked("no motion inside the joint limits leads to the goal")
-        others = f"; all {len(errors)} motions that were tried are blocked" if len(errors) > 1 else ""
-        raise Blocked(f"{errors[0]}{others}")
+        summary = f"; all {len(errors)} motions that were tried are blocked" if len(errors) > 1 else ""
+        raise Blocked(f"{errors[0]}{summary}")
 
     def _check_motion(self, motion: Trajectory, search: MotionSearch, task: Task) -> None:
         """Check joint limits and collisions of a motion.
@@ -103,17 +105,17 @@ class Planner:
             Unreachable, JointLimitError: The motion exceeds the range or another limit of a joint.
         """
         qs = motion.check_limits(self.limits).q
-        is_guarded = motion.guarded_start_time < math.inf
-        free_qs = qs[: math.ceil(motion.guarded_start_time / STEP)] if is_guarded else qs
+        has_guarded_part = motion.guarded_start_time < math.inf
+        free_qs = qs[: math.ceil(motion.guarded_start_time / STEP)] if has_guarded_part else qs
         search.require_clearance(free_qs)
-        if self._check is not None:
-            self._check(downsample_path(free_qs, MAX_CHECK_SPACING), _make_free_part_task(task))
-            if is_guarded:
-                self._check(downsample_path(qs[len(free_qs) - 1 :], MAX_CHECK_SPACING), task)
+        if self._check_collision is not None:
+            free_path = downsample_path(free_qs, MAX_CHECK_SPACING)
+            self._check_collision(free_path, _make_free_part_task(task))
+            if has_guarded_part:
+                self._check_collision(downsample_path(qs[len(free_qs) - 1 :], MAX_CHECK_SPACING), task)
 
 
 def _make_free_part_task(task: Task) -> Task:
     """Return the task of a motion before its guarded part: the target of the motion counts as an obstacle."""
-    return (
-        task if task.target is None else replace(task, obstacles=(*task.obstacles, task.target), target=None)
-    )
+    targets = () if task.target is None else (task.target,)
+    return replace(task, obstacles=(*task.obstacles, *targets), target=None)

@@ -23,7 +23,7 @@ class Plan(Generic[M]):
     Attributes:
         clock: Clock of the run.
         ready_time: Time at which the planning is finished [s].
-        outcome: The motion, or the error of the planner.
+        outcome: Planned motion, or error of the planner.
     """
 
     clock: Clock
@@ -40,7 +40,7 @@ class Plan(Generic[M]):
 
         Raises:
             Unreachable: The goal has no joint solution inside the limits.
-            Blocked: Every path comes too close to an obstacle.
+            Blocked: Every candidate comes too close to an obstacle.
         """
         if isinstance(self.outcome, Exception):
             raise self.outcome
@@ -48,19 +48,19 @@ class Plan(Generic[M]):
 
 
 class PlanFactory(Generic[M]):
-    """Makes the plans of an arm, keeps at most one plan for a later request, and emits the requested plans.
+    """Makes plans, stores at most one plan for a later request, and emits an event for each request.
 
     Args:
-        planner: Plans a motion from joint positions `(n,)` [rad] at rest; raises Unreachable and Blocked.
+        plan: Function that plans a motion from joint positions at rest; raises Unreachable and Blocked.
         clock: Clock of the run.
         planning_time: Time from the request of a plan until the plan is ready [s].
         emit: Function that receives the events.
     """
 
     def __init__(
-        self, planner: Callable[[Array, Goal | str, Task], M], clock: Clock, planning_time: float, emit: Emit
+        self, plan: Callable[[Array, Goal | str, Task], M], clock: Clock, planning_time: float, emit: Emit
     ) -> None:
-        self._plan_motion = planner
+        self._plan_motion = plan
         self._clock = clock
         self._planning_time = planning_time
         self._emit = emit
@@ -75,15 +75,17 @@ class PlanFactory(Generic[M]):
 
     def plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
         """Return the plan of a motion from `start` `(n,)` [rad], if possible the plan of `plan_ahead`."""
-        stored = self._stored_plan if (start.tobytes(), goal, task) == self._stored_query else None
-        plan = stored or self._make_plan(start, goal, task)
+        is_stored = (start.tobytes(), goal, task) == self._stored_query
+        stored_plan = self._stored_plan if is_stored else None
+        plan = stored_plan or self._make_plan(start, goal, task)
         self._stored_query = self._stored_plan = None
         duration = 0.0 if isinstance(plan.outcome, Exception) else plan.outcome.duration
         wait_time = max(0.0, plan.ready_time - self._clock.now)
-        self._emit(MotionPlanned(stored is not None, round(wait_time, 4), round(duration, 4)))
+        self._emit(MotionPlanned(is_stored, round(wait_time, 4), round(duration, 4)))
         return plan
 
     def _make_plan(self, start: Array, goal: Goal | str, task: Task) -> Plan[M]:
+        """Return the plan of a motion, which becomes ready after the planning time."""
         outcome: M | Unreachable | Blocked
         try:
             outcome = self._plan_motion(start, goal, task)

@@ -35,19 +35,19 @@ class PointToPoint:
 
     def sample(self, times: Array) -> JointState:
         """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
-        return JointState(*np.array([self._profile.at_time(t) for t in times.tolist()]).swapaxes(0, 1))
+        return JointState(*np.array([self._profile.at_time(time) for time in times.tolist()]).swapaxes(0, 1))
 
 
 class Connector:
-    """Finds the fastest motions between states within the limits of joint velocity, acceleration and jerk."""
+    """Planner of motions between two states within the limits of joint velocity, acceleration and jerk."""
 
     def __init__(self, limits: JointLimits) -> None:
         self.limits = limits
         self._ruckig = Ruckig(limits.joint_count)
-        self._input = InputParameter(limits.joint_count)
-        self._input.max_velocity = limits.velocity.tolist()
-        self._input.max_acceleration = limits.acceleration.tolist()
-        self._input.max_jerk = limits.jerk.tolist()
+        self._inputs = InputParameter(limits.joint_count)
+        self._inputs.max_velocity = limits.velocity.tolist()
+        self._inputs.max_acceleration = limits.acceleration.tolist()
+        self._inputs.max_jerk = limits.jerk.tolist()
 
     def connect(self, start: JointState, end: JointState, min_duration: float | None = None) -> PointToPoint:
         """Return the fastest motion from `start` to `end` that takes at least `min_duration` [s].
@@ -58,11 +58,11 @@ class Connector:
             JointLimitError: No motion exists, for example because the velocity of a state exceeds its limit.
             Fault: A state lacks a finite number for a joint; ruckig would read out of bounds or crash.
         """
-        count = self.limits.joint_count
+        joint_count = self.limits.joint_count
         for values in (*start, *end):
-            if values.shape != (count,) or not np.isfinite(values.sum()):
-                raise Fault(f"a motion needs states of {count} finite numbers, not {values}")
-        inputs, profile = self._input, Profile(count)
+            if values.shape != (joint_count,) or not np.isfinite(values.sum()):
+                raise Fault(f"a motion needs states of {joint_count} finite numbers, not {values}")
+        inputs, profile = self._inputs, Profile(joint_count)
         inputs.current_position, inputs.current_velocity, inputs.current_acceleration = (
             values.tolist() for values in start
         )
@@ -70,33 +70,34 @@ class Connector:
             values.tolist() for values in end
         )
         inputs.minimum_duration = min_duration
-        problem: object = None
+        cause: str | None = None
         try:
             result = self._ruckig.calculate(inputs, profile)
         except (RuckigError, ValueError) as error:
-            problem = error
+            cause = str(error)
         else:
             if result not in (Result.Working, Result.Finished):
-                problem = result
+                cause = str(result)
             elif np.any(_find_max_speeds(profile) > (1 + _ROUNDING_ERROR) * self.limits.velocity):
-                problem = "its profile exceeds a velocity limit"
-        if problem is not None:
+                cause = "its profile exceeds a velocity limit"
+        if cause is not None:
             states = f"from {start.q.round(4)} to {end.q.round(4)} rad"
-            raise JointLimitError(f"ruckig finds no profile {states}: {problem}")
+            raise JointLimitError(f"ruckig finds no profile {states}: {cause}")
         return PointToPoint(profile)
 
 
 def _find_max_speeds(profile: Profile) -> Array:
     """Return the largest speed of each joint `(n,)` [rad/s].
 
-    ruckig does not always check the speed at which an acceleration changes its sign within a phase.
+    ruckig does not always check the extreme speed `v - a² / 2 j` in a phase with constant jerk `j`, in which
+    the acceleration changes its sign.
     """
-    speeds = []
+    max_speeds = []
     for joint in profile.profiles[0]:
-        extrema = [
+        extreme_speeds = [
             v - a * a / (2 * j)
             for v, a, next_a, j in zip(joint.v, joint.a, joint.a[1:], joint.j, strict=False)
             if a * next_a < 0
         ]
-        speeds.append(max(map(abs, [*joint.v, *extrema])))
-    return np.array(speeds)
+        max_speeds.append(max(map(abs, [*joint.v, *extreme_speeds])))
+    return np.array(max_speeds)

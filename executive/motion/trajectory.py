@@ -44,14 +44,14 @@ class Trajectory:
         self.duration = self._end_times[-1]
         first, self._last = pieces[0].state_at(0.0), pieces[-1].state_at(pieces[-1].duration)
         self.start, self.end = first.q, self._last.q
-        for number, (before, after) in enumerate(pairwise(pieces), start=1):
-            states = before.state_at(before.duration), after.state_at(0.0)
+        for number, (piece, next_piece) in enumerate(pairwise(pieces), start=1):
+            states = piece.state_at(piece.duration), next_piece.state_at(0.0)
             _require_equal(*states, f"pieces {number} and {number + 1}")
-        for state, end in ((first, "start"), (self._last, "end")):
-            _require_equal(state, JointState.at_rest(state.q), f"rest and the {end} of a trajectory")
+        for state, end_name in ((first, "start"), (self._last, "end")):
+            _require_equal(state, JointState.at_rest(state.q), f"rest and the {end_name} of a trajectory")
 
     def slow_down(self, speed_factor: float) -> Trajectory:
-        """Return the motion on the same path with `speed_factor` (0 to 1) times the velocities."""
+        """Return a copy of the motion whose velocities are multiplied by `speed_factor`, 0 to 1."""
         pieces = [_SlowPiece(piece, speed_factor) for piece in self._pieces]
         return Trajectory(pieces, self.guarded_start_time / speed_factor)
 
@@ -107,7 +107,12 @@ def compute_peak_fractions(states: JointState, limits: JointLimits) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _SlowPiece:
-    """A piece with lower velocities on the same path; implements `MotionPiece`."""
+    """A piece with lower velocities on the path of another piece; implements `MotionPiece`.
+
+    Attributes:
+        piece: The piece with the original velocities.
+        speed_factor: Factor on the velocities, 0 to 1.
+    """
 
     piece: MotionPiece
     speed_factor: float
@@ -126,17 +131,17 @@ class _SlowPiece:
         return JointState(state.q, self.speed_factor * state.qd, self.speed_factor**2 * state.qdd)
 
 
-def downsample_path(qs: Array, spacing: float) -> Array:
-    """Return waypoints of a path `(N, n)` [rad]; no joint moves by more than `spacing` [rad] between them."""
-    kept = [0]
+def downsample_path(qs: Array, max_spacing: float) -> Array:
+    """Return some points of a path `(N, n)` [rad]; between two points, joints move by up to `max_spacing`."""
+    indices = [0]
     for index in range(1, len(qs) - 1):
-        if np.max(np.abs(qs[index + 1] - qs[kept[-1]])) > spacing:
-            kept.append(index)
-    return qs[[*kept, len(qs) - 1]]
+        if np.max(np.abs(qs[index + 1] - qs[indices[-1]])) > max_spacing:
+            indices.append(index)
+    return qs[[*indices, len(qs) - 1]]
 
 
 def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
-    """Return positions, velocities and accelerations, each `(N, n)`, at increasing `times` `(N,)` [s]."""
+    """Return the states of consecutive pieces, each array `(N, n)`, at increasing `times` `(N,)` [s]."""
     end_times = [*accumulate(piece.duration for piece in pieces[:-1]), math.inf]
     states, start_time = [JointState(*np.empty((3, 0, len(pieces[0].state_at(0.0).q))))], 0.0
     for piece, end_time in zip(pieces, end_times, strict=True):
@@ -147,14 +152,16 @@ def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
     return JointState(*map(np.concatenate, zip(*states, strict=True)))
 
 
-def _require_equal(state: JointState, other: JointState, description: str) -> None:
-    for name, a, b in zip(JointState._fields, state, other, strict=True):
-        difference = float(np.max(np.abs(a - b)))
+def _require_equal(state: JointState, next_state: JointState, description: str) -> None:
+    """Raise Fault if two states differ by more than the rounding error."""
+    for name, values, next_values in zip(JointState._fields, state, next_state, strict=True):
+        difference = float(np.max(np.abs(values - next_values)))
         if difference > _ROUNDING_ERROR:
             raise Fault(f"{description} do not fit together: their {name} differ by {difference:.2g}")
 
 
 def _require_in_range(qs: Array, limits: JointLimits) -> None:
+    """Raise Unreachable if joint positions `(N, n)` [rad] exceed the joint range."""
     excess = limits.position.compute_excess(qs)
     row, joint = np.unravel_index(np.argmax(excess), excess.shape)
     if excess[row, joint] > _ROUNDING_ERROR:

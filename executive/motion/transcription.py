@@ -152,7 +152,7 @@ class Transcription:
         program.hessian[:inner_count, :inner_count] += scale[:, None] * squares * scale
         program.gradient[:inner_count] = -(position_map.T @ residual).T.ravel() * scale
         program.lower[inner_count] = program.upper[inner_count] = 1.0
-        return self._solve(step, program)
+        return self._solve(step, program, np.empty((0, inner_count + 2)), np.empty(0))
 
     def shorten(
         self, last: DiscreteMotion, constraints: Sequence[LinearizedConstraints], trust_radius: float
@@ -226,10 +226,10 @@ class Transcription:
         return np.outer(self._grid.sample_times, start.qd * step) + step**2 * quadratic
 
     def _solve(
-        self, step: float, program: _Program, rows: Array | None = None, row_upper: Array | None = None
+        self, step: float, program: _Program, extra_rows: Array, extra_upper: Array
     ) -> DiscreteMotion | None:
-        """Return the motion that solves a program with additional rows, or None if there is no solution."""
-        solution = program.solve(rows, row_upper)
+        """Return the motion that solves a program with extra rows, or None if there is no solution."""
+        solution = program.solve(extra_rows, extra_upper)
         if solution is None:
             return None
         h = step * float(solution[self._inner_count])
@@ -265,13 +265,11 @@ class _Program(NamedTuple):
     row_upper: Array
     equality_count: int
 
-    def solve(self, extra_rows: Array | None, extra_upper: Array | None) -> Array | None:
-        """Return the solution `(V,)`, also with `extra_rows x <= extra_upper`, or None if there is none."""
-        rows, row_lower, row_upper = self.rows, self.row_lower, self.row_upper
-        if extra_rows is not None and extra_upper is not None:
-            rows = np.concatenate([extra_rows, rows])
-            row_lower = np.concatenate([np.full(len(extra_upper), -_UNBOUNDED), row_lower])
-            row_upper = np.concatenate([extra_upper, row_upper])
+    def solve(self, extra_rows: Array, extra_upper: Array) -> Array | None:
+        """Return the solution `(V,)` with `extra_rows (scale x) <= extra_upper`, or None if there is none."""
+        rows = np.concatenate([extra_rows, self.rows])
+        row_lower = np.concatenate([np.full(len(extra_upper), -_UNBOUNDED), self.row_lower])
+        row_upper = np.concatenate([extra_upper, self.row_upper])
         constraint_types = np.zeros(len(self.lower) + len(rows), dtype=np.int32)
         constraint_types[-self.equality_count :] = _EQUALITY_CONSTRAINT
         solution, _, status, _ = daqp.solve(
