@@ -1,14 +1,14 @@
 """Simulated cell with true detections: physics and motion are simulated, detectors return the true boxes.
 
-A simulated sort takes about a second of computing time, and no network makes errors. Each frame contains its
-true detections, so that a detector knows only the objects that are visible in its frame.
+A simulated sort takes about one second of computing time. Each frame contains its true detections, so that a
+detector knows only the objects that are visible in its frame.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -39,8 +39,8 @@ class TrueFrame(Frame):
     """A frame with the true detections of its objects.
 
     Attributes:
-        true_detections: Boxes around the outlines of the loose objects in front of the camera, without those
-            whose centre is occluded by another object.
+        true_detections: Bounding boxes of the loose objects in front of the camera; objects whose centre is
+            occluded by another object are omitted.
     """
 
     true_detections: tuple[Detection, ...]
@@ -90,13 +90,13 @@ class TruthCamera(SimCamera):
 
     def _find_true_detections(self) -> tuple[Detection, ...]:
         outlines = []
-        matrix, X_WC = self._get_true_view()
+        camera_matrix, X_WC = self._get_true_view()
         for body, label in self._world.labels.items():
             mesh = load_mesh(self._world.models[body])
-            outline = self._world.get_object_pose(body).apply(mesh.vertices)
-            distances = X_WC.inverse().apply(outline)[:, 2]
+            vertices = self._world.get_object_pose(body).apply(mesh.vertices)
+            distances = X_WC.inverse().apply(vertices)[:, 2]
             if np.all(distances > NEAR_PLANE):
-                pixels = project(matrix, X_WC, outline)
+                pixels = project(camera_matrix, X_WC, vertices)
                 outlines.append(_Outline(label, pixels, float(distances.mean())))
         return tuple(
             Detection(outline.label, ORACLE_CONFIDENCE, compute_bounding_box(outline.pixels))
@@ -131,16 +131,16 @@ class Oracle:
         """Request the true detections of `frame`, which are available after the latency of the detector."""
         assert isinstance(frame, TrueFrame), "an oracle requires frames of a TruthCamera"
         random = np.random.default_rng([self.seed, frame.id])
-        found = []
-        for true in frame.true_detections:
-            box = np.array(true.box) + random.normal(0.0, self.box_std, 4)
-            detection = Detection(true.label, true.confidence, (box[0], box[1], box[2], box[3]))
+        detections = []
+        for true_detection in frame.true_detections:
+            box = np.array(true_detection.box) + random.normal(0.0, self.box_std, 4)
+            detection = replace(true_detection, box=(box[0], box[1], box[2], box[3]))
             column, row = detection.centre
             left, top, right, bottom = self.camera.get_view_box(view)
             if left <= column < right and top <= row < bottom and frame.visible[int(row), int(column)]:
-                found.append(detection)
+                detections.append(detection)
         answer: Future[list[Detection]] = Future()
-        answer.set_result(found)
+        answer.set_result(detections)
         answer_time = self.clock.now + self.config.latency
         return PendingSearch(answer, answer_time, self.clock, self.name, self.config.error_rates)
 
@@ -164,4 +164,7 @@ def _build_oracles(
 ) -> dict[str, Oracle]:
     del base, folders
     camera = next(iter(config.cameras.values()))
-    return {name: Oracle(name, part, camera, clock, box_std, seed) for name, part in config.detectors.items()}
+    return {
+        name: Oracle(name, detector_config, camera, clock, box_std, seed)
+        for name, detector_config in config.detectors.items()
+    }

@@ -52,13 +52,13 @@ class MissionResult(RunEnded):
 
     def list_activated_nodes(self, pattern: str) -> list[str]:
         """Return the paths of all activated nodes, in order of activation, that match the pattern."""
-        started = (timed.event.node for timed in self.events if isinstance(timed.event, NodeStarted))
-        return [node for node in started if fnmatchcase(node, pattern)]
+        started_paths = (timed.event.node for timed in self.events if isinstance(timed.event, NodeStarted))
+        return [path for path in started_paths if fnmatchcase(path, pattern)]
 
     def list_failure_reasons(self, pattern: str = "*") -> list[str]:
-        """Return the reasons of all failures of skills, in order, whose node has a path that matches."""
-        ended = (timed.event for timed in self.events if isinstance(timed.event, NodeEnded))
-        failures = (event for event in ended if event.skill and event.status == "FAILURE")
+        """Return the failure reasons of the skills whose paths match the pattern, in order."""
+        ends = (timed.event for timed in self.events if isinstance(timed.event, NodeEnded))
+        failures = (event for event in ends if event.skill and event.status == "FAILURE")
         return [event.reason for event in failures if fnmatchcase(event.node, pattern)]
 
     def list_injected_faults(self) -> list[FaultInjected]:
@@ -85,7 +85,7 @@ def run_mission(
         mission: Mission file, or name of a shipped mission.
         kind: Function that makes the work cell, instead of the kind in the cell file.
         seed: Random seed.
-        set: Values by name of a param, or by `cell.<key>.<key>` for a key of the cell file.
+        set: Values of params by name, and of keys of the cell file by `cell.<key>.<key>`.
         requests: Requests of the operator, in order.
         substitutes: Skills that replace the skills of nodes, by a pattern that the paths of the nodes match.
         faults: Fault script of the cell.

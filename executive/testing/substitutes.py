@@ -2,7 +2,7 @@
 
 Each function returns a subclass of a skill, with the same ports, params and reasons, for
 `run_mission(substitutes={"*/Grasp": make_failing(Grasp, "missed", start_count=2)})`. A substitute
-counts its starts over all nodes and runs, so make a new substitute for each run.
+counts its starts over all nodes and runs, so make a new substitute for each mission run.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ RunMethod = Callable[[Skill, Cell], Steps | None]
 def make_failing(
     skill: type[Skill], reason: str, *, start_count: int | None = None, message: str = "injected failure"
 ) -> type[Skill]:
-    """Return a skill that fails in its first `start_count` starts, and later runs as the original.
+    """Return a skill whose first `start_count` runs fail; later runs execute the original skill.
 
-    If `start_count` is None, the skill always fails.
+    All runs fail if `start_count` is None.
 
     Raises:
         InputError: The skill does not declare this reason.
@@ -72,10 +72,10 @@ def make_succeeding(
 def make_raising(
     skill: type[Skill], error: Exception, *, delay_steps: int = 0, start_count: int | None = None
 ) -> type[Skill]:
-    """Return a skill that raises `error` after `delay_steps` control steps, if it has not ended before.
+    """Return a skill that raises `error` after `delay_steps` control steps of the original skill.
 
-    Before the error the skill runs as the original; its `finally` blocks are executed. The error is
-    raised in the first `start_count` starts, or in all starts if None.
+    The original skill is closed before the error. A run that ends earlier raises no error. The error is
+    raised in the first `start_count` runs; in all runs if `start_count` is None.
     """
 
     def run(self: Skill, cell: Cell) -> Steps:
@@ -91,7 +91,7 @@ def make_raising(
 
 
 def make_raising_when_halted(skill: type[Skill], error: Exception) -> type[Skill]:
-    """Return a skill that raises `error` when it is halted, as with a bug in a `finally` block."""
+    """Return a skill that raises `error` when it is halted, like a skill with a bug in a `finally` block."""
 
     def run(self: Skill, cell: Cell) -> Steps:
         try:
@@ -121,8 +121,8 @@ def make_substitute(
     Args:
         skill: Class of the skill.
         prefix: Prefix of the name of the subclass.
-        run: The other method.
-        start_numbers: Numbers of the starts, from 1, in which the other method runs; None: all starts.
+        run: Replacement of the method `run`.
+        start_numbers: Numbers of the starts, from 1, at which the replacement runs; None: all starts.
     """
     start_counter = count(1)
 
@@ -135,9 +135,10 @@ def make_substitute(
 
 
 def _list_first_starts(start_count: int | None) -> Container[int] | None:
+    """Return the numbers of the first `start_count` starts; None: all starts."""
     return None if start_count is None else range(1, start_count + 1)
 
 
 def _run_original(skill: type[Skill], instance: Skill, cell: Cell) -> Generator[None, None, None]:
-    """Execute the method `run` of `skill` on `instance`, as a generator even if the method is none."""
+    """Execute the method `run` of `skill` on `instance`; `run` may be a generator or a plain function."""
     yield from skill.run(instance, cell) or ()

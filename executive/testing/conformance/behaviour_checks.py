@@ -28,7 +28,7 @@ _MEASUREMENTS = ("camera.capture", "operator.ask")
 def can_succeed(runs: SkillRuns) -> Iterator[str]:
     """The skill can be tested, and succeeds in at least one situation."""
     try:
-        _ = runs.situations
+        _ = runs.situations  # Generates all values.
     except ArrangementFailed as error:
         yield f"{runs.name} cannot be tested: {error}"
         return
@@ -44,7 +44,7 @@ def can_succeed(runs: SkillRuns) -> Iterator[str]:
 def terminates(runs: SkillRuns) -> Iterator[str]:
     """Each tick returns, and the skill ends within 60 s on the run's clock."""
     try:
-        _ = runs.complete_runs, runs.halted_runs
+        _ = runs.complete_runs, runs.halted_runs  # Executes all runs.
     except TickNotReturned as error:
         yield str(error)
         return
@@ -59,15 +59,15 @@ def terminates(runs: SkillRuns) -> Iterator[str]:
 def ends_as_declared(runs: SkillRuns) -> Iterator[str]:
     """Under each fault the skill succeeds with all outputs, or fails with a declared reason and a message."""
     for test_run in runs.complete_runs:
-        place = f"{test_run.description} at tick {test_run.ticks}"
+        start = f"{test_run.description} at tick {test_run.ticks}"
         if test_run.status == "FAULT":
             yield (
-                f"{place} {test_run.message}. This is a fault, which ends the run: fail with a declared "
+                f"{start} {test_run.message}. This is a fault, which ends the run: fail with a declared "
                 "reason, or correct the code."
             )
         elif test_run.status == "FAILURE" and not test_run.message.strip():
             yield (
-                f'{place} it failed with "{test_run.reason}" and no message. '
+                f'{start} it failed with "{test_run.reason}" and no message. '
                 "State what happened, with numbers: the operator reads only this message."
             )
 
@@ -76,11 +76,11 @@ def has_outputs_of_declared_types(runs: SkillRuns) -> Iterator[str]:
     """Each output has its declared type."""
     for test_run in runs.complete_runs:
         for name, value in test_run.outputs.items():
-            declared = runs.skill.ports[name].type
-            if not _is_of_type(value, declared):
+            port_type = runs.skill.ports[name].type
+            if not _is_of_type(value, port_type):
                 yield (
                     f"{test_run.description} {runs.name}.{name} is of the type {type(value).__name__}, not "
-                    f"{describe_type(declared)}. Set a value of this type, or change the declaration."
+                    f"{describe_type(port_type)}. Set a value of this type, or change the declaration."
                 )
 
 
@@ -118,7 +118,7 @@ def leaves_tool_as_declared(runs: SkillRuns) -> Iterator[str]:
 
 def leaves_arm_at_rest(runs: SkillRuns) -> Iterator[str]:
     """If the skill started the arm, the arm is at rest after the end or a halt of the skill."""
-    for test_run in _find_first_violations([*runs.complete_runs, *runs.halted_runs], _has_left_arm_moving):
+    for test_run in _find_first_violations([*runs.complete_runs, *runs.halted_runs], _is_arm_left_moving):
         yield (
             f"{test_run.ending}, and the arm still moves. "
             "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
@@ -135,7 +135,7 @@ def halts_in_one_tick(runs: SkillRuns) -> Iterator[str]:
 
 
 def is_deterministic(runs: SkillRuns) -> Iterator[str]:
-    """In equal situations the skill makes equal calls at equal ticks, and ends equally."""
+    """Two runs in the same situation make the same calls at the same ticks, and end with the same result."""
     for _, first, second in runs.repeated_runs:
         if difference := _describe_difference(first, second):
             yield (
@@ -156,18 +156,17 @@ def has_short_ticks(runs: SkillRuns) -> Iterator[str]:
             )
 
 
-def _describe_difference(run: SkillTestRun, other: SkillTestRun) -> str:
+def _describe_difference(first: SkillTestRun, second: SkillTestRun) -> str:
     """Return a description of the first difference between two runs, or ""."""
-    for first, second in zip(run.calls, other.calls, strict=False):
-        if (first.tick, first.name) != (second.tick, second.name):
-            return f"it called {first.name} at tick {first.tick} and then {second.name} at tick {second.tick}"
-        if not has_equal_pickle(first.arguments, second.arguments):
-            return f"it called {first.name} at tick {first.tick} with different arguments"
-    if (run.ticks, run.status) != (other.ticks, other.status):
-        return (
-            f"it ended as {run.status} after {run.ticks} ticks and then as {other.status} after {other.ticks}"
-        )
-    return "" if has_equal_pickle(run.outputs, other.outputs) else "it set its outputs to different values"
+    for call, other in zip(first.calls, second.calls, strict=False):
+        if (call.tick, call.name) != (other.tick, other.name):
+            return f"it called {call.name} at tick {call.tick} and then {other.name} at tick {other.tick}"
+        if not has_equal_pickle(call.arguments, other.arguments):
+            return f"it called {call.name} at tick {call.tick} with different arguments"
+    if (first.ticks, first.status) != (second.ticks, second.status):
+        end, other_end = f"{first.status} after {first.ticks}", f"{second.status} after {second.ticks}"
+        return f"it ended as {end} ticks and then as {other_end}"
+    return "" if has_equal_pickle(first.outputs, second.outputs) else "it set its outputs to different values"
 
 
 def _find_first_violations(
@@ -180,7 +179,8 @@ def _find_first_violations(
     return first_by_situation.values()
 
 
-def _has_left_arm_moving(test_run: SkillTestRun) -> bool:
+def _is_arm_left_moving(test_run: SkillTestRun) -> bool:
+    """Return True if the skill started the arm, and the arm moves after the end or a halt of the skill."""
     has_ended = test_run.status in ("SUCCESS", "FAILURE", "HALTED")
     return has_ended and test_run.has_moved and not test_run.is_at_rest
 
@@ -192,9 +192,9 @@ def _describe_tool_problem(runs: SkillRuns, test_run: SkillTestRun) -> str:
     required, requirement = _find_required_tool_state(runs, test_run)
     if required is not ANY and (required is HOLDING) != test_run.holds_after:
         actual = "holds something" if test_run.holds_after else "is empty"
-        should = "hold something" if required is HOLDING else "be empty"
+        expected = "hold something" if required is HOLDING else "be empty"
         return (
-            f"{test_run.ending}, and the tool {actual}. It should {should}, {requirement}. "
+            f"{test_run.ending}, and the tool {actual}. It should {expected}, {requirement}. "
             "Leave the tool in this state, or change the declaration."
         )
     if test_run.holds_after and not test_run.is_item_held:
@@ -207,27 +207,28 @@ def _describe_tool_problem(runs: SkillRuns, test_run: SkillTestRun) -> str:
 
 def _find_required_tool_state(runs: SkillRuns, test_run: SkillTestRun) -> tuple[ToolState, str]:
     """Return the required state of the tool at the end of a run, and the declaration that requires it."""
-    before = HOLDING if test_run.holds_before else EMPTY
+    initial_state = HOLDING if test_run.holds_before else EMPTY
     if test_run.status == "SUCCESS":
-        after = runs.skill.tool_state[1]
-        return (before, "as before") if after is ANY else (after, "by tool_state")
+        declared_state = runs.skill.tool_state[1]
+        is_unchanged = declared_state is ANY
+        return (initial_state, "as before") if is_unchanged else (declared_state, "by tool_state")
     name = HALT if test_run.status == "HALTED" else test_run.reason
     if name in runs.skill.tool_left:
         return runs.skill.tool_left[name], f'by tool_left["{name}"]'
-    return before, f'as before, because tool_left has no "{name}"'
+    return initial_state, f'as before, because tool_left has no "{name}"'
 
 
-def _is_of_type(value: Any, declared: Any) -> bool:
+def _is_of_type(value: Any, declared_type: Any) -> bool:
     """Return True if a value, and each element of a list, has the declared type."""
-    if declared is Any:
+    if declared_type is Any:
         return True
-    origin = get_origin(declared)
+    origin = get_origin(declared_type)
     if origin in (Union, types.UnionType):
-        return any(_is_of_type(value, part) for part in get_args(declared))
-    if declared is float:
+        return any(_is_of_type(value, part) for part in get_args(declared_type))
+    if declared_type is float:
         return isinstance(value, float | int)
-    kind = origin or declared
-    if isinstance(kind, type) and not isinstance(value, kind):
+    runtime_type = origin or declared_type
+    if isinstance(runtime_type, type) and not isinstance(value, runtime_type):
         return False
-    element = None if isinstance(value, str | Mapping) else find_element_type(declared)
-    return element is None or all(_is_of_type(item, element) for item in value)
+    element_type = None if isinstance(value, str | Mapping) else find_element_type(declared_type)
+    return element_type is None or all(_is_of_type(element, element_type) for element in value)

@@ -21,7 +21,7 @@ FORBIDDEN_PACKAGES = (
     "py_trees", "pybullet", "ruckig", "threading", "multiprocessing", "concurrent", "subprocess", "time",
     "asyncio",
 )  # fmt: skip
-"""Packages that skills must not import: a skill runs in the tick thread, by the run's clock, on any cell."""
+"""Packages that skills must not import: skills use only the tick thread, the run's clock and the cell."""
 HALT = "halt"
 """Key of `tool_left` for the state of the tool after a halt."""
 
@@ -38,8 +38,8 @@ def has_documentation(runs: SkillRuns) -> Iterator[str]:
     declarations: dict[str, Param | Port] = {**runs.skill.params, **runs.skill.ports}
     for name, declared in declarations.items():
         if not declared.doc.strip():
-            declare = "param" if isinstance(declared, Param) else "port"
-            yield f'{runs.name}.{name} has no doc. Write {declare}(..., doc="its meaning").'
+            function = "param" if isinstance(declared, Param) else "port"
+            yield f'{runs.name}.{name} has no doc. Write {function}(..., doc="its meaning").'
 
 
 def has_allowed_defaults(runs: SkillRuns) -> Iterator[str]:
@@ -56,7 +56,7 @@ def declares_reasons(runs: SkillRuns) -> Iterator[str]:
         yield f'{runs.name}.reasons is the string "{reasons}". Write a tuple: ("{reasons}",).'
         return
     for function in source_code.walk_functions(runs.skill):
-        for reason, node in _find_failure_reasons(function.tree):
+        for reason, node in _find_failure_reasons(function.syntax_tree):
             if reason not in reasons:
                 yield (
                     f'{function.locate(node)} fails with "{reason}", which {runs.name} does not declare. '
@@ -65,22 +65,24 @@ def declares_reasons(runs: SkillRuns) -> Iterator[str]:
 
 
 def declares_resources(runs: SkillRuns) -> Iterator[str]:
-    """`uses` has only arm, tool and camera; `moves` requires arm; `tool_left` has only own reasons."""
+    """`uses` has only arm, tool, camera; `moves` requires arm; `tool_left` has reasons of the skill."""
     skill, name = runs.skill, runs.name
-    unknown = [repr(skill.uses)] if isinstance(skill.uses, str) else sorted(set(skill.uses) - set(RESOURCES))
-    if unknown:
-        yield f"{name} uses {', '.join(unknown)}. Write a tuple of {', '.join(RESOURCES)}."
+    unknown_resources = (
+        [repr(skill.uses)] if isinstance(skill.uses, str) else sorted(set(skill.uses) - set(RESOURCES))
+    )
+    if unknown_resources:
+        yield f"{name} uses {', '.join(unknown_resources)}. Write a tuple of {', '.join(RESOURCES)}."
     if skill.moves and "arm" not in skill.uses:
         yield f'{name} moves the arm but does not use it. Add "arm" to uses, or remove moves.'
-    known = (*skill.reasons, HALT)
-    for ending in skill.tool_left:
-        if ending not in known:
-            allowed = ", ".join(known)
-            yield f'{name}.tool_left has "{ending}", which is not a reason of the skill. Allowed: {allowed}.'
+    allowed_keys = (*skill.reasons, HALT)
+    for key in skill.tool_left:
+        if key not in allowed_keys:
+            listed = ", ".join(allowed_keys)
+            yield f'{name}.tool_left has "{key}", which is not a reason of the skill. Allowed: {listed}.'
 
 
 def imports_allowed_modules(runs: SkillRuns) -> Iterator[str]:
-    """The file imports no package with another clock, with threads, or for only one kind of cell."""
+    """The file imports no package with a clock, with threads, or for only one kind of cell."""
     for path in filter(lambda path: path.is_file(), source_code.find_source_files(runs.skill)):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             for package in _find_imported_packages(node):
@@ -94,28 +96,28 @@ def imports_allowed_modules(runs: SkillRuns) -> Iterator[str]:
 def calls_take_effect(runs: SkillRuns) -> Iterator[str]:
     """Each call has an effect: generators are executed with `yield from`, and failures are raised."""
     for function in source_code.walk_functions(runs.skill):
-        for call in _find_calls_without_used_value(function):
+        for call in _find_unused_calls(function):
             callee, text = function.resolve_callee(call), f"{ast.unparse(call.func)}(...)"
             place = function.locate(call)
-            if source_code.is_returning_steps(callee):
+            if source_code.returns_steps(callee):
                 yield f'{place} calls {text} without executing its steps. Write "yield from {text}".'
-            elif source_code.is_returning_failure(callee):
+            elif source_code.returns_failure(callee):
                 yield f'{place} calls {text} without raising the failure. Write "raise {text}".'
 
 
 def _describe_default_problem(param: Param) -> str:
-    """Return the error of a default, as a sentence without its subject; "" if the default is valid."""
+    """Return the predicate of a sentence about an invalid default; "" if the default is valid."""
     # The default None is allowed even if it is not among the choices.
-    checked = replace(param, choices=None) if param.default is None else param
+    declaration = replace(param, choices=None) if param.default is None else param
     try:
-        return find_param_problem(checked, param.default)[1]
+        return find_param_problem(declaration, param.default)[1]
     except TypeError as problem:
         return str(problem)
 
 
-def _find_failure_reasons(tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
+def _find_failure_reasons(syntax_tree: ast.AST) -> Iterator[tuple[str, ast.expr]]:
     """Yield reason and call of each `self.failure("reason", ...)` in the syntax tree of a function."""
-    for node in ast.walk(tree):
+    for node in ast.walk(syntax_tree):
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("self.failure", "skill.failure"):
             reason = node.args[0] if node.args else None
             if isinstance(reason, ast.Constant) and isinstance(reason.value, str):
@@ -131,18 +133,20 @@ def _find_imported_packages(node: ast.AST) -> Sequence[str]:
     return []
 
 
-def _find_calls_without_used_value(function: source_code.FunctionSource) -> Iterator[ast.Call]:
+def _find_unused_calls(function: source_code.FunctionSource) -> Iterator[ast.Call]:
     """Yield the calls in a function whose return value is not used."""
-    nodes = list(ast.walk(function.tree))
+    nodes = list(ast.walk(function.syntax_tree))
     read_names = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
-    # Nobody uses the return value of a generator `run`; callers may use those of other functions.
+    # The executive ignores the return value of a generator `run`; other functions may return a value.
     is_run = function.function.__name__ == "run" and inspect.isgeneratorfunction(function.function)
     for node in nodes:
         if isinstance(node, ast.Expr) or (is_run and isinstance(node, ast.Return)):
-            is_dropped = True
+            is_unused = True
         elif isinstance(node, ast.Assign):
-            is_dropped = not any(not isinstance(t, ast.Name) or t.id in read_names for t in node.targets)
+            is_unused = not any(
+                not isinstance(target, ast.Name) or target.id in read_names for target in node.targets
+            )
         else:
             continue
-        if is_dropped and isinstance(node.value, ast.Call):
+        if is_unused and isinstance(node.value, ast.Call):
             yield node.value

@@ -19,10 +19,12 @@ from executive.mission.model.port_types import describe_type
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 
 GENERATED_NUMBER = 0.1
-"""Value generated for a number, within the bounds of its param; small, because it may be a duration [s]."""
+"""Value generated for each number, clipped to the bounds of its param; small, as it may be a duration [s]."""
 
 _HOLDING_BY_STATE: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY: (False, True)}
+"""Values of `Situation.is_holding` by the declared state of the tool before the run."""
 _TOOL_TEXTS = {False: "with an empty tool", True: "with an item in the tool"}
+"""Description of the tool by `Situation.is_holding`."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class SkillScene:
         cell: Cell with a row of objects on the table, one per class; its operator requests each class once.
         detections: Detections in the image; an object in the tool is not among them.
         targets: One localized target per detection.
-        item: Item in the tool if the skill requires one there; else the item of the first target.
+        item: Item in the tool if the skill requires `HOLDING`, else the item of the first target.
     """
 
     cell: FakeCell
@@ -74,24 +76,25 @@ class Situation:
 def list_situations(skill: type[Skill], arrange: Arrange) -> Iterator[Situation]:
     """Yield the situations in which a skill is tested.
 
-    They are: each allowed state of the tool with default values; all optional inputs given; and each choice
-    of a param other than its default, unless `arrange` returns a value of this param.
+    The situations are each allowed state of the tool with default values, all optional inputs given, and
+    each choice of a param except its default, unless `arrange` returns a value of this param.
 
     Raises:
         ArrangementFailed: The declared `tool_state` is invalid, or a value cannot be generated.
     """
-    state = skill.tool_state
-    if not isinstance(state, tuple) or not state or state[0] not in _HOLDING_BY_STATE:
-        raise ArrangementFailed(f"its tool_state is {state!r}; it must begin with ANY, EMPTY or HOLDING")
-    first = _HOLDING_BY_STATE[state[0]][0]
-    for is_holding in _HOLDING_BY_STATE[state[0]]:
-        yield Situation(_TOOL_TEXTS[is_holding], is_holding)
+    tool_state = skill.tool_state
+    if not isinstance(tool_state, tuple) or not tool_state or tool_state[0] not in _HOLDING_BY_STATE:
+        raise ArrangementFailed(f"its tool_state is {tool_state!r}; it must begin with ANY, EMPTY or HOLDING")
+    is_holding = _HOLDING_BY_STATE[tool_state[0]][0]
+    for holds in _HOLDING_BY_STATE[tool_state[0]]:
+        yield Situation(_TOOL_TEXTS[holds], holds)
     if any(not port.is_required for port in list_input_ports(skill)):
-        yield Situation(f"{_TOOL_TEXTS[first]} and all inputs given", first, has_all_inputs=True)
-    scene, values = prepare_scene(skill, Situation("", first), arrange)
+        yield Situation(f"{_TOOL_TEXTS[is_holding]} and all inputs given", is_holding, has_all_inputs=True)
+    scene, values = prepare_scene(skill, Situation("", is_holding), arrange)
     for param in skill.params.values():
         for value in () if param.name in values else _list_choices(param, scene):
-            yield Situation(f"{_TOOL_TEXTS[first]} and {param.name}: {value}", first, {param.name: value})
+            name = f"{_TOOL_TEXTS[is_holding]} and {param.name}: {value}"
+            yield Situation(name, is_holding, {param.name: value})
 
 
 def prepare_scene(
@@ -108,18 +111,20 @@ def prepare_scene(
     except Exception as error:
         raise ArrangementFailed(f"the function `arrange` raised {type(error).__name__}: {error}") from error
     declarations: list[Param | Port] = [*skill.params.values(), *list_input_ports(skill)]
-    missing = []
+    missing_values = []
     for declared in declarations:
-        is_used = declared.is_required or (situation.has_all_inputs and isinstance(declared, Port))
-        if declared.name in values or not is_used:
+        needs_value = declared.is_required or (situation.has_all_inputs and isinstance(declared, Port))
+        if declared.name in values or not needs_value:
             continue
         if (value := _generate_value(declared, scene)) is not None:
             values[declared.name] = value
         elif declared.is_required:
-            missing.append(declared)
-    if missing:
-        names = " and ".join(f'"{declared.name}" ({describe_type(declared.type)})' for declared in missing)
-        example = ", ".join(f'"{declared.name}": ...' for declared in missing)
+            missing_values.append(declared)
+    if missing_values:
+        names = " and ".join(
+            f'"{declared.name}" ({describe_type(declared.type)})' for declared in missing_values
+        )
+        example = ", ".join(f'"{declared.name}": ...' for declared in missing_values)
         raise ArrangementFailed(
             f"no value can be generated for {names}. Return it from a function in a test: "
             f"list_conformance_checks({skill.__name__}, lambda scene: {{{example}}}); "
@@ -178,7 +183,8 @@ def _find_name_in_scene(refers: str, scene: SkillScene) -> str | None:
 def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
     """Return a new scene for a skill.
 
-    If the skill uses a target and the tool but not the arm, the suction cup touches the first target.
+    The suction cup touches the first target if the skill cannot move there: it has a target as input, and
+    uses the tool without the arm.
 
     Args:
         skill: The skill.
@@ -216,6 +222,7 @@ def detect_targets(fake: FakeCell) -> tuple[Detections, list[Target]]:
 
 
 def _starts_at_target(skill: type[Skill]) -> bool:
+    """Return True if the skill has a target as input, and uses the tool without the arm."""
     input_types = [port.type for port in list_input_ports(skill)]
     return "tool" in skill.uses and "arm" not in skill.uses and Target in input_types
 

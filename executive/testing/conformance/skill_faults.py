@@ -11,11 +11,11 @@ from executive.testing import faults
 from executive.testing.faults.effect import Effect, Occurrence
 
 SEAL_BREAK_INTERVALS = 20
-"""Number of equal intervals of a run; for each boundary, the seal breaks there in a run of its own."""
+"""Number of equal intervals of a run; one test run for each boundary, at which the seal breaks."""
 START_MOTION_STEPS = 24
-"""Duration of the motion that the arm still makes when the skill starts [control steps]."""
+"""Duration of a motion during which the skill starts [control steps]."""
 MAX_REMOVED_OBJECTS = 10
-"""Maximum number of objects on the table, which are all removed."""
+"""Number of removals that empties the table; more than there are objects."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class NamedFault:
     Attributes:
         name: Description, as a part of a sentence: `while the table is empty`.
         effect: Effect of the fault on the cell.
-        part: Part of the cell; only skills that use this part are affected. "": all skills.
+        part: Resource that affected skills use: `arm`, `tool` or `camera`; "" if all skills are affected.
         requires_holding: True if the fault affects only runs with an object in the tool at the start.
         count: Number of equal faults that are injected together.
         tick: Control step before which the fault begins.
@@ -45,7 +45,8 @@ def list_skill_faults(skill: type[Skill], ticks: int, *, is_holding: bool) -> It
     Faults that need an object in the tool at the start are yielded only if `is_holding` is True.
     """
     for fault in _FAULTS:
-        if (not fault.part or fault.part in skill.uses) and is_holding >= fault.requires_holding:
+        can_occur = is_holding or not fault.requires_holding
+        if can_occur and (not fault.part or fault.part in skill.uses):
             yield fault
     if "tool" in skill.uses:
         for tick in sorted(
@@ -78,3 +79,4 @@ _FAULTS = (
     NamedFault("while the operator quits", faults.operator_quits()),
     NamedFault("while the operator requests a new scan", faults.operator_asks_rescan()),
 )
+"""Faults that begin at the start of a run."""

@@ -1,4 +1,4 @@
-"""Test runs of one skill, shared by its conformance checks; each run is executed once, when it is needed."""
+"""Test runs of one skill, which its conformance checks share; a run is executed at its first use."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from executive.testing.conformance.skill_faults import NamedFault, list_skill_fa
 from executive.testing.conformance.skill_test_run import SkillTestRun
 
 MAX_HALTS = 40
-"""Maximum number of halts at evenly spaced ticks of a run, and of further halts at its calls."""
+"""Maximum number of halts at evenly spaced ticks of a run, and maximum number of halts at calls."""
 
 
 class TickNotReturned(NotTestable):
@@ -45,7 +45,7 @@ class SkillRuns:
 
     @cached_property
     def complete_runs(self) -> list[SkillTestRun]:
-        """Runs to the end: in each situation one without a fault, and one with each fault."""
+        """Runs without a halt: for each situation, one run without a fault and one run per fault."""
         runs_without_fault = [first for _, first, _ in self.repeated_runs]
         return runs_without_fault + [
             self._run(situation, fault)
@@ -57,7 +57,7 @@ class SkillRuns:
 
     @cached_property
     def halted_runs(self) -> list[SkillTestRun]:
-        """Halted runs: in each situation one for each tick from `_choose_halt_ticks`."""
+        """Halted runs: for each situation, one run per tick of `_choose_halt_ticks`."""
         return [
             self._run(situation, halt_at=tick)
             for situation, first, _ in self.repeated_runs
@@ -77,21 +77,21 @@ class SkillRuns:
             raise TickNotReturned(self._stuck_message)
         test_run = SkillTestRun(self.skill, situation, self._arrange, fault, halt_at)
         if test_run.status == "STUCK":
-            halted = ", when halted," if test_run.ticks == halt_at else ""
+            halt_text = ", when halted," if test_run.ticks == halt_at else ""
             self._stuck_message = (
-                f"{test_run.description} at tick {test_run.ticks}{halted} {self.name} {test_run.message}. "
+                f"{test_run.description} at tick {test_run.ticks}{halt_text} {self.name} {test_run.message}. "
                 "A long tick blocks the arm: yield in each loop that waits, "
                 "and do long computations in a detector."
             )
             raise TickNotReturned(self._stuck_message)
         if fault is not None or halt_at is not None:
-            # The arguments, such as frames, may be large, and are only compared in repeated runs.
+            # Only repeated runs are compared; the arguments may be large, for example frames.
             test_run.calls = [replace(call, arguments=()) for call in test_run.calls]
         return test_run
 
 
 def _choose_halt_ticks(test_run: SkillTestRun) -> list[int]:
-    """Return the ticks at which to halt a run: evenly spaced ticks, and the tick of and after each call."""
+    """Return the halt ticks of a run: evenly spaced, at each call, and one tick after each call."""
     evenly_spaced = np.linspace(1, test_run.ticks, min(test_run.ticks, MAX_HALTS), dtype=int).tolist()
     call_ticks = sorted({call.tick + offset for call in test_run.calls for offset in (0, 1)})
     return sorted(tick for tick in {*evenly_spaced, *call_ticks[:MAX_HALTS]} if 1 <= tick <= test_run.ticks)

@@ -31,8 +31,9 @@ MAX_RUN_TIME = 60.0
 STUCK_TIMEOUT = 10.0
 """Wall time without a new tick after which a tick counts as stuck [s]."""
 PROGRESS_CHECKS = 2
-"""Number of checks for a new tick within `STUCK_TIMEOUT`; a suspended machine delays only one of them."""
+"""Number of checks for a new tick within `STUCK_TIMEOUT`; a suspended machine delays only one check."""
 _OBSERVED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "localizer", "operator")
+"""Parts of the cell whose calls are recorded."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class SkillTestRun:
     ) -> None:
         scene, values = prepare_scene(skill, situation, arrange)
         fake = scene.cell
-        before = values if halt_at else copy.deepcopy(values, {id(fake): fake})
+        original_values = values if halt_at else copy.deepcopy(values, {id(fake): fake})
         script = [during("*", fault.effect)] * fault.count if fault else []
         cell = FaultyCell(fake, script)
         self.description = f"{situation.name} {fault.name}" if fault else situation.name
@@ -102,20 +103,22 @@ class SkillTestRun:
                 self.status = self._run_skill(values, cell, observed_cell, fault.tick if fault else 0)
         except TickStuck as stuck:
             self.status, self.message = "STUCK", str(stuck)
-        self.changed_names = [name for name in values if not has_equal_pickle(values[name], before[name])]
+        self.changed_names = [
+            name for name in values if not has_equal_pickle(values[name], original_values[name])
+        ]
         self.holds_after, self.is_item_held = fake.tool.holding, fake.ledger.find_held_item() is not None
         self.is_at_rest = fake.arm.at_rest
 
     @property
     def ending(self) -> str:
         """Situation, fault and result of the run, as a part of a sentence."""
-        texts = {
+        result_texts = {
             "SUCCESS": "it succeeded",
             "FAILURE": f'it failed with "{self.reason}" ({self.message})',
             "HALTED": f"it was halted at tick {self.ticks}",
             "RUNNING": "it was still running",
         }
-        return f"{self.description} {texts.get(self.status, f'it ended as a fault: {self.message}')}"
+        return f"{self.description} {result_texts.get(self.status, f'it ended as a fault: {self.message}')}"
 
     @property
     def has_moved(self) -> bool:
@@ -164,7 +167,7 @@ class SkillTestRun:
 
 
 class TickStuck(BaseException):
-    """A tick did not return; the message, after the name of the skill, is a sentence with duration and place.
+    """A tick did not return; the message is the predicate of a sentence about the skill, with time and place.
 
     Not a subclass of Exception, so that a skill that catches exceptions is interrupted, too.
     """
@@ -189,7 +192,9 @@ def detect_stuck_ticks(skill: type[Skill], count_ticks: Callable[[], int]) -> It
         tick = count_ticks()
         unchanged_checks, last_tick = (unchanged_checks + 1 if tick == last_tick else 0), tick
         if unchanged_checks >= PROGRESS_CHECKS:
-            place = find_skill_line(skill, ((f.f_code.co_filename, line) for f, line in walk_stack(frame)))
+            place = find_skill_line(
+                skill, ((caller.f_code.co_filename, line) for caller, line in walk_stack(frame))
+            )
             raise TickStuck(f"did not return for {STUCK_TIMEOUT:g} s{place and f', at {place}'}")
 
     old_handler = signal.signal(signal.SIGALRM, on_timer)
@@ -204,7 +209,7 @@ def detect_stuck_ticks(skill: type[Skill], count_ticks: Callable[[], int]) -> It
 
 
 def has_equal_pickle(value: Any, other: Any) -> bool:
-    """Return True if the pickles of two values are equal, or a value cannot be pickled."""
+    """Return True if the pickles of two values are equal; also True if a value cannot be pickled."""
     try:
         return pickle.dumps(value) == pickle.dumps(other)
     except (pickle.PicklingError, TypeError, AttributeError):

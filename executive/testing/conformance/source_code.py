@@ -24,16 +24,16 @@ class FunctionSource:
 
     Attributes:
         function: The function.
-        tree: Syntax tree of the function, with the line numbers of its file.
-        skill: The skill that defines the function or, directly or indirectly, calls it.
+        syntax_tree: Syntax tree of the function, with the line numbers of its file.
+        skill: Skill whose methods contain the function or call it, directly or through other functions.
     """
 
     function: FunctionType
-    tree: ast.AST
+    syntax_tree: ast.AST
     skill: type[Skill]
 
     def locate(self, node: ast.expr | ast.stmt) -> str:
-        """Return file and line of a node of the tree, for instance `wave.py:12`."""
+        """Return file and line of a node of the syntax tree, for instance `wave.py:12`."""
         return f"{Path(self.function.__code__.co_filename).name}:{node.lineno}"
 
     def resolve_callee(self, call: ast.Call) -> Any:
@@ -41,7 +41,7 @@ class FunctionSource:
         return self._resolve(call.func)
 
     def _resolve(self, node: ast.expr) -> Any:
-        """Return the value of an expression; its class if only this is known; None if neither is known."""
+        """Return the value of an expression, or its class if the value is unknown, or None."""
         if isinstance(node, ast.Attribute):
             return _find_member(self._resolve(node.value), node.attr)
         if not isinstance(node, ast.Name):
@@ -76,28 +76,28 @@ def find_skill_line(skill: type[Skill], frames: Iterable[tuple[str, int]]) -> st
 def walk_functions(skill: type[Skill]) -> Iterator[FunctionSource]:
     """Yield the functions of a skill, and the functions of the same package that they call."""
     package = skill.__module__.partition(".")[0]
-    pending, seen = list_skill_functions(skill), set[FunctionType]()
+    pending, visited = list_skill_functions(skill), set[FunctionType]()
     while pending:
         function = pending.pop(0)
-        if function in seen or (tree := _parse(function)) is None:
+        if function in visited or (syntax_tree := _parse(function)) is None:
             continue
-        seen.add(function)
-        function_source = FunctionSource(function, tree, skill)
+        visited.add(function)
+        function_source = FunctionSource(function, syntax_tree, skill)
         yield function_source
-        callees = [
-            function_source.resolve_callee(node) for node in ast.walk(tree) if isinstance(node, ast.Call)
-        ]
+        calls = [node for node in ast.walk(syntax_tree) if isinstance(node, ast.Call)]
+        callees = map(function_source.resolve_callee, calls)
         functions = [callee for callee in callees if isinstance(callee, FunctionType)]
         pending += [callee for callee in functions if callee.__module__.partition(".")[0] == package]
 
 
-def is_returning_steps(callee: Any) -> bool:
+def returns_steps(callee: Any) -> bool:
     """Return True if a call of the function returns an iterator of control steps."""
-    returned = _find_return_type(callee)
-    return inspect.isgeneratorfunction(callee) or (get_origin(returned) or returned) in (Iterator, Generator)
+    return_type = _find_return_type(callee)
+    is_iterator = (get_origin(return_type) or return_type) in (Iterator, Generator)
+    return is_iterator or inspect.isgeneratorfunction(callee)
 
 
-def is_returning_failure(callee: Any) -> bool:
+def returns_failure(callee: Any) -> bool:
     """Return True if a call of the function or class returns a SkillFailed."""
     return SkillFailed in (callee, _find_return_type(callee))
 
@@ -113,7 +113,7 @@ def _find_return_type(callee: Any) -> Any:
 
 
 def _find_member(owner: Any, name: str) -> Any:
-    """Return the declared type of an attribute, or else the member of a module or class, or None."""
+    """Return the declared type of an attribute; without one, the member of the module or class, or None."""
     if owner is None:
         return None
     if isinstance(owner, type) and not issubclass(owner, Skill) and name in get_type_hints(owner):
@@ -125,8 +125,8 @@ def _find_member(owner: Any, name: str) -> Any:
 def _parse(function: FunctionType) -> ast.AST | None:
     """Return the syntax tree of a function, or None if its source code is not available."""
     try:
-        lines, first = inspect.getsourcelines(function)
-        tree = ast.parse(textwrap.dedent("".join(lines)))
+        lines, first_line = inspect.getsourcelines(function)
+        syntax_tree = ast.parse(textwrap.dedent("".join(lines)))
     except (OSError, SyntaxError):
         return None
-    return ast.increment_lineno(tree.body[0], first - 1)
+    return ast.increment_lineno(syntax_tree.body[0], first_line - 1)
