@@ -22,9 +22,9 @@ from executive.manipulation.obstacles import (
 )
 
 DROP_HEIGHT = 0.01
-"""Default height of an item above the surface under the item when the tool releases the item [m]."""
+"""Default clearance between an item and the surface below at the release [m]."""
 OVERTRAVEL = 0.015
-"""Default distance that a guarded motion continues below the expected surface of an object [m]."""
+"""Default distance by which a guarded motion continues below the expected surface of an object [m]."""
 PROBE_CLEARANCE = 0.005
 """Height above the table at which a probe (an approach almost down to the table) ends [m]."""
 ATTEMPTS_BEFORE_PROBE = 3
@@ -32,9 +32,9 @@ ATTEMPTS_BEFORE_PROBE = 3
 SPIRAL_SPACING = 0.0025
 """Default scale of the Vogel spiral on which the contact points of the attempts lie [m]."""
 MIN_GAP = 0.02
-"""Minimum gap between an object that is put down and other objects [m]."""
+"""Minimum gap between the object in the tool and other objects after a put-down [m]."""
 POSITIONS_PER_SIDE = 2
-"""Number of candidate positions for a put-down to the left, right, front and back of the safe place."""
+"""Half width of the grid of candidate positions around the safe place [grid steps]."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
 

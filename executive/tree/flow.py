@@ -21,7 +21,7 @@ class PossibleToolState:
 
     Attributes:
         state: EMPTY or HOLDING.
-        cause: Path of the skill that caused the state; "" for the beginning of the run.
+        cause: Path of the skill that caused the state; "" for the start of the run.
         handled_failure: Last failure that a control node handled in this state of the tool, or "".
         has_arm_moved: True if the arm may have moved in this state of the tool.
     """
@@ -75,7 +75,7 @@ class FlowState:
         return replace(self, tool_states=tool_states)
 
     def with_handled_failure(self, failure: PossibleFailure) -> FlowState:
-        """Return the state after a control node handled the failure `failure`."""
+        """Return the state after a control node has handled a failure."""
         states = [replace(state, handled_failure=str(failure)) for state in self.tool_states or ()]
         return self if self.tool_states is None else self.with_tool_states(frozenset(states))
 
@@ -146,7 +146,7 @@ class PossibleFailure:
     labels: frozenset[str] = frozenset()
 
     def may_match(self, reasons: Iterable[Reason]) -> bool:
-        """Return True if one of `reasons` may denote the failure; an unknown source or reason may be any."""
+        """Return True if one of `reasons` may denote the failure; an unknown source or reason matches all."""
         return any(
             self.reason in (reason.reason, UNKNOWN_NAME)
             and (self.source == UNKNOWN_NAME or reason.source in {self.source, *self.labels})
@@ -194,7 +194,7 @@ def make_unknown_flow(source: str, path: str) -> Flow:
 
 
 FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]
-"""Function that returns the possible ends of a child that is entered in a state."""
+"""Function that returns the possible ends of a child from a state."""
 
 
 def find_fixed_point(
@@ -221,7 +221,7 @@ def join_states(states: Iterable[FlowState | None]) -> FlowState | None:
 
 
 def find_end_tool_states(flow: Flow, entry: FlowState, can_be_halted: bool) -> ToolStates:
-    """Return the possible states of the tool after a branch from the state `entry`, with or without halt."""
+    """Return the possible states of the tool after a branch from `entry`, with halts if `can_be_halted`."""
     halt_states = (flow.halted, entry) if can_be_halted else ()
     return (join_states((flow.success, *flow.failures.values(), *halt_states)) or entry).tool_states
 

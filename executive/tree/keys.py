@@ -51,7 +51,7 @@ class Key:
         doc: Meaning of the key, one sentence.
         default: Value if the key is missing; `...` for a required key.
         ge, gt: Inclusive and exclusive lower bound of a number, or None.
-        max_key: For a number: key with a list of nodes; the number is at most the length of the list. Or "".
+        max_key: For a number: key with a list of nodes whose length is the maximum of the number; or "".
         max_count: For a list of nodes: maximum number of nodes, or None.
         is_shorthand: True if the key may be omitted and its value written directly under the keyword.
         is_sibling: True if the key is a sibling of the keyword in the mission file: `catch` next to `try`.
@@ -109,7 +109,7 @@ def key(
     raising_key: str = "do",
     list_key: str = "",
 ) -> Any:
-    """Declare a key in the body of a class; `Key` documents the arguments, `is_shorthand` as `shorthand`.
+    """Declare a key in the body of a class; the arguments set attributes of `Key`, such as `is_shorthand`.
 
     The name of the key is the name of the attribute, without a trailing underscore.
     """

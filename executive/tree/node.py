@@ -85,7 +85,7 @@ class ControlNode(KeyOwner, TreeNode):
         shape: Shape of the node in Graphviz drawings.
         remedy: Advice to let this node handle a failure: `add a retry around`; the name of the failing node
             follows. "" if this node handles no failures.
-        keyword_hints: Hints for authors, by wrong keyword that the authors wrote instead of `keyword`.
+        keyword_hints: Hints for authors, by the wrong keyword that an author writes instead of `keyword`.
         clock: Clock of the run.
     """
 
@@ -166,7 +166,7 @@ class ControlNode(KeyOwner, TreeNode):
 
     @property
     def children_halted_by_sibling(self) -> tuple[Child, ...]:
-        """Children that the node halts after the end of another child; they may contain endless loops."""
+        """Children that the node halts after the end of another child; loops in these children may be endless."""
         return ()
 
     # Methods for the diagnosis.
@@ -233,7 +233,7 @@ class ControlNode(KeyOwner, TreeNode):
     # Methods of the py_trees interface.
 
     def tick_once(self) -> None:
-        """Continue by one tick."""
+        """Start the node, or continue the node by one tick."""
         if self.status is not Status.RUNNING:
             self.failure = None
             self.status = Status.RUNNING
@@ -259,7 +259,7 @@ class ControlNode(KeyOwner, TreeNode):
                 self._emit(NodeEnded(self.path, new_status.value))
 
     def _end(self, status: Status) -> None:
-        """Set the final status, clean up, and emit the end."""
+        """Set the final status, clean up, and emit `NodeEnded`."""
         self.status = status
         self.clean_up()
         failure = self.failure if status is Status.FAILURE else None

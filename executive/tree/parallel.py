@@ -33,8 +33,8 @@ class Parallel(ControlNode):
 
     * If enough children have succeeded, the node halts the running children and succeeds, even if other
       children failed in the same tick.
-    * If too many children have failed, the node fails with the first failure, and of several failures in one
-      tick, with that of the first child. With `halt`, the node halts the running children at once; without
+    * If too many children have failed, the node fails with the first failure; of failures in the same tick,
+      the failure of the earlier child counts. With `halt`, the node halts the running children at once; without
       `halt`, the running children finish.
 
     With `wait_for: lead`, the first child is the lead: the node ends in the same tick as the lead, with the
@@ -71,8 +71,8 @@ class Parallel(ControlNode):
         if self._has_lead:
             return "wait for the lead"
         child_count, required_count = len(self.do), self._required_count
-        counts = "all" if required_count == child_count else f"{required_count} of {child_count}"
-        return f"wait for {counts}, halt" if self.halt else f"wait for {counts}"
+        required = "all" if required_count == child_count else f"{required_count} of {child_count}"
+        return f"wait for {required}, halt" if self.halt else f"wait for {required}"
 
     def start(self) -> None:
         """Begin with all children."""
@@ -115,7 +115,7 @@ class Parallel(ControlNode):
             self.halt_children(running_children)
             self._report_choices("enough others succeeded", failures)
             return Status.SUCCESS
-        # Even the success of all running children is then too little.
+        # The node has failed if the success of all running children is not enough.
         has_failed = self._missing_successes > len(running_children)
         if running_children and not (has_failed and self.halt):
             choice = "let the others finish, then fail" if has_failed else "go on with the others"
