@@ -93,7 +93,7 @@ def make_object_goal(
 
 
 def compute_min_contact_height(object_class: ObjectClass, centre_height: float, overtravel: float) -> float:
-    """Return the minimum height of a contact with an object [m]; at a lower contact, the tool missed it.
+    """Return the minimum height of a contact with an object [m]; a lower contact misses the object.
 
     Args:
         object_class: Class of the object.
@@ -106,8 +106,8 @@ def compute_min_contact_height(object_class: ObjectClass, centre_height: float, 
 def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     """Return the targets that can be picked, sorted by their distance from the destination of the arm.
 
-    A target can be picked if its item is unsorted and certain, if its class has a route, and if its position
-    is not invalidated.
+    A target can be picked if its item is unsorted and certain, its class has a route, and its position is
+    still valid.
     """
     ledger, destination = cell.ledger, cell.arm.destination[:2]
 

@@ -109,7 +109,7 @@ class ForEach(Loop):
         )
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of all iterations [s]; 0 if their number is unknown."""
+        """Return the minimum time of all iterations [s]; 0 if the number of iterations is unknown."""
         return 0.0 if isinstance(self.in_, VariableName) else len(self.in_) * get_min_time(self.do)
 
     def explain_unreachable(self, child: Child) -> str:

@@ -166,7 +166,7 @@ class ControlNode(KeyOwner, TreeNode):
 
     @property
     def children_halted_by_sibling(self) -> tuple[Child, ...]:
-        """Children that the node halts after the end of another child; loops in these children may be endless."""
+        """Children that the node halts after the end of another child; loops in them may be endless."""
         return ()
 
     # Methods for the diagnosis.

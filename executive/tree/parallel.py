@@ -34,8 +34,8 @@ class Parallel(ControlNode):
     * If enough children have succeeded, the node halts the running children and succeeds, even if other
       children failed in the same tick.
     * If too many children have failed, the node fails with the first failure; of failures in the same tick,
-      the failure of the earlier child counts. With `halt`, the node halts the running children at once; without
-      `halt`, the running children finish.
+      the failure of the earlier child is the first. With `halt`, the node halts the running children at once;
+      without `halt`, the running children finish.
 
     With `wait_for: lead`, the first child is the lead: the node ends in the same tick as the lead, with the
     status of the lead, and halts the other children.

@@ -37,11 +37,11 @@ class Repeat(Loop):
     def start(self) -> None:
         """Begin the first iteration."""
         super().start()
-        self._completed_count = 0
+        self._iteration_count = 0
 
     def step(self) -> Status:
         """Tick the body; after its end, begin the next iteration, in the same tick if possible."""
-        while self._completed_count != self.times:
+        while self._iteration_count != self.times:
             status = self.tick_in_iteration(self.do)
             if status is Status.RUNNING:
                 return status
@@ -51,8 +51,8 @@ class Repeat(Loop):
                     return self.fail(failure)
                 self.report_choice("done", failure)
                 return Status.SUCCESS
-            self._completed_count += 1
-            if not self.begin_iteration() and self._completed_count != self.times:
+            self._iteration_count += 1
+            if not self.begin_iteration() and self._iteration_count != self.times:
                 return Status.RUNNING
         return Status.SUCCESS
 

@@ -112,8 +112,8 @@ class TryCatch(ControlNode):
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of the body or the fastest handler, plus the time of `finally` [s]."""
-        time = min(get_min_time(child) for child in (self.do, *(handler.do for handler in self.catch)))
-        return time + (get_min_time(self.finally_) if self.finally_ else 0.0)
+        body_time = min(get_min_time(child) for child in (self.do, *(handler.do for handler in self.catch)))
+        return body_time + (get_min_time(self.finally_) if self.finally_ else 0.0)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
         """Yield a warning for every reason in a handler that has no effect because of earlier reasons."""
@@ -123,7 +123,7 @@ class TryCatch(ControlNode):
         for reason in [reason for handler in self.catch for reason in handler.on]:
             caught = [failure for failure in failures if failure.may_match([reason])]
             if caught and all(failure.must_match(earlier_reasons) for failure in caught):
-                earlier_reason = next(other for other in earlier_reasons if caught[0].must_match([other]))
+                earlier_reason = next(name for name in earlier_reasons if caught[0].must_match([name]))
                 place = analysis.describe_place(earlier_reason, reason)
                 message = f"{reason} is caught already, as {earlier_reason} in {place}"
                 yield NodeFinding(reason, "unreachable", message, is_warning=True)
