@@ -40,9 +40,10 @@ def build_tree(
     """
     builder = TreeBuilder(skills, cell, blackboard, emit, substitutes or {})
     root = builder.build_node(loaded.tree)
-    if unused := [pattern for pattern in builder.substitutes if pattern not in builder.matched_patterns]:
-        paths = [node.path for node in root.iterate() if isinstance(node, SkillLeaf)]
-        raise InputError(f'no skill node matches "{unused[0]}"; the skill nodes are: {", ".join(paths)}')
+    for pattern in builder.substitutes:
+        if pattern not in builder.matched_patterns:
+            paths = ", ".join(node.path for node in root.iterate() if isinstance(node, SkillLeaf))
+            raise InputError(f'no skill node matches "{pattern}"; the skill nodes are: {paths}')
     return root
 
 
@@ -91,6 +92,6 @@ class TreeBuilder:
         return SkillLeaf(context, node.skill, self._find_substitute(node.path) or skill, wiring, self.cell)
 
     def _find_substitute(self, path: str) -> type[Skill] | None:
-        matching = [pattern for pattern in self.substitutes if fnmatchcase(path, pattern)]
-        self.matched_patterns.extend(matching)
-        return self.substitutes[matching[0]] if matching else None
+        patterns = [pattern for pattern in self.substitutes if fnmatchcase(path, pattern)]
+        self.matched_patterns.extend(patterns)
+        return self.substitutes[patterns[0]] if patterns else None

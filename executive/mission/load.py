@@ -94,25 +94,25 @@ def load_mission(
     files = read_mission(mission_path, overrides or {}, skills, node_classes, recorded_cell)
     mission, config = files.mission, files.cell.config if files.cell else None
     findings = list(files.findings)
-    kind = _find_cell_kind(files, find_cell_kind, findings)
+    cell_kind = _find_cell_kind(files, find_cell_kind, findings)
     classes_by_detector, min_times = {}, None
-    if kind is not None and files.cell is not None and files.cell_path is not None:
+    if cell_kind is not None and files.cell is not None and files.cell_path is not None:
         folder = files.cell_path.parent
-        errors = kind.check(config, folder)
+        errors = cell_kind.check(config, folder)
         cell_findings = [files.cell.make_error(keys, "robot", message) for keys, message in errors]
         findings += cell_findings
-        classes_by_detector = dict(kind.labels(config, folder))
-        min_times = None if cell_findings else kind.min_times(config)
-    expanded = expand(mission, skills)
-    tree = assign_paths(expanded.tree or UnknownNode(files.source.make_span(), label=""))
+        classes_by_detector = dict(cell_kind.labels(config, folder))
+        min_times = None if cell_findings else cell_kind.min_times(config)
+    expansion = expand(mission, skills)
+    tree = assign_paths(expansion.tree or UnknownNode(files.source.make_span(), label=""))
     context = CheckContext(
-        mission, tree, expanded.unused_subtrees, skills, node_classes, config, classes_by_detector, min_times
+        mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector, min_times
     )
-    findings += (*expanded.findings, *run_checks(context))
-    has_errors = expanded.tree is None or any(finding.severity == "error" for finding in findings)
+    findings += (*expansion.findings, *run_checks(context))
+    has_errors = expansion.tree is None or any(finding.severity == "error" for finding in findings)
     if config is None or files.cell_path is None or has_errors:
         raise MissionError(sort_findings(findings, files.source.path))
-    if kind is not None and files.cell is not None:
+    if cell_kind is not None and files.cell is not None:
         findings += _warn_about_unmeasured_detectors(files.cell, files.cell_path.parent)
     return LoadedMission(
         mission, tree, config, files.source.text, mission_path, files.cell_path, files.libraries,
@@ -133,11 +133,11 @@ def _warn_about_unmeasured_detectors(cell: CellFile, folder: Path) -> Iterator[F
 def _find_cell_kind(
     files: MissionFiles, find_cell_kind: CellKindFinder | None, findings: list[Finding]
 ) -> CellKind | None:
-    """Return the kind of the mission's cell, or None if the kind is not installed or should not be found."""
+    """Return the kind of the mission's cell, or None after an error or without `find_cell_kind`."""
     if files.cell is None or files.cell.config is None or find_cell_kind is None:
         return None
     try:
         return find_cell_kind(files.cell.config.kind)
-    except InputError as problem:
-        findings.append(files.cell.make_error(("kind",), "unknown-kind", str(problem)))
+    except InputError as error:
+        findings.append(files.cell.make_error(("kind",), "unknown-kind", str(error)))
         return None

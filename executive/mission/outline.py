@@ -45,9 +45,9 @@ class OutlineNode:
         symbol, shape: Symbol and Graphviz shape of a control node in drawings; "" for a skill.
         title: Label, or name of the skill or keyword.
         slot: Key of the parent under which the node is written: `do`, `recover`, `catch 1`; "" in a list.
-        when: Failures after which a catch runs: `on Grasp.missed`; "" for other nodes.
+        when: Failures that activate a catch: `on Grasp.missed`; "" for other nodes.
         subtrees: Names of the subtrees with this node as root, the outermost first.
-        skill: Name of the skill; for a control node, this field and all fields below are empty.
+        skill: Name of the skill; "" for a control node, for which all fields below are empty, too.
         doc: Description of the skill, one sentence.
         params: Values of the skill's params.
         reads, writes: Connections of the skill's inputs and outputs.

@@ -1,4 +1,4 @@
-"""Checks that the types of the values of variables fit the inputs that read the variables."""
+"""Checks of the types of variables: the written values must fit the inputs that read the variables."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ def _find_reads(context: CheckContext, branch: Node) -> Iterator[VariableRead]:
 
 
 def _find_resource_users(context: CheckContext, branch: Node) -> dict[str, SkillNode]:
-    """Return the first skill below `branch` that uses a part of the cell (`Skill.uses`), by this part."""
+    """Return the first skill below `branch` that uses each part of the cell, by the name in `Skill.uses`."""
     users: dict[str, SkillNode] = {}
     cameras = context.cell.cameras.values() if context.cell else ()
     is_camera_on_wrist = any(camera.mount == "wrist" for camera in cameras)

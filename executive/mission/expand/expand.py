@@ -226,20 +226,20 @@ class _Expander:
         return cast("Node", rename_part(body))
 
     def _map_returned_variables(self, use: UseNode, subtree: Subtree) -> dict[str, str]:
-        """Return the caller's variable for each variable that the subtree returns."""
+        """Return the variables of the caller by the names of the returned variables in the subtree."""
         returned_names = subtree.returns or {}
-        names = {name: name for name in returned_names}
+        variables = {name: name for name in returned_names}
         for name, setting in use.returns.items():
             if name not in returned_names:
                 hint = suggest_choice(name, returned_names, "Returned variables")
                 message = f'the subtree "{subtree.name}" does not return "{name}"'
                 self.findings.append(make_error(setting.name_span, "unknown-return", message, hint))
             elif isinstance(setting.value, Reference):
-                names[name] = setting.value.name
+                variables[name] = setting.value.name
             else:
                 message = f"returns.{name} must be a variable, for example $mine"
                 self.findings.append(make_error(setting.value.span, "wrong-type", message))
-        return names
+        return variables
 
     def _collect_arguments(self, use: UseNode, subtree: Subtree) -> dict[str, Value] | None:
         """Return the value of every argument of the subtree, or None if a value is missing."""

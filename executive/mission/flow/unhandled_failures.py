@@ -29,9 +29,8 @@ class UnhandledFailure:
 def find_unhandled_failures(analysis: FlowAnalysis) -> tuple[UnhandledFailure, ...]:
     """Return the failures that can end the mission, in the order of the tree."""
     order = {path: index for index, path in enumerate(analysis.nodes)}
-    failures = sorted(
-        analysis.root_flow.failures, key=lambda failure: (order[failure.origin], failure.reason)
-    )
+    failures = list(analysis.root_flow.failures)
+    failures.sort(key=lambda failure: (order[failure.origin], failure.reason))
     spans = {failure: analysis.nodes[failure.origin].span for failure in failures}
     return tuple(
         UnhandledFailure(failure.source, failure.reason, failure.origin, span.source.path, span.line)

@@ -85,9 +85,9 @@ def _validate(adapter: TypeAdapter[object], value: object) -> object:
         return adapter.validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
         # A union has one error per type. A violated bound helps most; its type is `less_than` or similar.
-        errors = sorted(error.errors(include_url=False), key=lambda each: "than" not in each["type"])
+        errors = sorted(error.errors(include_url=False), key=lambda details: "than" not in details["type"])
         code = "out-of-range" if "than" in errors[0]["type"] else "wrong-type"
-        is_integer_allowed = {each["type"] for each in errors[1:]} == {"int_type"}
+        is_integer_allowed = {details["type"] for details in errors[1:]} == {"int_type"}
         note = " (a whole number is allowed, too)" if is_integer_allowed else ""
         raise WrongType(describe_validation_error(errors[0]) + note, code) from None
 

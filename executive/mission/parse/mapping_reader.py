@@ -76,7 +76,7 @@ class MappingReader:
         return node
 
     def read_text(self, key: str) -> str:
-        """Return the text of `key`; if the value is no text, add an error. "" without a text."""
+        """Return the text of `key`, or "" without a text; add an error for a list, mapping or null."""
         node = self.get(key)
         if node is None:
             return ""
@@ -87,7 +87,7 @@ class MappingReader:
         return ""
 
     def read_failure_names(self, key: str) -> tuple[FailureName, ...]:
-        """Return the failure names in the list or single value of `key`; add an error for each other item."""
+        """Return the failure names in the list or single value of `key`; add an error for invalid items."""
         node = self.get(key)
         names = []
         if isinstance(node, YamlSequence) and not node.items:
@@ -168,7 +168,7 @@ def make_literal(node: YamlNode) -> Literal:
 
 
 def _find_misplaced_dollars(node: YamlNode) -> Iterator[Finding]:
-    """Yield an error for each text with a `$` that is neither `$$` nor the start of a whole value `$name`."""
+    """Yield an error for each text that contains a single `$` in another place than in a reference."""
     for scalar in iterate_scalars(node):
         if isinstance(scalar.value, str) and _REFERENCE_START.search(scalar.value.replace("$$", "")):
             message = f'"{scalar.text}" is no reference: a reference is a whole value, as in key: $name'

@@ -105,15 +105,15 @@ class NodeParser:
             if not siblings:
                 self.add_error(node.span, "missing-node", "a node is missing here: the mapping names no node")
             return make_unknown_node(node.span)
-        first, *surplus = node_entries
-        name, span = first.key.text, first.key.span
-        for entry in surplus:
+        node_entry, *surplus_entries = node_entries
+        name, span = node_entry.key.text, node_entry.key.span
+        for entry in surplus_entries:
             message = f'"{name}" and "{entry.key.text}" are two nodes in one mapping'
             self.add_error(entry.key.span, "two-nodes", message, "Write a list to run one after the other.")
-        if surplus:
-            # A surplus node may cause misleading errors until the author has corrected the mapping.
-            parts = [self.make_silent_parser()._read_entry(node, entry, "") for entry in surplus]
-            return UnknownNode(span, label, (self._read_entry(node, first, ""), *parts))
+        if surplus_entries:
+            # The errors of surplus nodes may be misleading until the author has corrected the mapping.
+            parts = [self.make_silent_parser()._read_entry(node, entry, "") for entry in surplus_entries]
+            return UnknownNode(span, label, (self._read_entry(node, node_entry, ""), *parts))
         node_class = self._node_classes.get(name)
         sibling_keys = find_sibling_keys(node_class) if node_class else {}
         allowed_keys = ("as", *(grammar.USE_SIBLINGS if name == grammar.USE_KEYWORD else sibling_keys))
@@ -125,7 +125,7 @@ class NodeParser:
                 hint = hint or suggest_choice(key, allowed_keys, f"Keys at the level of {name}")
                 message = f'"{key}" is not allowed at the level of "{name}"'
                 self.add_error(entry.key.span, "unknown-key", message, hint)
-        mission_node = self._read_entry(node, first, label)
+        mission_node = self._read_entry(node, node_entry, label)
         label_node = node.get("as")
         return replace(mission_node, label_span=label_node.span) if label_node else mission_node
 
@@ -146,13 +146,14 @@ class NodeParser:
 
     def _read_use(self, node: YamlMapping, entry: YamlEntry, label: str) -> Node:
         """Return the use of a subtree, or an unknown node if the name of the subtree is no text."""
-        values = [(key, node.get(key)) for key in grammar.USE_SIBLINGS]
-        arguments, returns = (read_settings(each, key, self.findings) if each else {} for key, each in values)
+        siblings = [(key, value) for key in grammar.USE_SIBLINGS if (value := node.get(key)) is not None]
+        settings = {key: read_settings(value, key, self.findings) for key, value in siblings}
         if not (isinstance(entry.value, YamlScalar) and isinstance(entry.value.value, str)):
             message = f"use must be the name of a subtree, not {describe_node(entry.value)}"
             self.add_error(entry.value.span, "wrong-type", message)
             return make_unknown_node(entry.key.span)
-        return UseNode(entry.value.span, label, entry.value.text, arguments, returns)
+        name = entry.value.text
+        return UseNode(entry.value.span, label, name, settings.get("with", {}), settings.get("returns", {}))
 
     def _read_label(self, node: YamlMapping) -> str:
         value = node.get("as")

@@ -58,7 +58,7 @@ def _has_section(root: YamlNode, path: list[str], value: YamlNode, findings: lis
 
 
 def _set_value(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> YamlNode:
-    """Return the tree with `value` at `path`; if `path` continues below a value, add an error instead."""
+    """Return the tree with `value` at `path`; add an error if `path` leads below a scalar or a list."""
     key, *inner_path = path
     if not isinstance(root, YamlMapping):
         message = f'there is no key "{key}", because the value of the section above is no mapping'
@@ -73,7 +73,8 @@ def _set_value(root: YamlNode, path: list[str], value: YamlNode, findings: list[
         new_entry = YamlEntry(entry.key, _set_value(entry.value, inner_path, value, findings))
     else:
         new_entry = YamlEntry(replace(entry.key, span=value.span), value)
-    return replace(root, entries=tuple(new_entry if each is entry else each for each in root.entries))
+    entries = [new_entry if candidate is entry else candidate for candidate in root.entries]
+    return replace(root, entries=tuple(entries))
 
 
 def _set_spans(node: YamlNode, span: Span) -> YamlNode:
@@ -81,7 +82,7 @@ def _set_spans(node: YamlNode, span: Span) -> YamlNode:
     if isinstance(node, YamlScalar):
         return replace(node, span=span)
     if isinstance(node, YamlMapping):
-        pairs = [(entry.key, entry.value) for entry in node.entries]
-        entries = tuple(YamlEntry(replace(key, span=span), _set_spans(each, span)) for key, each in pairs)
-        return replace(node, span=span, entries=entries)
+        keys = [replace(entry.key, span=span) for entry in node.entries]
+        values = [_set_spans(entry.value, span) for entry in node.entries]
+        return replace(node, span=span, entries=tuple(map(YamlEntry, keys, values)))
     return replace(node, span=span, items=tuple(_set_spans(item, span) for item in node.items))

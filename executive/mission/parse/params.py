@@ -71,7 +71,7 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
         None if choices is None else tuple(to_python_value(item) for item in reader.list_items("choices")),
         reader.read_text("doc"),
     )
-    # After an error, the param has a valid value, so that references to the param cause no more errors.
+    # After an error, the param has a valid value, so that references to the param cause no errors.
     fallback = replace(param, value=Literal(_choose_valid_value(param), reader.span))
     if contradiction := _find_contradiction(param):
         code, key = ("empty-list", "choices") if param.choices == () else ("out-of-range", "min")
@@ -111,7 +111,7 @@ def _choose_valid_value(param: MissionParam) -> JsonValue:
 
 
 def _read_type(reader: MappingReader) -> str:
-    """Return the value of the key `type`, or "" without this key; for an unknown type, add an error."""
+    """Return the name below the key `type`, or ""; add an error for an unknown type."""
     name = reader.read_text("type")
     if not name or name in PARAM_TYPES:
         return name
@@ -121,13 +121,13 @@ def _read_type(reader: MappingReader) -> str:
 
 
 def _infer_type(value: object) -> str:
-    """Return the name of the type of a value, or "" for a value of another type."""
+    """Return the name of the param type of a value, or "" if no param type fits."""
     types = PARAM_TYPES.items()
     return next((name for name, declared in types if type(value) is (get_origin(declared) or declared)), "")
 
 
 def _read_bound(reader: MappingReader, key: str) -> float | None:
-    """Return the number under `key`, or None; for other values, add an error."""
+    """Return the number below `key`, or None; add an error for a value of another type."""
     node = reader.get(key)
     if node is None:
         return None

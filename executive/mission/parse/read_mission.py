@@ -74,7 +74,8 @@ def read_mission(
     parser = NodeParser(findings, skills, node_classes)
     mission = parse_mission(root, overrides, parser)
     subtrees = dict(mission.subtrees)
-    texts = {name.name: _add_library(name, path.parent, parser, subtrees) for name in mission.libraries}
+    references = mission.libraries
+    texts = {library.name: _add_library(library, path.parent, parser, subtrees) for library in references}
     libraries = {name: text for name, text in texts.items() if text is not None}
     mission = replace(mission, subtrees=subtrees, is_complete=len(libraries) == len(texts))
     cell_path: Path | None = None

@@ -17,7 +17,6 @@ from executive.mission.schema.types import (
     REFERENCE,
     Schema,
     allow_reference,
-    list_failures,
     make_name_schemas,
     make_settings_schema,
 )
@@ -177,8 +176,9 @@ def _require_any_of(keys: Sequence[str]) -> Schema:
 
 def _make_reasons_schema(skills: Skills) -> Schema:
     """Return the schema of one reason, or of a list of reasons."""
+    skill_reasons = [f"{name}.{reason}" for name, skill in skills.items() for reason in skill.reasons]
     reason = [
-        {"title": "Skill.reason", "enum": list_failures(skills)},
+        {"title": "Skill.reason", "enum": skill_reasons},
         {"title": "label.reason", "type": "string", "pattern": rf"^{grammar.LABEL_PATTERN}\.{_NAME}$"},
     ]
     reasons = {"title": "list", "type": "array", "items": {"anyOf": reason}, "minItems": 1}

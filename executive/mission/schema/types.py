@@ -103,11 +103,6 @@ def make_name_schemas(skills: Mapping[str, type[Skill]]) -> list[Schema]:
     ]
 
 
-def list_failures(skills: Mapping[str, type[Skill]]) -> list[str]:
-    """Return `Skill.reason` for each reason of each skill."""
-    return [f"{name}.{reason}" for name, skill in skills.items() for reason in skill.reasons]
-
-
 def _document_skill(skill: type[Skill]) -> Schema:
     """Return the description of a skill for editors, with its docstring, ports and reasons."""
     docstring = inspect.getdoc(skill) or ""

@@ -19,8 +19,8 @@ _MAX_FILE_SIZE = 1_000_000
 def get_shipped_folder() -> Path:
     """Return the folder of the shipped missions, in a wheel or in a checkout."""
     package = Path(executive.__file__).parent
-    installed = package / "shipped"
-    return installed if installed.is_dir() else package.parent / "missions"
+    wheel_folder = package / "shipped"
+    return wheel_folder if wheel_folder.is_dir() else package.parent / "missions"
 
 
 def list_shipped_missions() -> list[str]:
@@ -43,8 +43,8 @@ def find_mission(name: str | Path) -> Path:
     if os.path.lexists(path):
         raise InputError(f'"{name}" is {_describe_kind(path)}, not a file')
     stem = PurePosixPath(str(name).removeprefix("missions/").removesuffix(".yaml"))
-    if len(stem.parts) == 1 and os.path.isfile(shipped := get_shipped_folder() / f"{stem}.yaml"):
-        return shipped
+    if len(stem.parts) == 1 and os.path.isfile(shipped_path := get_shipped_folder() / f"{stem}.yaml"):
+        return shipped_path
     hint = suggest_choice(str(stem), list_shipped_missions(), "Shipped missions")
     raise InputError(f'there is no mission file and no shipped mission "{name}". {hint}')
 
@@ -104,7 +104,7 @@ def read_source(path: Path) -> Source:
 
 
 def _describe_kind(path: str | Path) -> str:
-    """Return "a folder" or another description of a path that is not a regular file."""
+    """Return the kind of a path that is not a regular file, with an article: `a folder`."""
     if os.path.isdir(path):
         return "a folder"
     return "a pipe or a device" if os.path.exists(path) else "a link to nothing"

@@ -201,8 +201,8 @@ class _Composer:
             raise self._make_fatal_error(self._make_span(event, 1), "too-deep", _DEPTH_MESSAGE)
         if isinstance(event, yaml.SequenceStartEvent):
             items = []
-            while not isinstance(item := next(self._events), yaml.SequenceEndEvent):
-                items.append(self._read_node(item, depth + 1))
+            while not isinstance(item_event := next(self._events), yaml.SequenceEndEvent):
+                items.append(self._read_node(item_event, depth + 1))
             return YamlSequence(self._make_span(event, 1), tuple(items))
         return self._read_mapping(event, depth)
 
@@ -215,8 +215,8 @@ class _Composer:
 
     def _read_mapping(self, event: yaml.Event, depth: int) -> YamlMapping:
         entries: dict[str, YamlEntry] = {}
-        while not isinstance(start := next(self._events), yaml.MappingEndEvent):
-            key = self._read_node(start, depth + 1)
+        while not isinstance(key_event := next(self._events), yaml.MappingEndEvent):
+            key = self._read_node(key_event, depth + 1)
             value = self._read_node(next(self._events), depth + 1)
             if not isinstance(key, YamlScalar):
                 self._add_error(key.span, "bad-key", "a key must be a single word")
@@ -264,8 +264,8 @@ def _make_syntax_error(source: Source, error: yaml.MarkedYAMLError) -> Finding:
         last_line = source.text.rstrip().count("\n") + 1
         span = source.make_span(last_line, max(1, len(source.get_line(last_line))), 1)
     context = f" {error.context}" if error.context else ""
-    start = error.context_mark
-    note = f" that began in line {start.line + 1}" if context and start and start is not position else ""
+    context_mark = error.context_mark if context and error.context_mark is not position else None
+    note = f" that began in line {context_mark.line + 1}" if context_mark else ""
     message = f"not valid YAML:{context}{note}: {error.problem}".replace("::", ":")
     hints = (hint for text, hint in _ADVICE_BY_MESSAGE.items() if str(error.problem).startswith(text))
     return make_error(span, "yaml", message, next(hints, ""))
