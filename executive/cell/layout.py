@@ -68,10 +68,8 @@ def find_unreachable_places(
 ) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key in the cell file and a message for each bin or safe place that the arm cannot reach.
 
-    Args:
-        config: The cell file.
-        require_reachable: Function that raises `Unreachable` if the arm cannot reach a position `(2,)` [m]
-            above a surface with a height [m].
+    `require_reachable` is a function of a position `(2,)` [m] and of the height of the surface below the
+    position [m]. The function raises `Unreachable` if the arm cannot reach the position.
     """
     places: list[tuple[KeyPath, str, Array, float]] = [
         (("bins", name, "position"), f'the bin "{name}"', build_bin(name, bin).slots, bin.position[2])

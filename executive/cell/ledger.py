@@ -84,9 +84,7 @@ class Ledger(Protocol):
     def record_miss(self, item: Item, *, found_table: bool = False) -> None:
         """Record a failed attempt to pick an item, which may have moved any object on the table.
 
-        Args:
-            item: The item.
-            found_table: True if the descent to the item touched nothing above the table.
+        `found_table` is True if the descent to the item touched nothing above the table.
         """
 
     def record_grasp(self, item: Item) -> None:

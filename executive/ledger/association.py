@@ -1,8 +1,7 @@
 """Association of observations with items: by position first, then by class.
 
-The association has three steps: `associate` matches each observation to a nearby item,
-`find_moved_item` matches a new item to an item that may have been moved to its position, and `find_duplicate`
-matches two items at one position.
+`associate` matches each observation to a nearby item, `find_moved_item` a new item to a known item that may
+have been moved, and `find_duplicate` two items at one position.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ class Belief:
         log_odds: Posterior log odds that the item exists.
         is_proved: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
-        uncertain_look_count: Number of looks with a low-confidence detection since the last confident one.
+        uncertain_look_count: Number of looks with a low-confidence detection since the last confident look.
         last_label_by_viewpoint: Last detected class by viewpoint key, since the last possible move.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
@@ -89,9 +89,9 @@ class Belief:
         """
         if not self.label_counts:
             return 1.0
-        best = self.log_likelihoods[self.label]
-        others = (value for label, value in self.log_likelihoods.items() if label != self.label)
-        odds_of_other_class = sum(math.exp(value - best) for value in (0.0, *others))
+        max_value = self.log_likelihoods[self.label]
+        other_values = (value for label, value in self.log_likelihoods.items() if label != self.label)
+        odds_of_other_class = sum(math.exp(value - max_value) for value in (0.0, *other_values))
         return odds_of_other_class / (1.0 + odds_of_other_class)
 
     @property

@@ -78,9 +78,7 @@ class Certainty:
     def reject_if_uncertain(self, record: ItemRecord, *, is_unmoved: bool) -> None:
         """Reject an item in the state SEEN if more looks are unlikely to make the item certain.
 
-        Args:
-            record: The item.
-            is_unmoved: True if the item cannot have moved since its last detection.
+        `is_unmoved` is True if the item cannot have moved since its last detection.
         """
         belief = record.belief
         is_certain = is_unmoved and self.is_certain(record)
@@ -92,10 +90,11 @@ class Certainty:
             counts = ", ".join(f"{count} {label}" for label, count in belief.label_counts.most_common())
             record.set_state(State.REJECTED, f"looks disagree about its class: {counts}")
         elif self._needs_other_viewpoint(record):
+            look_count, class_error = belief.look_count, belief.class_error
             reason = (
-                f"{belief.look_count} looks from one pose leave a probability of {belief.class_error:.1%}"
+                f"{look_count} looks from one pose leave a probability of {class_error:.1%} that it is no "
             )
-            reason += f" that it is no {record.label}; at most {self.config.max_class_error:.1%} is allowed"
+            reason += f"{record.label}; at most {self.config.max_class_error:.1%} is allowed"
             record.set_state(State.REJECTED, reason)
         elif not is_certain and (
             belief.uncertain_look_count >= MIN_UNCERTAIN_LOOKS_TO_REJECT
@@ -109,7 +108,7 @@ class Certainty:
     def register_low_touch(self, record: ItemRecord) -> bool:
         """Count a touch below the height of the class; return False if the touch contradicts the class.
 
-        The first low touch is no contradiction if the looks prove the class; it may have missed the top.
+        The first low touch is no contradiction if the looks prove the class; the cup may have missed the top.
         """
         record.low_touch_count += 1
         return record.low_touch_count == 1 and record.belief.class_error <= self.config.max_class_error

@@ -61,6 +61,7 @@ class Coverage:
         self._reset_values = np.where(inside_mask, 1.0, PRIOR_OUTSIDE_AFTER_CHANGE)
         """Miss probabilities `(N,)` after a change of the table."""
         self._last_change_numbers = np.zeros(len(self._points), dtype=int)
+        """Number of the last change of the table near each point `(N,)`."""
         self._searched_masks: dict[str, NDArray[np.bool_]] = {}
         """Masks `(N,)` of the points that earlier looks searched, by viewpoint and view."""
         self._full_look_count = 0
@@ -81,11 +82,11 @@ class Coverage:
         viewpoint = f"{make_viewpoint_key(look)} {look.view}"
         miss_rate, repeated = look.error_rates.miss_rate, look.error_rates.repeated
         repeated_miss_rate = compute_repeat_probability(miss_rate, repeated)
-        repeated_mask = self._searched_masks.setdefault(viewpoint, np.zeros(len(self._points), bool))
-        miss_rates = np.where(repeated_mask, repeated_miss_rate, miss_rate)
+        earlier_searched_mask = self._searched_masks.setdefault(viewpoint, np.zeros(len(self._points), bool))
+        miss_rates = np.where(earlier_searched_mask, repeated_miss_rate, miss_rate)
         self._miss_probabilities[searched_mask] *= miss_rates[searched_mask]
         self._miss_probabilities = self._miss_probabilities.clip(MIN_MISS_PROBABILITY)
-        repeated_mask |= searched_mask
+        earlier_searched_mask |= searched_mask
         if look.view == "full":
             self._full_look_count += 1
             # Points at the border of the image do not count as visible, because no later look may show them.

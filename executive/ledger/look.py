@@ -1,4 +1,4 @@
-"""Update of all items with the detections and localized detections of one look (an image), and its event."""
+"""Update of all items with one look (an image with its detections), and the event of the look."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EXPECTED_OBJECT_COUNT = 3.0
 
 
 def make_look_event(look: Detections, observations: Sequence[Observation]) -> FrameSearched:
-    """Return the event of a look; `observations` are its localized detections."""
+    """Return the event of a look; `observations` are the localized detections."""
     confident_objects: list[DetectedObject] = []
     doubtful_objects: list[DetectedObject] = []
     for observation in observations:
@@ -86,11 +86,9 @@ class LookUpdate:
         self, known_items: Sequence[ItemRecord], observations: Sequence[Observation]
     ) -> list[ItemRecord]:
         """Update known items with confident observations, add new items, and return the detected items."""
-        # An object at the position of an improbable item that may have been moved is a new item.
-        probable_items = [item for item in known_items if item.belief.existence_probability >= 0.5]
-        candidates = [
-            item for item in known_items if item in probable_items or self.staleness.is_unmoved(item)
-        ]
+        # An object at the position of an unlikely item that may have been moved is a new item.
+        likely_items = [item for item in known_items if item.belief.existence_probability >= 0.5]
+        candidates = [item for item in known_items if item in likely_items or self.staleness.is_unmoved(item)]
         matches = associate(observations, candidates, self.staleness, self.config.gate)
         unmatched_items = [record for record in candidates if record not in matches.values()]
         rates, viewpoint = self.look.error_rates, make_viewpoint_key(self.look)
@@ -104,10 +102,8 @@ class LookUpdate:
             is_unmoved = self.staleness.is_unmoved(record)
             if not is_unmoved:
                 record.forget_viewpoints()
-            label, is_ambiguous = (
-                observation.detection.label,
-                self._may_show_any_item(observation, unmatched_items),
-            )
+            label = observation.detection.label
+            is_ambiguous = self._may_show_any_item(observation, unmatched_items)
             record.belief.add_detection(label, rates, viewpoint, is_ambiguous=is_ambiguous)
             record.observe(observation, self.look.frame, rates.bias, is_unmoved=is_unmoved)
             detected_items.append(record)

@@ -27,11 +27,9 @@ class Recovery:
         """Number of visible objects of each class, by bin, in each look that shows the whole bin."""
 
     def add_look(self, look: Detections, bin_names: Mapping[Observation, str | None]) -> None:
-        """Count the objects in each bin whose whole floor is visible in a look.
+        """Count the objects in each bin whose whole floor is visible in a look at the whole image.
 
-        Args:
-            look: Detections in a whole image.
-            bin_names: Name of the bin in which each observed object lies, or None.
+        `bin_names` contains, for each observed object, the name of the bin in which the object lies, or None.
         """
         for name in self._bins.bins:
             if self._bins.is_floor_visible(name, look):
@@ -66,9 +64,8 @@ class Recovery:
         for bin_name, look_counts in self._counts_by_bin.items():
             labels = set().union(*look_counts)
             visible_counts = {label: median_low(counts[label] for counts in look_counts) for label in labels}
-            unknown_count = sum(visible_counts.values()) - self._bins.count_objects_in(
-                bin_name, self._records
-            )
+            tracked_count = self._bins.count_objects_in(bin_name, self._records)
+            unknown_count = sum(visible_counts.values()) - tracked_count
             forbidden_labels = {label for label in labels if bin_name not in self._bins.routes.get(label, ())}
             for label in sorted(labels, key=lambda label: (label in forbidden_labels, label)):
                 known_count = sum((item.label, item.bin) == (label, bin_name) for item in self._records)

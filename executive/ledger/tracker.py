@@ -43,8 +43,8 @@ class Tracker:
         labels_with_unique_height: Classes whose height distinguishes them from all others.
 
     Attributes:
-        unknown_labels: Maximum number of boxes in one look, by label that is not in the cell file.
-        assumption_reasons: Reasons for which error rates of detectors are assumed instead of measured.
+        unknown_labels: Maximum number of boxes in a frame, by label that is not in the cell file.
+        assumption_reasons: Reasons why error rates of detectors were assumed, and not measured.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Tracker:
         """Record a touch, and return False if the touch contradicts the class of the item.
 
         A touch proves that the item exists. After a touch at the height of the class, a touch at another
-        height is no contradiction: the item may have fallen over. `may_miss_top`: see `Ledger`.
+        height is no contradiction, because the item may have fallen over.
         """
         record = self._records.find(item)
         record.belief.is_proved, record.had_contact, record.empty_probe_count = True, True, 0
@@ -187,12 +187,12 @@ class Tracker:
         """Record that the tool holds an item, and that the grasp may have moved neighbouring objects.
 
         Raises:
-            Fault: By the ledger, the tool still holds another item.
+            Fault: According to the ledger, the tool still holds another item.
         """
-        if (other := self.find_held_item()) not in (None, item):
+        if (held_item := self.find_held_item()) not in (None, item):
             raise Fault(
-                f"the tool cannot hold {item}: it holds {other}; the skill that released {other} must call "
-                "record_placement, record_drop or record_put_down of the ledger"
+                f"the tool cannot hold {item}: it holds {held_item}; the skill that released {held_item} "
+                "must call record_placement, record_drop or record_put_down of the ledger"
             )
         record = self._records.find(item)
         self._records.change_state(record, State.HELD)
@@ -255,7 +255,7 @@ class Tracker:
     def close(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the behaviour tree succeeded."""
         has_touched_item = any(record.touched_label for record in self.records)
-        dropped = [record for record in self.records if record.state is State.DROPPED]
+        dropped_items = [record for record in self.records if record.state is State.DROPPED]
         for record in self.records:
             final_state = outcomes.find_final_state(
                 record, self._certainty, has_route=record.label in self._routes, is_completed=completed,
@@ -266,7 +266,7 @@ class Tracker:
             if final_state is not None:
                 record.set_state(*final_state)
                 self._records.emit(record)
-        self._records.emit(*outcomes.discard_moved_items(self.records, dropped))
+        self._records.emit(*outcomes.discard_moved_items(self.records, dropped_items))
 
     def reopen(self) -> None:
         """Discard the items on the table; the next look adds a new item for each visible object."""

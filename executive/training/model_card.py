@@ -41,15 +41,13 @@ def render_card(
     blocks = [f"# {title}", summary, _render_table(("setting", "value"), list(settings.items()))]
     if evaluations:
         thresholds = sorted({evaluation.threshold for evaluation in evaluations.values()})
-        rows = [
-            (
-                dataset,
-                *(template.format(getattr(evaluation, name)) for name, template in METRIC_COLUMNS.values()),
-                _format_distribution(evaluation.centre),
-                _format_distribution(evaluation.position),
-            )
-            for dataset, evaluation in evaluations.items()
-        ]
+        rows = []
+        for dataset, evaluation in evaluations.items():
+            metrics = [
+                template.format(getattr(evaluation, name)) for name, template in METRIC_COLUMNS.values()
+            ]
+            errors = [_format_distribution(values) for values in (evaluation.centre, evaluation.position)]
+            rows.append([dataset, *metrics, *errors])
         blocks += [
             "## Accuracy",
             f"Precision and recall at confidence {', '.join(map('{:g}'.format, thresholds))} and IoU 0.5. "

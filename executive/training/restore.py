@@ -25,14 +25,11 @@ QUERY_GROUP_COUNT: int = ARCHITECTURE["group_detr"]
 
 
 def restore_model(model: Path) -> Any:
-    """Return an `rfdetr.RFDETRNano` with the weights of an exported model.
+    """Return an `rfdetr.RFDETRNano` with the weights of an ONNX file that `executive train` wrote.
 
     The export renames and drops weights. To find the original names, a model with random weights is exported,
     and each exported weight is compared with the tensors of the model. All groups of queries become copies of
     the first group. Layers that the export drops, because no output depends on them, stay random.
-
-    Args:
-        model: ONNX file that `executive train` wrote.
 
     Raises:
         InputError: The file has another architecture.

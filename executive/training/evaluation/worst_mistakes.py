@@ -37,7 +37,7 @@ TRUE_COLOUR, DETECTED_COLOUR, OUTLINE_COLOUR = "#56B4E9", "#E69F00", "#000000"
 HEADER_BASELINE, TEXT_BASELINE, FILE_BASELINE = 21, 15, 32
 """Distances of lines of text from the upper side of the header, and of a caption (two lines) [pixel]."""
 FONT, FONT_SCALE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
-"""Font of OpenCV, and scale of its size."""
+"""Font of OpenCV, and factor by which its base size is multiplied."""
 
 Picture = NDArray[np.uint8]
 """An image `(H, W, 3)`, RGB."""
@@ -142,7 +142,7 @@ def _draw_tile(mistake: Mistake) -> Picture:
     crop_size = max(CROP_SCALE * max(right - left, bottom - top), MIN_CROP_SIZE)
     crop_corner = np.array([left + right - crop_size, top + bottom - crop_size]) / 2
     zoom = TILE_SIZE / crop_size
-    # The centre of pixel i is at i + 0.5 in the coordinates of boxes, and at i in those of OpenCV.
+    # The centre of pixel i is at i + 0.5 in the coordinates of boxes, and at i in the coordinates of OpenCV.
     shift = zoom * (0.5 - crop_corner) - 0.5
     matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
     image = mistake.sample.image[..., ::-1]  # The annotators expect BGR.
