@@ -1,4 +1,4 @@
-"""Loading of cells, given by the path of a cell file or the name of a shipped cell."""
+"""Functions that find and load a cell by the path of a cell file or the name of a shipped cell."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ if TYPE_CHECKING:
     from executive.cell.config import CellConfig
 
 
-def load_cells(names: tuple[str, ...], overrides: Mapping[str, str] | None = None) -> dict[str, CellConfig]:
-    """Return the cells by name; `names` contains paths of cell files and names of shipped cells.
+def load_cells(
+    paths_or_names: tuple[str, ...], overrides: Mapping[str, str] | None = None
+) -> dict[str, CellConfig]:
+    """Return the configurations of cells by cell name.
 
-    `overrides` contains values of keys of the cells, by `cell.<key>.<key>`.
+    `paths_or_names` contains paths of cell files and names of shipped cells. `overrides` contains values by
+    the names of keys of the cells, `cell.KEY.KEY`.
 
     Raises:
         InputError: A cell does not exist, two cells have the same name, or a file is invalid.
@@ -22,30 +25,30 @@ def load_cells(names: tuple[str, ...], overrides: Mapping[str, str] | None = Non
     from executive.mission.parse.cell_file import load_cell
 
     cells: dict[str, CellConfig] = {}
-    for name in names:
-        config = load_cell(find_cell(name), overrides)
+    for path_or_name in paths_or_names:
+        config = load_cell(find_cell(path_or_name), overrides)
         if config.cell in cells:
             raise InputError(f'two cells are called "{config.cell}"; give one of them another name')
         cells[config.cell] = config
     return cells
 
 
-def find_cell(name: str) -> Path:
-    """Return the cell file at a path, or the shipped cell with this name.
+def find_cell(path_or_name: str) -> Path:
+    """Return the path of a cell file, or the path of the shipped cell file with this name.
 
     Raises:
-        InputError: Neither a file nor a shipped cell has this name.
+        InputError: Neither a file nor a shipped cell exists.
     """
     from executive.errors import InputError
     from executive.mission.findings import suggest_choice
     from executive.mission.text.file_search import get_shipped_folder
 
-    path = Path(name)
+    path = Path(path_or_name)
     if path.is_file():
         return path
     folder = get_shipped_folder() / "cells"
-    shipped = {file.stem: file for file in sorted(folder.glob("*.yaml"))}
-    if name in shipped:
-        return shipped[name]
-    hint = suggest_choice(name, shipped, "Shipped cells")
-    raise InputError(f'there is neither a cell file nor a shipped cell "{name}". {hint}')
+    shipped_files = {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+    if path_or_name in shipped_files:
+        return shipped_files[path_or_name]
+    choices = suggest_choice(path_or_name, shipped_files, "Shipped cells")
+    raise InputError(f'there is neither a cell file nor a shipped cell "{path_or_name}". {choices}')

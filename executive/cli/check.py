@@ -29,7 +29,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     """
     with keep_stdout_clean():
         from executive.errors import InputError
-        from executive.mission.findings import MAX_LISTED_FINDINGS, Finding
+        from executive.mission.findings import MAX_LISTED_FINDINGS, Finding, MissionError
         from executive.mission.load import load_mission
         from executive.plugins import load_cell_kind, load_skills
 
@@ -39,20 +39,21 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
         for mission in missions:
             try:
                 loaded = load_mission(mission, skills, overrides, load_cell_kind)
-                findings, endings, ok = loaded.warnings, loaded.unhandled_failures, True
-                texts.append(_describe_mission(mission, findings, endings))
-            except InputError as error:
-                unreadable = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
-                findings, endings, ok = getattr(error, "findings", unreadable), (), False
+                findings, failures, is_valid = loaded.warnings, loaded.unhandled_failures, True
+                texts.append(_describe_mission(mission, findings, failures))
+            except MissionError as error:
+                findings, failures, is_valid = error.findings, (), False
                 texts.append(str(error))
-            contents = {
-                "findings": [
-                    {**asdict(finding), "excerpt": finding.shown_excerpt}
-                    for finding in findings[:MAX_LISTED_FINDINGS]
-                ],
-                "endings": [*map(asdict, endings)],
-            }
-            reports.append({"mission": mission, "ok": ok, **contents})
+            except InputError as error:
+                findings = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
+                failures, is_valid = (), False
+                texts.append(str(error))
+            entries = [
+                {**asdict(finding), "excerpt": finding.shown_excerpt}
+                for finding in findings[:MAX_LISTED_FINDINGS]
+            ]
+            endings = [*map(asdict, failures)]
+            reports.append({"mission": mission, "ok": is_valid, "findings": entries, "endings": endings})
     if as_json:
         print_json(reports)
     else:
@@ -60,17 +61,18 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
     ctx.exit(0 if all(report["ok"] for report in reports) else 2)
 
 
-def _describe_mission(mission: str, findings: Sequence[Finding], endings: Sequence[UnhandledFailure]) -> str:
+def _describe_mission(mission: str, warnings: Sequence[Finding], failures: Sequence[UnhandledFailure]) -> str:
     """Return a text with the warnings of a valid mission, and with the failures that can end its run."""
     from executive.mission.findings import describe_findings
 
-    lines = [*describe_findings(findings), f"{mission}: ok"]
-    if endings:
+    lines = [*describe_findings(warnings), f"{mission}: ok"]
+    if failures:
         lines.append("  no node handles these failures; each would end the mission:")
-        # A subtree that is used twice has the same endings in the same lines; each is printed once.
+        # If a mission uses a subtree twice, the failures of the subtree are listed once.
         reasons_by_place: dict[tuple[str, str, int], dict[str, None]] = {}
-        for ending in endings:
-            reasons_by_place.setdefault((ending.source, ending.path, ending.line), {})[ending.reason] = None
+        for failure in failures:
+            place = (failure.source, failure.path, failure.line)
+            reasons_by_place.setdefault(place, {})[failure.reason] = None
         descriptions = {place: f"{place[0]}: {', '.join(names)}" for place, names in reasons_by_place.items()}
         width = max(map(len, descriptions.values()))
         lines += [f"    {text:{width}}  {path}:{line}" for (_, path, line), text in descriptions.items()]

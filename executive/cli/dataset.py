@@ -16,13 +16,13 @@ from executive.cli.streams import keep_stdout_clean
 @click.option("--images", type=COUNT, default=1000, help="Number of images.")
 @seed_option
 @click.option(
-    "--format", "layout", type=click.Choice(["coco", "yolo"]), default="coco",
-    help="Format of the dataset, as in exports of Roboflow.",
+    "--format", "dataset_format", type=click.Choice(["coco", "yolo"]), default="coco",
+    help="Format of the dataset, the same format that Roboflow exports.",
 )  # fmt: skip
 @workers_option
 @click.option("--valid", type=click.FloatRange(0, 1), default=0.1, help="Fraction kept for validation.")
 def command(
-    cells: tuple[str, ...], out: Path, images: int, seed: int, layout: str, workers: int, valid: float
+    cells: tuple[str, ...], out: Path, images: int, seed: int, dataset_format: str, workers: int, valid: float
 ) -> None:
     """Render labelled images for the training of a detector.
 
@@ -36,7 +36,7 @@ def command(
         configs = load_cells(cells)
         with show_progress("rendering") as progress:
             generate_dataset(
-                configs, out, image_count=images, seed=seed, layout=layout, worker_count=workers,
+                configs, out, image_count=images, seed=seed, layout=dataset_format, worker_count=workers,
                 valid_fraction=valid, progress=progress,
             )  # fmt: skip
         click.echo(f"{out}: {images} images", err=True)

@@ -1,8 +1,8 @@
 """`executive doctor`: checks of this installation, with a fix for each problem.
 
-`python -m executive.cli.doctor tiny|egl` renders a few frames and prints the median time per frame. It
-runs as a separate process, because a failing EGL driver may crash the process. Each check imports its
-packages itself, so that a missing package affects only this check, and other commands start quickly.
+Each check imports its packages itself, so that a missing package affects only this check. The module is also
+a program, `python -m executive.cli.doctor tiny|egl`, that prints the median rendering time of a frame: a
+failing EGL driver may crash the process in which it runs.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from executive.processes import build_command
 MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
 """Oldest and newest Python version for which every required package has wheels."""
 EXTRAS = {"view": "watch a run in the browser", "train": "train a detector of your own"}
-"""Purpose of each optional group of packages, by its name."""
+"""Purpose of each extra of this project (an optional group of packages), by the name of the extra."""
 FRAME_COUNT = 5
-"""Number of timed frames; another frame before them is not timed."""
+"""Number of timed frames; the first frame of a process is not timed."""
 FRAME_SIZE = (640, 480)
 """Width and height of a frame [pixel]."""
 RENDER_TIMEOUT = 30.0
@@ -41,9 +41,9 @@ class CheckResult(NamedTuple):
     """Result of one check.
 
     Attributes:
-        status: `ok`; `note`: an optional feature cannot be used; `problem`: missions cannot be run.
+        status: `ok`, `note` (an optional feature cannot be used), or `problem` (missions cannot be run).
         subject: Name of the checked part of the installation.
-        message: State of this part.
+        message: State of the checked part.
         fix: Command or other action that solves the problem, or "".
     """
 
@@ -59,20 +59,20 @@ class CheckResult(NamedTuple):
 def command(ctx: click.Context, as_json: bool) -> None:
     """Check this installation.
 
-    Checks Python, packages, plugins, renderer, display and the server of Roboflow. A problem prevents runs;
-    exit code 1 if there is one. A note concerns an optional feature that cannot be used.
+    Checks Python, packages, plugins, renderer, display and the server of Roboflow. Exit code 1 if a
+    problem prevents runs. A note concerns an optional feature that cannot be used.
     """
     with keep_stdout_clean():
-        findings = list(run_checks())
-    problems = sum(finding.status == "problem" for finding in findings)
+        results = list(run_checks())
+    problem_count = sum(result.status == "problem" for result in results)
     if as_json:
-        print_json([finding._asdict() for finding in findings])
+        print_json([result._asdict() for result in results])
     else:
-        width = max(len(finding.subject) for finding in findings)
-        for status, subject, message, fix in findings:
-            click.echo(f"{status:7}  {subject:{width}}  {message}{fix and f'; {fix}'}")
-        click.echo(f"{problems} problem{'s' if problems > 1 else ''}" if problems else "no problems")
-    ctx.exit(int(problems > 0))
+        width = max(len(result.subject) for result in results)
+        for status, subject, message, fix in results:
+            click.echo(f"{status:7}  {subject:{width}}  {'; '.join(filter(None, (message, fix)))}")
+        click.echo(f"{problem_count or 'no'} problem{'' if problem_count == 1 else 's'}")
+    ctx.exit(int(problem_count > 0))
 
 
 def run_checks() -> Iterator[CheckResult]:
@@ -93,10 +93,10 @@ def check_system(version: tuple[int, ...] = sys.version_info[:3]) -> Iterator[Ch
     is_supported = MIN_PYTHON <= version[:2] <= MAX_PYTHON
     fix = "use Python 3.10 or 3.11 (uv installs 3.11)"
     yield _make_result(is_supported, "python", python, "problem", f"{python} has no pybullet wheel", fix)
-    name = os.environ.get("DISPLAY")
-    message = f"DISPLAY is {name}; --gui opens the window of the simulator there"
+    display = os.environ.get("DISPLAY")
+    message = f"DISPLAY is {display}; --gui opens the window of the simulator there"
     fix = "run without --gui; the terminal, --view and the report also show a run"
-    yield _make_result(bool(name), "display", message, "note", "DISPLAY is not set", fix)
+    yield _make_result(bool(display), "display", message, "note", "DISPLAY is not set", fix)
 
 
 def check_packages() -> Iterator[CheckResult]:
@@ -105,12 +105,13 @@ def check_packages() -> Iterator[CheckResult]:
 
     from executive.run.versions import DISTRIBUTION, find_installer, find_version, list_requirements
 
-    names = list_requirements()
-    missing = [name for name in (DISTRIBUTION, *names) if not find_version(name)]
-    for name in missing:
+    required_packages = list_requirements()
+    missing_packages = [name for name in (DISTRIBUTION, *required_packages) if not find_version(name)]
+    for name in missing_packages:
         yield CheckResult("problem", "packages", f"{name} is missing", "run `uv sync`")
-    if not missing:
-        message = f"{DISTRIBUTION} {find_version(DISTRIBUTION)} and its {len(names)} required packages"
+    if not missing_packages:
+        version, count = find_version(DISTRIBUTION), len(required_packages)
+        message = f"{DISTRIBUTION} {version} and its {count} required packages"
         yield CheckResult("ok", "packages", message)
     if packages := sorted(set(packages_distributions().get("cv2", ()))):
         opencv = ", ".join(f"{name} {find_version(name)}" for name in packages)
@@ -121,13 +122,13 @@ def check_packages() -> Iterator[CheckResult]:
         message = f"{len(packages)} packages provide `cv2` and overwrite each other ({opencv})"
         yield _make_result(len(packages) == 1, "opencv", ok_message, "problem", message, fix)
     for extra, purpose in EXTRAS.items():
-        names = list_requirements(extra)
-        missing = [name for name in names if not find_version(name)]
-        versions = ", ".join(f"{name} {find_version(name)}" for name in names)
+        version_by_package = {name: find_version(name) for name in list_requirements(extra)}
+        missing = ", ".join(name for name, version in version_by_package.items() if not version)
+        versions = ", ".join(f"{name} {version}" for name, version in version_by_package.items())
         fix = f"to {purpose}, run `uv sync --extra {extra}`"
-        yield _make_result(not missing, extra, versions, "note", f"not installed: {', '.join(missing)}", fix)
-    if version := find_version("av"):
-        yield CheckResult("ok", "film", f"av {version} encodes videos; the program ffmpeg is not needed")
+        yield _make_result(not missing, extra, versions, "note", f"not installed: {missing}", fix)
+    if av_version := find_version("av"):
+        yield CheckResult("ok", "film", f"av {av_version} encodes videos; the program ffmpeg is not needed")
 
 
 def check_plugins() -> Iterator[CheckResult]:
@@ -150,9 +151,9 @@ def check_renderer() -> Iterator[CheckResult]:
     ok_message = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 pixels of the cell overhead"
     message, fix = f"TinyRenderer renders no frame: {problem}", "run `uv sync --reinstall-package pybullet`"
     yield _make_result(not problem, "renderer", ok_message, "problem", message, fix)
-    _, problem = measure_frame_time("egl")
-    state = f"renders no frame: {problem}" if problem else "can be loaded and renders"
-    status = "note" if problem else "ok"
+    _, egl_problem = measure_frame_time("egl")
+    state = f"renders no frame: {egl_problem}" if egl_problem else "can be loaded and renders"
+    status = "note" if egl_problem else "ok"
     yield CheckResult(status, "egl", f"PyBullet's EGL plugin {state}; no cell needs it")
 
 
@@ -168,28 +169,33 @@ def check_roboflow() -> Iterator[CheckResult]:
     yield _make_result(is_reachable(HOSTED_URL), "roboflow", f"{HOSTED_URL} answers", "note", message, fix)
 
 
-def _make_result(is_ok: bool, subject: str, ok_text: str, status: str, text: str, fix: str) -> CheckResult:
-    return CheckResult("ok", subject, ok_text) if is_ok else CheckResult(status, subject, text, fix)
+def _make_result(
+    is_ok: bool, subject: str, ok_message: str, failure_status: str, failure_message: str, fix: str
+) -> CheckResult:
+    """Return a result with the status `ok`, or with the failure status, the failure message and the fix."""
+    if is_ok:
+        return CheckResult("ok", subject, ok_message)
+    return CheckResult(failure_status, subject, failure_message, fix)
 
 
 def measure_frame_time(renderer: str) -> tuple[float, str]:
     """Render with `tiny` or `egl` in a subprocess; return time per frame [ms] and error message or ""."""
-    command_line = build_command("executive.cli.doctor", renderer)
+    arguments = build_command("executive.cli.doctor", renderer)
     try:
-        completed = subprocess.run(
-            command_line, capture_output=True, text=True, timeout=RENDER_TIMEOUT, check=False
+        process = subprocess.run(
+            arguments, capture_output=True, text=True, timeout=RENDER_TIMEOUT, check=False
         )
     except subprocess.TimeoutExpired:
         return 0.0, f"no frame within {RENDER_TIMEOUT:.0f} s"
     # Drivers may print text before and after the result, and may crash afterwards.
-    if result := re.search(r"^milliseconds: ([0-9.]+)$", completed.stdout, re.MULTILINE):
+    if result := re.search(r"^milliseconds: ([0-9.]+)$", process.stdout, re.MULTILINE):
         return float(result[1]), ""
-    *_, last = ["no error output", *filter(str.strip, completed.stderr.splitlines())]
-    return 0.0, f"its process ended with exit code {completed.returncode}: {last.strip()}"
+    error_lines = process.stderr.strip().splitlines() or ["no error output"]
+    return 0.0, f"its process ended with exit code {process.returncode}: {error_lines[-1].strip()}"
 
 
 def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
-    """Return True if a server answers within `timeout` [s], also with an HTTP error."""
+    """Return True if a server answers within `timeout` [s]; an HTTP error is also an answer."""
     import urllib.error
     import urllib.request
 
@@ -201,10 +207,10 @@ def is_reachable(address: str, timeout: float = SERVER_TIMEOUT) -> bool:
 
 
 def prepare_renderer(renderer: str) -> Callable[[], object]:
-    """Return a function that renders a frame: of the cell overhead for `tiny`, of an empty scene for `egl`.
+    """Return a function that renders a frame of the cell overhead (`tiny`) or of an empty scene (`egl`).
 
     Raises:
-        SystemExit: There is no EGL plugin, or it cannot be loaded.
+        SystemExit: The EGL plugin is missing or cannot be loaded.
     """
     import pybullet
 

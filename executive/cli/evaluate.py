@@ -12,7 +12,7 @@ from executive.cli import options
 from executive.cli.streams import keep_stdout_clean, print_json
 
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
-"""Suffixes of the file formats in which the sheet of mistakes can be saved."""
+"""File name suffixes of the formats in which the worst mistakes can be saved."""
 
 
 @click.command(name="evaluate")
@@ -68,9 +68,9 @@ def command(
     """Measure the accuracy of a detector.
 
     The detector belongs to a cell (--cell), or is a model file (--weights) or the shipped model. The images
-    are rendered scenes of the cell (by default of the shipped cell overhead), or those of --dataset. The
-    error rates of a detector of a cell are stored for runs, except with --threshold, --varied, --scene,
-    --view full, and --set without --out.
+    come from --dataset, or are rendered scenes of the cell (by default of the shipped cell overhead). The
+    error rates of the detector of a cell are stored for runs. With --threshold, --varied, --scene or
+    --view full, and with --set without --out, the error rates are only printed.
     """
     unknown_key = next((key for key in overrides if not key.startswith("cell.")), "")
     is_image = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES
@@ -97,34 +97,37 @@ def command(
         from executive.training.evaluation.worst_mistakes import WorstMistakes
         from executive.view.results.detector_results import print_metrics
 
-        worst, scenes = WorstMistakes(), evaluation.SceneSettings(images, seed, varied, view, workers, scene)
-        names = cells or (() if dataset else ("overhead",))
-        configs_by_file = dict(zip(map(find_cell, names), load_cells(names, overrides).values(), strict=True))
+        worst_mistakes = WorstMistakes()
+        scene_settings = evaluation.SceneSettings(images, seed, varied, view, workers, scene)
+        cell_names = cells or (() if dataset else ("overhead",))
+        configs = load_cells(cell_names, overrides)
+        configs_by_file = dict(zip(map(find_cell, cell_names), configs.values(), strict=True))
         detectors = list(evaluation.list_detectors(configs_by_file, detector_name, weights, labels))
         if dataset is not None:
             report_polygons(dataset)
         for detector in detectors:
             evaluation.check_detector(detector, renders_scenes=dataset is None, scene=scene)
         for detector in detectors:
-            measurement, start_time = detector.make_measurement_name(dataset), time.monotonic()
+            name, start_time = detector.make_measurement_name(dataset), time.monotonic()
             result = evaluation.measure_detector(
-                detector, dataset, scenes, threshold=threshold, worst_mistakes=worst, progress=show_progress
-            )
-            print_metrics(measurement, detector.name, result)
+                detector, dataset, scene_settings, threshold=threshold, worst_mistakes=worst_mistakes,
+                progress=show_progress,
+            )  # fmt: skip
+            print_metrics(name, detector.name, result)
             kind = detector.configs[detector.name].kind
-            results[measurement] = {"detector": detector.name, "kind": kind, **result.to_dict()}
+            results[name] = {"detector": detector.name, "kind": kind, **result.to_dict()}
             if is_stored and detector.cell is not None:
                 source = f"--dataset {dataset}" if dataset else f"--images {images} --seed {seed}"
                 arguments = f"--cell {detector.cell.cell} --detector {detector.name} {source}"
-                line, duration = f"executive evaluate {arguments}", time.monotonic() - start_time
-                path = evaluation.store_evaluation(detector, result, out, command=line, duration=duration)
+                repeat, duration = f"executive evaluate {arguments}", time.monotonic() - start_time
+                path = evaluation.store_evaluation(detector, result, out, command=repeat, duration=duration)
                 click.echo(f"stored in {path}", err=True)
         if sheet is not None:
             from executive.training.dataset import save_image
             from executive.training.evaluation.worst_mistakes import draw_sheet
 
-            save_image(sheet, draw_sheet(worst.mistakes, ", ".join(results)))
-            click.echo(f"{sheet}: the {len(worst.mistakes)} worst mistakes", err=True)
+            save_image(sheet, draw_sheet(worst_mistakes.mistakes, ", ".join(results)))
+            click.echo(f"{sheet}: the {len(worst_mistakes.mistakes)} worst mistakes", err=True)
     if as_json:
-        named_files = {"scene": scene and str(scene), "weights": weights and str(weights)}
-        print_json({"seed": seed, "varied": varied, **named_files, "measured": results})
+        files = {"scene": scene and str(scene), "weights": weights and str(weights)}
+        print_json({"seed": seed, "varied": varied, **files, "measured": results})

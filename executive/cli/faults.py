@@ -46,41 +46,43 @@ def command(
     """Inject each possible fault into a run of a mission.
 
     MISSION is a file or the name of a shipped mission. Its tree determines the faults: every reason of every
-    node, bugs in every skill, and faults of detectors, objects and the tool. If a fault of the cell makes a
-    node fail, the same reason is not injected into its skill: fewer faults are injected than --list prints.
-    Exit code 1 if a run does not handle its fault: it loses an object that is still within reach, misplaces
-    an object, ends with a ledger that differs from the world, or ends in another wrong way.
+    node, bugs in every skill, and faults of detectors, objects and the tool. A failure that a cell fault
+    causes is not injected into its node again, so that fewer faults are injected than --list prints.
+    Exit code 1 if a run does not handle its fault: the run loses an object within reach, misplaces an object,
+    does not end correctly, or has a ledger that differs from the world.
     """
-    if sum((pairs is not None, fault_numbers is not None, list_only)) > 1:
-        raise click.UsageError("--pairs, --fault and --list exclude each other; give one of them")
+    option_count = sum((pairs is not None, fault_numbers is not None, list_only))
+    options.check_usage(
+        (option_count > 1, "--pairs, --fault and --list exclude each other; give one of them")
+    )
     with keep_stdout_clean():
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record_trial
         from executive.campaign.mission_under_test import load_mission_under_test
         from executive.cli.progress import print_halt, show_progress
-        from executive.view.results.fault_results import (
-            format_results,
-            format_trial,
-            results_to_json,
-            trial_to_json,
-        )
+        from executive.view.results import fault_results
 
         mission_under_test = load_mission_under_test(mission, overrides, oracle, seed)
         with show_progress("faults", quiet=as_json or list_only or fault_numbers is not None) as progress:
             campaign = Campaign(mission_under_test, workers=workers, progress=progress, on_halt=print_halt)
-            value: Any
+            output: Any
             if list_only:
-                numbered = enumerate(campaign.faults, 1)
-                value = [{"fault": number, "description": str(fault)} for number, fault in numbered]
-                text, code = "\n".join(f"{fault['fault']:4} {fault['description']}" for fault in value), 0
+                descriptions = dict(enumerate(map(str, campaign.faults), start=1))
+                output = [{"fault": number, "description": text} for number, text in descriptions.items()]
+                text = "\n".join(f"{number:4} {text}" for number, text in descriptions.items())
+                exit_code = 0
             elif fault_numbers is not None:
                 faults = campaign.select_faults(fault_numbers)
                 trial, path = record_trial(mission_under_test, campaign.nominal_run, faults, runs)
-                value = {**trial_to_json(trial), "run": str(path)}
-                text, code = f"{format_trial(trial)}\n{path}", int(bool(trial.problems))
+                output = {**fault_results.trial_to_json(trial), "run": str(path)}
+                text, exit_code = f"{fault_results.format_trial(trial)}\n{path}", int(bool(trial.problems))
             else:
                 results = campaign.run_fault_pairs(pairs) if pairs else campaign.run_single_faults()
-                value, text = results_to_json(results), format_results(results)
-                code = int(bool(results.failed_trials)) if results.complete else ExitCode.HALTED
-    print_json(value) if as_json else click.echo(text)
-    ctx.exit(code)
+                output = fault_results.results_to_json(results)
+                text = fault_results.format_results(results)
+                exit_code = int(bool(results.failed_trials)) if results.complete else ExitCode.HALTED
+    if as_json:
+        print_json(output)
+    else:
+        click.echo(text)
+    ctx.exit(exit_code)

@@ -1,4 +1,4 @@
-"""`executive film`: make a film of a recorded run that shows robot and tree side by side."""
+"""`executive film`: make a film of a recorded run, with the robot and the tree side by side."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def command(
     """Make a film of a recorded run.
 
     RUN is a run directory or `latest`. The film shows the robot, the tree and all items. The world is
-    reconstructed from world.log in the run directory and rendered again, so that every run on a simulated
-    cell can be filmed, also a run that was halted, interrupted or resumed. No display is needed.
+    reconstructed from world.log in the run directory and rendered again. Therefore every run on a simulated
+    cell can be filmed, including halted, interrupted and resumed runs. No display is needed.
     """
     with keep_stdout_clean():
         from executive.cli.progress import show_progress
@@ -53,11 +53,11 @@ def command(
                 seconds = source.events[-1].clock / speed + RESULT_DISPLAY_TIME
                 click.echo(f"making a film of about {seconds:.0f} s", err=True)
             with show_progress("frames", quiet=quiet, print_lines=True) as progress:
-                frames = write_film(
+                frame_count = write_film(
                     source, partial_file, film_format, speed=speed, workers=workers, progress=progress
                 )
-        seconds, size = frames / film_format.frame_rate, film_file.stat().st_size
-        result = {"file": str(film_file), "frames": frames, "seconds": seconds, "size": size}
+        seconds, size = frame_count / film_format.frame_rate, film_file.stat().st_size
+        result = {"file": str(film_file), "frames": frame_count, "seconds": seconds, "size": size}
         click.echo(f"{film_file}: {seconds:.1f} s, {size / 1e6:.1f} MB", err=True)
     if as_json:
         print_json(result)

@@ -1,4 +1,4 @@
-"""Command group `executive`: runs the requested command, and reports errors by text and exit code."""
+"""Command group `executive`: runs the requested command, and reports errors by message and exit code."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PATH_ERROR_NUMBERS = (
     errno.EACCES, errno.EEXIST, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR,
     errno.EPERM, errno.EROFS,
 )  # fmt: skip
-"""Error numbers of the operating system that are reported as an invalid path of the user."""
+"""Error numbers of the operating system that mean an invalid path."""
 
 COMMANDS = (
     "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep", "faults",
@@ -42,7 +42,7 @@ class CommandGroup(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command of this name, or None."""
+        """Return the command with this name, or None."""
         del ctx
         if cmd_name not in COMMANDS:
             return None
@@ -52,38 +52,34 @@ class CommandGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that `args[0]` names; the error for a misspelled name suggests a command."""
+        """Return the command with the name `args[0]`; suggest a command if the name is misspelled."""
         suggestions = difflib.get_close_matches(args[0], COMMANDS, n=1)
         if args[0] not in COMMANDS and suggestions and not args[0].startswith("-"):
             ctx.fail(f'there is no command "{args[0]}"; did you mean "{suggestions[0]}"?')
         return super().resolve_command(ctx, args)
 
     def main(
-        self,
-        args: Sequence[str] | None = None,
-        prog_name: str | None = None,
-        complete_var: str | None = None,
-        standalone_mode: bool = True,
-        **extra: Any,
-    ) -> Any:
+        self, args: Sequence[str] | None = None, prog_name: str | None = None,
+        complete_var: str | None = None, standalone_mode: bool = True, **extra: Any,
+    ) -> Any:  # fmt: skip
         """Run a command and exit with its exit code; tracebacks are printed only with `--debug`."""
         del standalone_mode  # The group is always the main program.
         args = list(sys.argv[1:] if args is None else args)
         with use_tolerant_streams():
             try:
                 with handle_signals(TERMINATION_SIGNALS, signal.default_int_handler):
-                    code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+                    exit_code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
             except (Exception, KeyboardInterrupt) as error:
-                code = _show_error(error, debug="--debug" in args)
-        sys.exit(code if isinstance(code, int) else 0)
+                exit_code = _show_error(error, debug="--debug" in args)
+        sys.exit(exit_code if isinstance(exit_code, int) else 0)
 
 
 def _show_error(error: BaseException, *, debug: bool) -> ExitCode:
-    """Print the error that ended a command to stderr, and return the exit code."""
+    """Print the error of a command to stderr, and return the exit code."""
     if isinstance(error, click.ClickException):
-        text = io.StringIO()
-        error.show(text)
-        click.echo(shorten_quotations(text.getvalue()), err=True, nl=False)
+        message_buffer = io.StringIO()
+        error.show(message_buffer)
+        click.echo(shorten_quotations(message_buffer.getvalue()), err=True, nl=False)
         return ExitCode.INVALID_INPUT
     if isinstance(error, (click.Abort, KeyboardInterrupt)):
         click.echo("halted", err=True)
@@ -108,9 +104,8 @@ def _save_traceback(error: BaseException) -> str:
     ) as file:
         traceback.print_exception(error, file=file)
     text = shorten_quotations(f"{type(error).__name__}: {error}")
-    return (
-        f"internal error ({text}); {file.name} contains the traceback, and `executive --debug ...` prints it"
-    )
+    advice = f"{file.name} contains the traceback, and `executive --debug ...` prints it"
+    return f"internal error ({text}); {advice}"
 
 
 @click.group(cls=CommandGroup, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})

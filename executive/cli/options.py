@@ -10,7 +10,7 @@ import click
 
 
 def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
-    """Return the values of options `--set KEY=VALUE` by key; a key that occurs twice is an error."""
+    """Return the values of options `--set KEY=VALUE` by key, and reject a key that occurs twice."""
     overrides: dict[str, str] = {}
     for value in values:
         key, equals, text = value.partition("=")
@@ -24,7 +24,7 @@ def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[s
 
 
 class PathType(click.Path):
-    """Type of paths that rejects an empty path (`Path("")` is the working directory) and a broken link."""
+    """Path type that rejects a broken link, and an empty path, which would mean the working directory."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path, or raise a usage error."""
@@ -42,19 +42,12 @@ FOLDER = PathType(path_type=Path, file_okay=False)
 COUNT = click.IntRange(min=1)
 """Type of an option with a positive number."""
 MAX_SEED = 2**32 - 1
-"""Maximum seed: 32 bits, which every random number generator accepts."""
+"""Maximum seed: every random number generator accepts a seed of 32 bits."""
 mission_argument = click.argument("mission", metavar="MISSION")
 
 
 def check_usage(*errors: tuple[object, str]) -> None:
-    """Raise the first error whose condition is true.
-
-    Args:
-        errors: Condition and message of each possible error in the use of options.
-
-    Raises:
-        UsageError: A condition is true.
-    """
+    """Raise a UsageError for the first true condition; each error is a pair of condition and message."""
     for condition, message in errors:
         if condition:
             raise click.UsageError(message)

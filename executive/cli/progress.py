@@ -22,44 +22,44 @@ LINE_PERIOD = 10.0
 def show_progress(
     description: str, *, quiet: bool = False, print_lines: bool = False
 ) -> Iterator[Callable[[int, int], None]]:
-    """Show a progress bar with the remaining time; the context is its update function `(done, total)`.
+    """Show a progress bar with the remaining time if stderr is a terminal; yield its update function.
 
-    The bar is redrawn ten times per second. If stderr is not a terminal, the bar is not shown.
+    The arguments of the function are the number of completed parts and the number of all parts.
 
     Args:
         description: Name of the work, beside the bar.
-        quiet: True: show nothing.
-        print_lines: True: if stderr is not a terminal, print a line every `LINE_PERIOD` instead.
+        quiet: True to show nothing.
+        print_lines: True to print a line per `LINE_PERIOD` if stderr is not a terminal.
     """
     console = Console(file=open_unescaped_stderr())
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    disable = quiet or not console.is_interactive
-    if print_lines and not quiet and disable:
+    is_hidden = quiet or not console.is_interactive
+    if print_lines and not quiet and is_hidden:
         yield _make_line_printer(description)
         return
-    # The speed is estimated from all finished parts, because in a shorter period no part may finish.
-    with Progress(*columns, console=console, disable=disable, speed_estimate_period=math.inf) as progress:
+    # The remaining time is estimated from all completed parts, because a part may take minutes.
+    with Progress(*columns, console=console, disable=is_hidden, speed_estimate_period=math.inf) as progress:
         task = progress.add_task(description, total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
+        yield lambda completed, total: progress.update(task, completed=completed, total=total)
 
 
 def _make_line_printer(description: str) -> Callable[[int, int], None]:
-    """Return an update function `(done, total)` that prints a line at most every `LINE_PERIOD`."""
-    start = last_line = time.monotonic()
+    """Return an update function that prints at most one line per `LINE_PERIOD`."""
+    start_time = last_print_time = time.monotonic()
 
-    def update(done: int, total: int) -> None:
-        nonlocal last_line
+    def update(completed: int, total: int) -> None:
+        nonlocal last_print_time
         now = time.monotonic()
-        if done and now - last_line >= LINE_PERIOD:
-            last_line = now
-            remaining = (now - start) / done * (total - done)
-            click.echo(f"{description}: {done} of {total}, about {remaining:.0f} s left", err=True)
+        if completed and now - last_print_time >= LINE_PERIOD:
+            last_print_time = now
+            remaining_time = (now - start_time) / completed * (total - completed)
+            click.echo(f"{description}: {completed} of {total}, about {remaining_time:.0f} s left", err=True)
 
     return update
 
 
 def report_polygons(folder: Path) -> None:
-    """Print the number of polygons in labelled images, if there are any, because only boxes are used."""
+    """Print a note if labelled images contain polygons, because only bounding boxes are used."""
     from executive.training.samples import Samples
 
     if count := Samples(folder).polygon_count:
@@ -67,7 +67,7 @@ def report_polygons(folder: Path) -> None:
 
 
 def print_halt() -> None:
-    """Print that Ctrl-C or SIGTERM was received, and its consequences."""
+    """Print the consequences of the received Ctrl-C or SIGTERM."""
     click.echo(
         "halting: no new runs start, and current runs are halted; press Ctrl-C again to quit immediately",
         err=True,

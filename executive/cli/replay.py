@@ -23,8 +23,8 @@ def command(ctx: click.Context, run: str, mission_file: Path | None, runs: Path,
     """Repeat the decisions of a recorded run.
 
     RUN is a run directory or `latest`. Nothing moves and nothing is simulated: tree, skills and ledger get
-    the recorded inputs from arm, tool, camera, detectors and operator. Prints the first decision that
-    differs; exit code 1 if there is one.
+    the recorded inputs from arm, tool, camera, detectors and operator. Exit code 1 if a
+    decision differs from the record; the first difference is printed.
     """
     with keep_stdout_clean():
         from executive.plugins import load_skills
@@ -34,8 +34,8 @@ def command(ctx: click.Context, run: str, mission_file: Path | None, runs: Path,
 
         path = find_run(run, runs)
         result = replay_run(path, read_journal(path / "journal.jsonl"), load_skills(), mission_file)
-        end = ", all as recorded" if result.is_equal else f" as recorded, then {result.difference}"
-        click.echo(f"{result.decisions} decisions{end} ({path})", err=True)
+        comparison = ", all as recorded" if result.is_equal else f" as recorded, then {result.difference}"
+        click.echo(f"{result.decisions} decisions{comparison} ({path})", err=True)
     if as_json:
         print_json({"run": str(path), "same": result.is_equal, **result.as_json()})
     ctx.exit(0 if result.is_equal else 1)

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 @options.json_option
 @click.option("--quiet", is_flag=True, help="Print only the cause if the run does not succeed.")
 @click.option(
-    "--view", "live", is_flag=True, help="Show the run on a page in the browser; its address is printed."
+    "--view", "has_page", is_flag=True, help="Show the run on a page in the browser; its address is printed."
 )
 @click.option("--paused", is_flag=True, help="Wait for the operator before the first control step.")
 @click.option("--gui", is_flag=True, help="Open the simulator's window.")
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 @click.pass_context
 def command(
     ctx: click.Context, mission: str | None, resume: str | None, seed: int, overrides: dict[str, str],
-    scene: Path | None, runs: Path, as_json: bool, quiet: bool, live: bool, paused: bool, gui: bool,
+    scene: Path | None, runs: Path, as_json: bool, quiet: bool, has_page: bool, paused: bool, gui: bool,
     realtime: bool, requests: tuple[str, ...],
 ) -> None:  # fmt: skip
     """Run a mission and record the run.
@@ -59,14 +59,14 @@ def command(
     sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
     has_mission_options = any(source is not click.core.ParameterSource.DEFAULT for source in sources)
     has_keyboard = sys.stdin is not None and sys.stdin.isatty()
-    is_endless_pause = paused and not live and (quiet or not has_keyboard)
+    pauses_forever = paused and not has_page and (quiet or not has_keyboard)
     options.check_usage(
         (mission is None and resume is None, "give a MISSION, or a run with --resume RUN"),
         (
             resume is not None and has_mission_options,
             "--resume takes mission, seed, params, requests and scene from the run; omit them",
         ),
-        (is_endless_pause, "--paused needs --view or a keyboard in a terminal to continue the run"),
+        (pauses_forever, "--paused needs --view or a keyboard in a terminal to continue the run"),
         # Without this check, the simulator would end the process.
         (gui and not os.environ.get("DISPLAY"), "--gui needs a display, but DISPLAY is not set; omit --gui"),
     )
@@ -81,8 +81,8 @@ def command(
         from executive.view.report.page import try_write_report
         from executive.view.terminal.summary import describe_end, format_repeat_command, format_summary
 
-        terminal_view = None if quiet else _make_view()
-        with _serve_page(live) as page:
+        terminal_view = None if quiet else _make_terminal_view()
+        with _serve_page(has_page) as page:
             views = [GuardedView(view) for view in (terminal_view, page) if view is not None]
             record = RecordOptions(views, starts_paused=paused)
             run_options = RunOptions(
@@ -92,25 +92,26 @@ def command(
             if mission is None:
                 assert resume is not None
                 result, start = _resume(resume, run_options, runs, record)
-                origin = start.file, start.seed, start.overrides
+                repeat_arguments = start.file, start.seed, start.overrides
             else:
                 result = _run_mission(mission, overrides, run_options, runs, record)
-                origin = mission, seed, overrides
-            # The command to repeat the run contains the requests that the operator made.
+                repeat_arguments = mission, seed, overrides
+            # The operator may have made requests during the run, which the repeating command contains.
             all_requests, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
-            repeat = format_repeat_command(*origin, all_requests, used_scene)
-            report, problem = try_write_report(result.run)
+            repeat_command = format_repeat_command(*repeat_arguments, all_requests, used_scene)
+            report, report_problem = try_write_report(result.run)
             if page is not None:
                 page.finish(result, report and str(Path(report).resolve()))
-                problem = "; ".join(filter(None, (problem, page.problem)))
-        problem = "; ".join(filter(None, (problem, *(view.problem for view in views))))
-        if problem and (views or result.diagnosis is not None):
-            click.echo(f"note: {problem}", err=True)
+        page_problem = "" if page is None else page.problem
+        problems = filter(None, (report_problem, page_problem, *(view.problem for view in views)))
+        if (note := "; ".join(problems)) and (views or result.diagnosis is not None):
+            click.echo(f"note: {note}", err=True)
         if terminal_view is not None:
             items = terminal_view.timeline.items.list_items()
-            click.echo(format_summary(result, items, repeat, report), err=True, nl=False)
+            click.echo(format_summary(result, items, repeat_command, report), err=True, nl=False)
         elif result.diagnosis is not None:
-            click.echo("\n".join(format_diagnosis(result.diagnosis, result.run, repeat, report)), err=True)
+            lines = format_diagnosis(result.diagnosis, result.run, repeat_command, report)
+            click.echo("\n".join(lines), err=True)
         elif result.status == "INCOMPLETE" or describe_disagreement(result):
             end_description = describe_end(result.status, result.reason, result.node, result.message)
             click.echo("\n".join(filter(None, (describe_disagreement(result), end_description))), err=True)
@@ -155,7 +156,7 @@ def _resume(
 
 @contextlib.contextmanager
 def _serve_page(is_enabled: bool) -> Iterator[LivePage | None]:
-    """In this context, serve a page that shows the run, and print its address; None if not enabled."""
+    """Serve the live page of the run in this context, and print its address; yield None if not enabled."""
     if not is_enabled:
         yield None
         return
@@ -169,8 +170,8 @@ def _serve_page(is_enabled: bool) -> Iterator[LivePage | None]:
         page.finish()
 
 
-def _make_view() -> LineView | TerminalView:
-    """Return a view that redraws the terminal if stderr is a terminal, else a view that prints lines."""
+def _make_terminal_view() -> LineView | TerminalView:
+    """Return a view that redraws stderr if it is a terminal, else a view that prints lines."""
     from rich.console import Console
 
     from executive.view.terminal.lines import LineView

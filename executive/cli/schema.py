@@ -27,10 +27,11 @@ def command(cell: bool, library: bool, journal: bool) -> None:
         from executive.record.journal_format import make_journal_schema
         from executive.tree.node_registry import load_control_nodes
 
-        if cell or journal:
-            schema = make_cell_schema() if cell else make_journal_schema()
+        if cell:
+            schema = make_cell_schema()
+        elif journal:
+            schema = make_journal_schema()
         else:
-            schema = (make_library_schema if library else make_mission_schema)(
-                load_skills(), load_control_nodes()
-            )
+            make_schema = make_library_schema if library else make_mission_schema
+            schema = make_schema(load_skills(), load_control_nodes())
     print_json(schema)

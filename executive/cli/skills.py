@@ -20,17 +20,15 @@ if TYPE_CHECKING:
     from executive.testing.conformance.conformance_check import Verdict
 
 _LINE_WIDTH = 100
-"""Maximum number of characters of a line."""
+"""Maximum length of a line [characters]."""
 
 Declaration = Mapping[str, Any]
-"""Declaration of a skill, a port or a param, as JSON values by attribute."""
+"""Declaration of a skill, a port or a param: JSON value of each attribute, by the name of the attribute."""
 
 
 @click.command(name="skills")
 @click.argument("name", required=False)
-@click.option(
-    "--conform", is_flag=True, help="Check that NAME, or every skill, conforms to the rules for skills."
-)
+@click.option("--conform", is_flag=True, help="Check that NAME, or every skill, conforms to the rules.")
 @json_option
 @click.pass_context
 def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) -> None:
@@ -55,7 +53,9 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
     if as_json:
         print_json(declarations if name is None else declarations[0])
     else:
-        click.echo(_describe_skill(declarations[0]) if name else "\n".join(map(_summarize, declarations)))
+        click.echo(
+            _describe_skill(declarations[0]) if name else "\n".join(map(_summarize_skill, declarations))
+        )
 
 
 def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:
@@ -97,22 +97,24 @@ def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
 
 
 def _declare_entry(entry: Param | Port) -> dict[str, Any]:
-    """Return the declaration of a param or port; the keys of its bounds are `min` and `max`."""
+    """Return the declaration of a param or port; its bounds `ge` and `le` are called `min` and `max`."""
     values = {**vars(entry), "type": _format_type(entry.type), "required": entry.is_required}
     values["default"] = None if entry.default is ... else entry.default
     return {{"ge": "min", "le": "max"}.get(name, name): value for name, value in values.items()}
 
 
 def _format_type(annotation: Any) -> str:
+    """Return the name of a type without the names of the modules of `typing` and `executive.cell`."""
     is_class = isinstance(annotation, type) and not get_args(annotation)
     name = annotation.__name__ if is_class else str(annotation)
     return re.sub(r"\b(typing|executive\.cell\.\w+)\.", "", name)
 
 
-def _summarize(skill: Declaration) -> str:
+def _summarize_skill(skill: Declaration) -> str:
     """Return two lines about a skill: its purpose, and its ports, params and reasons."""
-    reads, writes = (", ".join(port["name"] for port in _list_ports(skill, side)) for side in ("in", "out"))
-    parts = [f"{reads or '-'} -> {writes or '-'}"]
+    inputs = ", ".join(port["name"] for port in _list_ports(skill, "in"))
+    outputs = ", ".join(port["name"] for port in _list_ports(skill, "out"))
+    parts = [f"{inputs or '-'} -> {outputs or '-'}"]
     if skill["params"]:
         parts.append(f"params: {', '.join(param['name'] for param in skill['params'])}")
     if skill["reasons"]:
@@ -131,15 +133,16 @@ def _describe_skill(skill: Declaration) -> str:
     ):
         lines += [f"{title}:", *(map(_describe_entry, entries) if entries else [f"  {empty_text}"])]
     lines.append(f"may fail with: {', '.join(skill['reasons']) or 'nothing'}")
-    effects = ("; senses" if skill["senses"] else "") + ("; moves the arm" if skill["moves"] else "")
-    lines.append(f"uses: {', '.join(skill['uses']) or 'nothing'}{effects}")
+    effects_text = ("; senses" if skill["senses"] else "") + ("; moves the arm" if skill["moves"] else "")
+    lines.append(f"uses: {', '.join(skill['uses']) or 'nothing'}{effects_text}")
     tool = skill["tool"]
-    left = "".join(f", {state} after {ending}" for ending, state in tool["left"].items())
-    lines.append(f"tool: {tool['before']} before, {tool['after']} after{left}")
+    exceptions_text = "".join(f", {state} after {ending}" for ending, state in tool["left"].items())
+    lines.append(f"tool: {tool['before']} before, {tool['after']} after{exceptions_text}")
     return "\n".join(lines)
 
 
 def _list_ports(skill: Declaration, direction: str) -> list[Declaration]:
+    """Return the input ports (`in`) or the output ports (`out`) of a skill."""
     return [port for port in skill["ports"] if port["direction"] == direction]
 
 

@@ -1,4 +1,4 @@
-"""Standard streams that tolerate write errors and escape control characters; stdout for results only."""
+"""Standard streams that tolerate write errors and escape control characters, and a clean stdout."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ class TolerantStream(io.TextIOBase):
     """Text stream that escapes control characters, and drops all output after the first write error.
 
     Args:
-        stream: Underlying stream; None: the process was started with this stream closed.
-        is_unescaped: True: write control characters unchanged, for a library that draws on the terminal.
+        stream: Underlying stream; None if the stream was closed when the process started.
+        escapes: False to write control characters unchanged, for a library that draws on the terminal.
 
     Attributes:
         error: Message of the first write error, or "".
     """
 
-    def __init__(self, stream: TextIO | None, *, is_unescaped: bool = False) -> None:
+    def __init__(self, stream: TextIO | None, *, escapes: bool = True) -> None:
         if isinstance(stream, io.TextIOWrapper):
-            # By default, a character that the encoding lacks would be an error.
+            # The default is an error for a character that the encoding lacks.
             stream.reconfigure(errors="backslashreplace")
         self._stream = stream
-        self._is_unescaped = is_unescaped
+        self._escapes = escapes
         self.error = ""
 
     @property
@@ -46,7 +46,7 @@ class TolerantStream(io.TextIOBase):
             self.error = "it is closed"
         elif not self.error:
             try:
-                self._stream.write(text if self._is_unescaped else escape_control_characters(text))
+                self._stream.write(escape_control_characters(text) if self._escapes else text)
             except OSError as error:
                 self._stop_writing(self._stream, error)
         return len(text)
@@ -65,23 +65,18 @@ class TolerantStream(io.TextIOBase):
 
     def copy_unescaped(self) -> TolerantStream:
         """Return a stream to the same file that does not escape control characters."""
-        return TolerantStream(self._stream, is_unescaped=True)
+        return TolerantStream(self._stream, escapes=False)
 
     def fileno(self) -> int:
-        """Return the number of the stream's file descriptor.
-
-        Raises:
-            OSError: The stream has no file descriptor.
-        """
+        """Return the number of the stream's file descriptor."""
         return super().fileno() if self._stream is None else self._stream.fileno()
 
     def _stop_writing(self, stream: TextIO, error: OSError) -> None:
+        """Store the error, and connect the stream to the null device."""
         self.error = error.strerror or str(error)
         # Python flushes the stream again at the end of the process; an error would change the exit code.
-        with contextlib.suppress(OSError):
-            null = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(null, stream.fileno())
-            os.close(null)
+        with contextlib.suppress(OSError), open(os.devnull, "w") as null_file:
+            os.dup2(null_file.fileno(), stream.fileno())
 
 
 def open_unescaped_stderr() -> TextIO:
@@ -93,41 +88,41 @@ def open_unescaped_stderr() -> TextIO:
 
 @contextlib.contextmanager
 def use_tolerant_streams() -> Iterator[None]:
-    """Make stdout and stderr tolerant in this context; report a write error of stdout at its end."""
+    """Make stdout and stderr tolerant in this context; then report a write error of stdout."""
     _open_closed_descriptors()
     with (
-        contextlib.redirect_stdout(TolerantStream(sys.stdout)) as output,
-        contextlib.redirect_stderr(TolerantStream(sys.stderr)) as errors,
+        contextlib.redirect_stdout(TolerantStream(sys.stdout)) as stdout,
+        contextlib.redirect_stderr(TolerantStream(sys.stderr)) as stderr,
     ):
         try:
             yield
         finally:
-            output.flush()
-            if output.error:
-                errors.write(f"note: standard output could not be written: {output.error}\n")
-            errors.flush()
+            stdout.flush()
+            if stdout.error:
+                stderr.write(f"note: standard output could not be written: {stdout.error}\n")
+            stderr.flush()
 
 
 def _open_closed_descriptors() -> None:
     """Connect closed standard streams to the null device.
 
-    Otherwise a file that is opened later would get the number of a closed stream, and its output.
+    Otherwise, a file that is opened later would get the descriptor and the output of a closed stream.
     """
-    for number in (0, 1, 2):
+    for descriptor in (0, 1, 2):
         try:
-            os.fstat(number)
+            os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
 
 
 @contextlib.contextmanager
 def keep_stdout_clean() -> Iterator[None]:
-    """In this context, send Python's stdout to stderr, and drop the stdout of C libraries (pybullet)."""
+    """Redirect Python's stdout to stderr, and drop the stdout of C libraries (pybullet), in this context."""
     sys.stdout.flush()
     real_stdout = os.dup(1)
-    null = os.open(os.devnull, os.O_WRONLY)
+    null_device = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(null, 1)
+        os.dup2(null_device, 1)
         with contextlib.redirect_stdout(sys.stderr):
             yield
     finally:
@@ -135,7 +130,7 @@ def keep_stdout_clean() -> Iterator[None]:
         ctypes.CDLL(None).fflush(None)
         os.dup2(real_stdout, 1)
         os.close(real_stdout)
-        os.close(null)
+        os.close(null_device)
 
 
 def print_json(value: Any) -> None:

@@ -14,7 +14,7 @@ from executive.exit_codes import ExitCode
 
 
 def parse_seed_range(text: str) -> range:
-    """Return the seeds from A to B (both included) for `A-B`, or the single seed for `A`."""
+    """Return the seeds from A to B (inclusive) for the text `A-B`, or the seed A for the text `A`."""
     match = re.fullmatch(r"(\d{1,10})(?:-(\d{1,10}))?", text)
     if match is None:
         raise click.BadParameter(f'"{text}" is not a range of seeds, for example 0-99')
@@ -80,40 +80,38 @@ def _describe_summary(summary: dict[str, Any]) -> str:
     """Return a text with the summary of a sweep."""
     from executive.view.terminal.summary import describe_end
 
-    done, succeeded = summary["runs"], summary["succeeded"]
-    headline = f"{succeeded} of {done} runs succeeded"
+    run_count, success_count = summary["runs"], summary["succeeded"]
+    headline = f"{success_count} of {run_count} runs succeeded"
     if summary["cut_off"]:
-        successes = f"; {succeeded} of them succeeded" if done else ""
-        headline = f"{done} of {summary['asked']} runs, halted{successes}"
-    if not done:
+        successes = f"; {success_count} of them succeeded" if run_count else ""
+        headline = f"{run_count} of {summary['asked']} runs, halted{successes}"
+    if not run_count:
         return headline
     objects, robot, wall = summary["objects"], summary["robot_time_s"], summary["wall_time_s"]
-    low, high = objects["interval_95"]
+    lower_bound, upper_bound = objects["interval_95"]
     lines = [
         headline,
         f"{objects['right']} of {objects['total']} objects correct: {objects['share']:.2%} "
-        f"(95 % interval {low:.2%} to {high:.2%})",
+        f"(95 % interval {lower_bound:.2%} to {upper_bound:.2%})",
         f"robot time {robot['median']:.1f} s (median; {robot['least']:.1f} to {robot['most']:.1f}), "
         f"wall time {wall['median']:.1f} s ({wall['least']:.1f} to {wall['most']:.1f})",
     ]
-    planning, pace = summary["planning"], summary["robot_time_per_object_s"]
-    if pace and planning["motions"]:
-        planned_ahead = (
-            f"{planning['ahead'] / planning['motions']:.0%} of {planning['motions']} motions planned ahead"
-        )
+    planning, time_per_object = summary["planning"], summary["robot_time_per_object_s"]
+    if time_per_object and planning["motions"]:
+        ahead_ratio = planning["ahead"] / planning["motions"]
+        planned_ahead = f"{ahead_ratio:.0%} of {planning['motions']} motions planned ahead"
         waiting_time = f"{planning['waited_s']:.1f} s waited for planning"
-        lines.append(f"robot time per object {pace:.2f} s; {planned_ahead}, {waiting_time}")
+        lines.append(f"robot time per object {time_per_object:.2f} s; {planned_ahead}, {waiting_time}")
     lines.append(f"ledger and audit disagree in {len(summary['disagreements'])} runs")
     for entry in summary["disagreements"]:
-        items, audit = (
-            ", ".join(f"{name} {number}" for name, number in entry[key].items()) for key in ("items", "audit")
-        )
+        items = ", ".join(f"{name} {count}" for name, count in entry["items"].items())
+        audit = ", ".join(f"{name} {count}" for name, count in entry["audit"].items())
         lines.append(f"  seed {entry['seed']}: ledger: {items}; audit: {audit}; {entry['run']}")
     if summary["failures"]:
         lines.append(f"{len(summary['failures'])} runs did not succeed:")
     keys = ("status", "reason", "node", "message")
     for entry in summary["failures"]:
-        # A run has no directory if its process crashed or could not create the directory.
-        path = entry["run"] and f"; {entry['run']}"
-        lines.append(f"  seed {entry['seed']}: {describe_end(*map(entry.get, keys))}{path}")
+        # A run whose process crashed, or could not create a run directory, has no directory.
+        directory_text = entry["run"] and f"; {entry['run']}"
+        lines.append(f"  seed {entry['seed']}: {describe_end(*map(entry.get, keys))}{directory_text}")
     return "\n".join(lines)

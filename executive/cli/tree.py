@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from itertools import compress
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
@@ -39,11 +40,11 @@ def command(
 
     MISSION is a file or the name of a shipped mission. All subtrees are expanded.
     """
-    formats = [name for name, given in (("--svg", as_svg), ("--dot", as_dot), ("--json", as_json)) if given]
-    extras = [name for name, given in (("--ports", ports), ("--reasons", reasons)) if given]
-    conflict = f"{' and '.join(formats)} exclude each other; give one of them"
-    redundancy = f"{''.join(formats)} always contains ports and reasons; omit {' and '.join(extras)}"
-    check_usage((len(formats) > 1, conflict), (formats and extras, redundancy))
+    formats = list(compress(("--svg", "--dot", "--json"), (as_svg, as_dot, as_json)))
+    details = list(compress(("--ports", "--reasons"), (ports, reasons)))
+    conflict_message = f"{' and '.join(formats)} exclude each other; give one of them"
+    redundancy_message = f"{''.join(formats)} always contains ports and reasons; omit {' and '.join(details)}"
+    check_usage((len(formats) > 1, conflict_message), (formats and details, redundancy_message))
     with keep_stdout_clean():
         from pydantic_core import to_json
 
@@ -54,14 +55,17 @@ def command(
         name, nodes = _load_outline(mission, overrides)
         nodes = fold_subtrees(nodes) if fold else nodes
         if as_svg:
-            shown = draw_svg(nodes, name)
+            output = draw_svg(nodes, name)
         elif as_dot:
-            shown = format_dot(nodes, name)
+            output = format_dot(nodes, name)
         elif as_json:
-            shown = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
+            output = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
         else:
-            shown = draw_outline(nodes, shows_ports=ports, shows_reasons=reasons)
-    (print_json if as_json else click.echo)(shown)
+            output = draw_outline(nodes, shows_ports=ports, shows_reasons=reasons)
+    if as_json:
+        print_json(output)
+    else:
+        click.echo(output)
 
 
 def _load_outline(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:
@@ -75,7 +79,7 @@ def _load_outline(mission: str, overrides: dict[str, str]) -> tuple[str, Sequenc
 
     skills = load_skills()
     loaded = load_mission(mission, skills, overrides)
-    # The tree is not run, so that it needs only the clock of a cell.
+    # The tree is built but not run, which requires only the clock of a cell.
     placeholder_cell = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
     tree = build_tree(loaded, skills, placeholder_cell, Blackboard(), discard_event)
     return loaded.mission.name, make_outline(tree)

@@ -69,10 +69,7 @@ def render_template(template: str, **values: object) -> str:
         values: Values of the variables in the template.
     """
     environment = Environment(
-        loader=PackageLoader("executive.view", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+        loader=PackageLoader("executive.view", "."), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
     return replace_invalid_xml_characters(environment.get_template(template).render(values))

@@ -21,9 +21,9 @@ def command(folder: Path, name: str | None) -> None:
     from executive.cli.init.project import MISSION_FILE, check_package_name, make_package_name, write_project
 
     package = make_package_name(folder) if name is None else check_package_name(name, f'--name "{name}"')
-    written = write_project(folder, package)
-    click.echo(f"{folder}: {', '.join(written)}")
-    # The environment may not be active in the shell of the user: `uv run` activates it for one command only.
+    files = write_project(folder, package)
+    click.echo(f"{folder}: {', '.join(files)}")
+    # `uv run executive init` activates the virtual environment only for this command.
     click.echo(f"Type, after `. {shlex.quote(str(Path(sys.prefix) / 'bin' / 'activate'))}`:")
     change_folder = "" if folder.resolve() == Path.cwd() else f"cd {shlex.quote(str(folder))} && "
     click.echo(f"  {change_folder}executive run {MISSION_FILE}")

@@ -17,24 +17,25 @@ TEMPLATE = Path(__file__).parent / "template"
 SUFFIX = ".jinja"
 """Suffix of every template file, so that tools do not treat the templates as code of this project."""
 PACKAGE = "package"
-"""Folder of the template that gets the name of the package."""
+"""Name of the folder in `TEMPLATE` that is renamed to the name of the package."""
 MISSION_FILE = "sort.yaml"
 """Name of the mission file of a project."""
 FOLDERS = ("cells", "runs", "tests")
 """Folders beside the package in a project; a package must not have one of these names."""
 
 _NAME_PATTERN = re.compile(r"[a-z]([a-z0-9_]*[a-z0-9])?")
-_ADVICE = "give another name with --name"
+"""Pattern of package names that are also valid names of distributions."""
+_NAME_ADVICE = "give another name with --name"
 
 
 def write_project(folder: Path, package: str) -> list[str]:
-    """Create a project in an empty or new folder; return the paths of its files.
+    """Create a project in an empty or new folder; return the paths of the files in this folder.
 
     Raises:
         InputError: The folder is not empty, is a file, or cannot be written.
     """
     _require_empty(folder)
-    # The files are code and YAML, not HTML, so that nothing is escaped.
+    # The files are code and YAML, in which HTML escapes would be wrong.
     templates = Environment(autoescape=False, undefined=StrictUndefined, keep_trailing_newline=True)
     files = {
         _map_path(file, package): templates.from_string(file.read_text(encoding="utf-8")).render(name=package)
@@ -66,7 +67,7 @@ def _require_empty(folder: Path) -> None:
 
 
 def _map_path(file: Path, package: str) -> str:
-    """Return the path of the file in a project that is rendered from a template file."""
+    """Return the path in a project for the path of a template file."""
     parts = file.relative_to(TEMPLATE).with_suffix("").parts
     return str(PurePosixPath(*(package if part == PACKAGE else part for part in parts)))
 
@@ -75,14 +76,14 @@ def make_package_name(folder: Path) -> str:
     """Return a package name made from the name of a folder: `blue_table` for `Blue-Table`.
 
     Raises:
-        InputError: The name is not valid, or belongs to another module, which could be imported instead.
+        InputError: The name is invalid or in use.
     """
     folder_name = folder.resolve().name
     return check_package_name(re.sub(r"[-. ]", "_", folder_name).lower(), f'the folder "{folder_name}"')
 
 
 def check_package_name(name: str, source: str) -> str:
-    """Check that a name is valid for a package and not in use, and return it.
+    """Return a package name if it is valid and not in use.
 
     Args:
         name: Name of the package.
@@ -94,10 +95,10 @@ def check_package_name(name: str, source: str) -> str:
     if _NAME_PATTERN.fullmatch(name) is None:
         raise InputError(
             f"{source} is not a valid package name: a package name starts with a letter, continues with "
-            f'letters, digits and "_", and does not end with "_"; {_ADVICE}'
+            f'letters, digits and "_", and does not end with "_"; {_NAME_ADVICE}'
         )
     if conflict := _find_conflict(name):
-        raise InputError(f'a package cannot be called "{name}": {conflict}; {_ADVICE}')
+        raise InputError(f'a package cannot be called "{name}": {conflict}; {_NAME_ADVICE}')
     return name
 
 
@@ -108,7 +109,7 @@ def _find_conflict(name: str) -> str:
     if name in FOLDERS:
         return "the project has another folder of this name"
     spec = find_spec(name)
-    # A folder without `__init__.py` is not a module; it may be the folder of the new project.
+    # A folder without `__init__.py`, which may be the folder of the new project, has no origin.
     if spec is not None and spec.origin is not None:
         return f"a module of this name is already installed: {spec.origin}"
     return ""

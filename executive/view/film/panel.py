@@ -25,12 +25,8 @@ _CHARACTERS_PER_LEVEL = 3
 _COLUMN_STARTS = {"item": 0.0, "class": 0.32, "state": 0.53, "bin": 0.74}
 """Left end of each column [fraction of the width of the panel]."""
 _STATE_COLOURS = {
-    "placed": SUCCESS,
-    "rejected": FAILURE,
-    "lost": FAILURE,
-    "held": RUNNING,
-    "dropped": RUNNING,
-}
+    "placed": SUCCESS, "rejected": FAILURE, "lost": FAILURE, "held": RUNNING, "dropped": RUNNING,
+}  # fmt: skip
 """Colour of the text of an item state; the text of any other state has the colour `MINOR_TEXT`."""
 _FINAL_STATES = ("placed", "rejected", "skipped", "lost", "phantom")
 """States of items that the run has finished."""

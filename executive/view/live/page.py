@@ -200,9 +200,8 @@ class LivePage:
                 while not self._queue.empty():
                     batch.append(self._queue.get())
                 is_last_batch = None in batch
-                pickle.dump(
-                    [message for message in batch if message is not None], pipe, pickle.HIGHEST_PROTOCOL
-                )
+                messages = [message for message in batch if message is not None]
+                pickle.dump(messages, pipe, pickle.HIGHEST_PROTOCOL)
                 pipe.flush()
                 if not is_last_batch:
                     time.sleep(BATCH_PERIOD)

@@ -68,10 +68,8 @@ class SceneProxy:
             await self.open_session() as session,
             session.ws_connect("http://scene/", protocols=protocols, max_msg_size=MAX_MESSAGE_SIZE) as scene,
         ):
-            tasks = [
-                asyncio.create_task(_forward(browser, scene)),
-                asyncio.create_task(_forward(scene, browser)),
-            ]
+            directions = (_forward(browser, scene), _forward(scene, browser))
+            tasks = [asyncio.create_task(direction) for direction in directions]
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in tasks:
                 task.cancel()

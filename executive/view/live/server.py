@@ -167,10 +167,9 @@ def parse_command(text: str) -> PageCommand | None:
         command = json.loads(text)
     except ValueError:
         return None
-    if not isinstance(command, dict):
-        return None
-    if command.get("name") in COMMANDS:
-        return PageCommand(command["name"])
-    if command.get("name") == "request" and isinstance(command.get("text"), str):
-        return PageCommand("request", command["text"])
+    match command:
+        case {"name": str(name)} if name in COMMANDS:
+            return PageCommand(name)
+        case {"name": "request", "text": str(text)}:
+            return PageCommand("request", text)
     return None
