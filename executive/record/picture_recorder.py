@@ -44,6 +44,7 @@ class PictureRecorder:
         self._look_by_frame_id: dict[int, tuple[Frame, FrameSearched]] = {}
         self._selected_frame_id: int | None = None
         self._undrawn_frame_id: int | None = None
+        """Frame of the last look; None if a picture shows this look."""
         self._picture_count = 0
         self._missing_picture_counts: Counter[str] = Counter()
 

@@ -104,17 +104,15 @@ def record_run(
     return result
 
 
-def make_run_directory(
-    run: Run, loaded: LoadedMission, options: RunOptions, runs_folder: Path
-) -> RunDirectory:
-    """Make and return the directory of a run below `runs_folder`, with the mission, the cell and the scene.
+def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, folder: Path) -> RunDirectory:
+    """Make and return the directory of a run below `folder`, with the mission, the cell and the scene.
 
     Raises:
         InputError: The directory cannot be made, or a file cannot be written.
     """
     scene = "" if options.scene is None else read_source(options.scene).text
     directory = RunDirectory.create(
-        runs_folder, mission=loaded.mission.name, seed=options.seed, start_time=datetime.now()
+        folder, mission=loaded.mission.name, seed=options.seed, start_time=datetime.now()
     )
     directory.save_inputs(
         mission=loaded.text,

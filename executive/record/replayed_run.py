@@ -35,8 +35,8 @@ class ReplayResult:
     Attributes:
         decisions: Number of equal decisions.
         ticks: Number of control steps of the replay.
-        recorded: First recorded decision that the replay did not repeat, or None; its message is "".
-        replayed: First decision of the replay that differs from the record, or None; its message is "".
+        recorded: First recorded decision that the replay did not repeat, or None; without its message.
+        replayed: First decision of the replay that differs from the record, or None; without its message.
         edited: True if the replayed mission differs from the recorded mission.
         unanswered: Message about the input without a recorded value that ended the replay, or "".
         is_complete: True if the replay repeated all recorded control steps.
@@ -135,7 +135,7 @@ class _Comparison:
     def __init__(self, log: InputLog, edited: bool) -> None:
         self._log = log
         self._edited = edited
-        self._recorded = [decision for timed in log.events if (decision := _to_decision(timed, edited))]
+        self._recorded_decisions = list(filter(None, (_to_decision(timed, edited) for timed in log.events)))
         # Without a recorded end, the last control step may be incomplete, and is then not compared.
         self._has_recorded_end = any(isinstance(timed.event, RunEnded) for timed in log.events)
         self._has_found_difference = False
@@ -150,7 +150,8 @@ class _Comparison:
         decision = _to_decision(timed, self._edited)
         if decision is None:
             return
-        recorded = self._recorded[self.equal_count] if self.equal_count < len(self._recorded) else None
+        decisions, count = self._recorded_decisions, self.equal_count
+        recorded = decisions[count] if count < len(decisions) else None
         if recorded == decision:
             self.equal_count += 1
             return
@@ -164,10 +165,10 @@ class _Comparison:
 
     def compare_end(self) -> None:
         """Compare the end of the replay with the end of the record; called after the replay."""
-        if self._has_found_difference or self.equal_count == len(self._recorded):
+        if self._has_found_difference or self.equal_count == len(self._recorded_decisions):
             return
         self.is_complete = False
-        next_decision = self._recorded[self.equal_count]
+        next_decision = self._recorded_decisions[self.equal_count]
         if self._is_in_complete_step(next_decision):
             self.difference = (next_decision, None)
             self.missing_input_message = self.run.replayed_cell.missing_input_message

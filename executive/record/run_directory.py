@@ -55,7 +55,7 @@ class RunDirectory:
 
     @staticmethod
     def create(runs: Path, *, mission: str, seed: int, start_time: datetime) -> RunDirectory:
-        """Make and return a directory below `runs`; its name consists of start time, mission and seed.
+        """Make and return a directory below the folder `runs`, named after start time, mission and seed.
 
         If the name exists already, it gets the suffix `-2`, `-3`, ....
 

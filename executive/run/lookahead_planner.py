@@ -25,8 +25,11 @@ class LookaheadPlanner:
     def __init__(self, cell: Cell) -> None:
         self._cell = cell
         self._item_and_bin: tuple[Item, str] | None = None
+        """Last selected target and its bin."""
         self._may_plan_transit = False
+        """True from the command to grip until the transit is planned."""
         self._may_plan_approach = False
+        """True if a look or a motion may have changed the next approach since it was planned."""
 
     def on_event(self, timed: TimedEvent) -> None:
         """Update the expected motions from an event of the run."""

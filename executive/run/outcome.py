@@ -1,4 +1,4 @@
-"""Outcome of a run: end of the tick loop, final check of the items, and messages of exceptions."""
+"""End of a run: end of the tick loop, check of the items, and collection of exception messages."""
 
 from __future__ import annotations
 

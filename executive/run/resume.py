@@ -52,6 +52,7 @@ class ResumedRun(Run):
         self._is_realtime_on_cell = is_realtime
         self._recorders: list[Observer] = []
         self._is_scene_known = True
+        """False from an interruption with unknown commands until the scene has been observed."""
         self._planner = LookaheadPlanner(replayed_cell.inner.cell)
         context.add_observer(self._planner.on_event)
         control.call_between_ticks(self._stop_or_resume)

@@ -20,6 +20,7 @@ class RunControl:
         self._is_stopped = False
         self._is_paused = False
         self._remaining_ticks = 0
+        """Number of ticks that `step` requested and that have not begun."""
         self._wake_up = threading.Event()
         self._requests: deque[str] = deque()
         self._callbacks: list[Callable[[], None]] = []
@@ -56,7 +57,7 @@ class RunControl:
         self._wake_up.set()
 
     def add_request(self, text: str) -> None:
-        """Store a request of the operator; the operator object discards requests from before its question."""
+        """Store a request for `TerminalOperator`, which discards requests from before its question."""
         self._requests.append(text)
 
     def take_request(self) -> str | None:

@@ -133,9 +133,10 @@ def _find_last_look(run: FailedRun) -> Sighting | Look | None:
 
 
 def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
-    last, failure = item.failure, None
-    if last is not None:
-        failure = ItemFailure(f"{get_skill_name(last.node)}.{last.reason}", last.message, last.end)
+    activation, failure = item.failure, None
+    if activation is not None:
+        failure_name = f"{get_skill_name(activation.node)}.{activation.reason}"
+        failure = ItemFailure(failure_name, activation.message, activation.end)
     return LostItem(name, item.sighting, item.unseen_look_count, item.pick_time, item.drop_time, failure)
 
 

@@ -12,7 +12,7 @@ from executive.record.timeline.activation import Activation
 
 @dataclass(frozen=True)
 class Look:
-    """Search of a detector in a camera image.
+    """Look: search of a detector in a camera image.
 
     Attributes:
         frame: Number of the frame.
