@@ -38,8 +38,9 @@ def predict_object_count(cell: Cell, bin_name: str, excluded_item: Item | None =
     the arm moves it.
     """
     held_item = cell.ledger.find_held_item()
-    is_moving_into_bin = cell.bins[bin_name].contains(cell.arm.destination)
-    arriving_count = 1 if held_item not in (None, excluded_item) and is_moving_into_bin else 0
+    is_counted = held_item not in (None, excluded_item)
+    # Without such an item, the destination is not read: each reading of the cell is a recorded input.
+    arriving_count = 1 if is_counted and cell.bins[bin_name].contains(cell.arm.destination) else 0
     return cell.ledger.count_objects_in(bin_name) + arriving_count
 
 
