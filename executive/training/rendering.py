@@ -108,7 +108,7 @@ def _render_samples(
     cameras = [next(iter(cell.cameras)) for cell in cells]
     with contextlib.ExitStack() as stack:
         renderers = [
-            SceneRenderer(cell, camera, randomized=scene is None, scene=scene or DECLARED_SCENE)
+            SceneRenderer(cell, camera, is_random=scene is None, scene=scene or DECLARED_SCENE)
             for cell, camera in zip(cells, cameras, strict=True)
         ]
         for renderer in renderers:

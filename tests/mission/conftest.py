@@ -66,7 +66,7 @@ SMALL_CELL = Path(__file__).with_name("small_cell.yaml").read_text()
 @pytest.fixture(scope="module")
 def shared_cells() -> Iterator[None]:
     """Read each cell file once, and look once at the poses of each cell, for all missions of a module."""
-    unfit_poses, found = executive.cells.sim.cell.find_unusable_poses, {}
+    unfit_poses, found = executive.cells.sim.cell.find_pose_errors, {}
 
     def look_once(config: CellConfig) -> Any:
         key = config.model_dump_json()
@@ -77,7 +77,7 @@ def shared_cells() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cell_file, "read_source", functools.cache(cell_file.read_source))
         patch.setattr(cell_file, "parse_yaml", functools.cache(cell_file.parse_yaml))
-        patch.setattr(executive.cells.sim.cell, "find_unusable_poses", look_once)
+        patch.setattr(executive.cells.sim.cell, "find_pose_errors", look_once)
         yield
 
 

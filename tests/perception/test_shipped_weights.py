@@ -37,7 +37,7 @@ def test_fresh_scenes_of_a_shipped_cell_are_read_almost_without_error(
     missions, name, scenes, randomized, precision, recall
 ):
     config = load_cell(missions / "cells" / f"{name}.yaml")
-    renderer = SceneRenderer(config, next(iter(config.cameras)), randomized=randomized)
+    renderer = SceneRenderer(config, next(iter(config.cameras)), is_random=randomized)
     samples = []
     for seed in scenes:
         drawn = renderer.render_sample(seed)

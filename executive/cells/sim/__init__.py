@@ -1,4 +1,4 @@
-"""Simulated work cell in PyBullet; this module imports pybullet without its greeting on stderr."""
+"""Simulated work cell in PyBullet. The import of pybullet prints no greeting on stderr."""
 
 import os
 from importlib import import_module

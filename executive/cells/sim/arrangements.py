@@ -17,23 +17,23 @@ from executive.cell.clock import STEP
 from executive.cell.config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
 from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim.camera import Region
-from executive.cells.sim.models import add_body, compute_upright_pose, load_mesh
+from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, load_mesh
 from executive.cells.sim.variations import draw_object_colour
 from executive.cells.sim.world import World, add_bin
 from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z, rotation_from_quaternion
 
-MAX_SPARSE_COUNT, MAX_DENSE_COUNT = 7, 20
+MAX_SPARSE_OBJECT_COUNT, MAX_DENSE_OBJECT_COUNT = 7, 20
 """Maximum number of objects in a sparse scene and in a dense scene."""
 SCALE_FACTORS = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
-"""Scale factors of objects whose size differs from that of their class."""
-UNKNOWN_MODEL_COUNT, DAMAGED_MODEL = 1000, 168
+"""Scale factors of objects with another size than the class."""
+UNKNOWN_MODEL_COUNT, DAMAGED_MODEL_NUMBER = 1000, 168
 """Number of the shapes in `random_urdfs` of pybullet_data, and index of the shape with a damaged mesh."""
-TRAINING_MODEL_NUMBERS = tuple(number for number in range(800) if number != DAMAGED_MODEL)
-"""Indices of the shapes used as unknown objects; the others are reserved for tests."""
+TRAINING_MODEL_NUMBERS = tuple(number for number in range(800) if number != DAMAGED_MODEL_NUMBER)
+"""Indices of the shapes for unknown objects in training; all other shapes are reserved for tests."""
 TABLE_X_RANGE, TABLE_Y_RANGE = (-0.05, 0.86), (-0.71, 0.71)
 """Ranges of the positions of objects on the table top [m]."""
-BASE_RADIUS = 0.16
-"""Radius around the base of the arm without objects [m]."""
+MIN_BASE_DISTANCE = 0.16
+"""Minimum distance of an object from the axis of the base of the arm [m]."""
 SETTLING_STEP_COUNT = 360
 """Number of physics steps in which dropped objects come to rest."""
 
@@ -56,22 +56,21 @@ class SceneObject:
 
 
 def move_arm_randomly(world: World, camera: CameraConfig, rng: Generator) -> bool:
-    """Move the arm to a random pose as in a run; return True if the tool shall hold an object."""
-    poses = world.config.arm.poses_deg
-    scans = camera.scan_poses
-    scan = np.radians(poses[scans[0] if rng.random() < 0.6 else str(rng.choice(scans))])
-    world.set_joint_positions(scan)
-    is_close_to_scan = rng.random() < 0.6
+    """Move the arm to a random pose of a run, and return whether the tool holds an object in the scene."""
+    poses = camera.scan_poses
+    pose = poses[0] if rng.random() < 0.6 else str(rng.choice(poses))
+    world.set_joint_positions(np.radians(world.config.arm.poses_deg[pose]))
+    is_near_scan_pose = rng.random() < 0.6
     if camera.mount == "wrist":
-        max_offset = (0.02, 0.02, 0.02) if is_close_to_scan else (0.07, 0.15, 0.12)
-        max_angle = math.radians(3) if is_close_to_scan else 0.5
+        max_offset = (0.02, 0.02, 0.02) if is_near_scan_pose else (0.07, 0.15, 0.12)
+        max_angle = math.radians(3) if is_near_scan_pose else 0.5
         X_WT = world.get_tool_pose()
         offset = rng.uniform(-1, 1, 3) * max_offset
         tilt = Pose.of(np.zeros(3), [*rng.normal(0, math.radians(1.5), 2) / 2, 0, 1])
         rotation = rotate_about_z(rng.uniform(-max_angle, max_angle)) @ X_WT.rotation
         _move_tool(world, Pose(rotation, X_WT.position + offset) @ tilt)
         return bool(rng.random() < 0.08)
-    if is_close_to_scan:
+    if is_near_scan_pose:
         return False
     # The inverse kinematics starts from a pose that is closer to all targets than the scan poses.
     position = rng.uniform((0.25, -0.50, 0.05), (0.72, 0.50, 0.40))
@@ -82,7 +81,7 @@ def move_arm_randomly(world: World, camera: CameraConfig, rng: Generator) -> boo
 
 
 def draw_region(camera: CameraConfig, rng: Generator) -> Region:
-    """Return the image region of a scene: mostly `table_view`, else a random region of the same size."""
+    """Return the image region of a scene: mostly `table_view`, else a random region of equal size."""
     left, top, right, bottom = camera.table_view
     if rng.random() < 0.65:
         return camera.table_view
@@ -91,14 +90,14 @@ def draw_region(camera: CameraConfig, rng: Generator) -> Region:
     return x, y, x + right - left, y + bottom - top
 
 
-def draw_objects(config: CellConfig, count: int, table: Colour, rng: Generator) -> list[SceneObject]:
-    """Return `count` random objects at the origin; in some scenes, objects are unknown or of other sizes."""
+def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Generator) -> list[SceneObject]:
+    """Return `count` random objects at the origin; some scenes contain unknown or scaled objects."""
     unknown_fraction = rng.uniform(0.05, 0.4) if rng.random() < 0.35 else 0.0
     scaled_fraction = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
     objects = []
     for label in rng.choice(list(config.objects), count):
         label, model = str(label), config.objects[str(label)]
-        colour = draw_object_colour(model.colours, table, rng)
+        colour = draw_object_colour(model.colours, table_colour, rng)
         if rng.random() < unknown_fraction:
             label, model = UNKNOWN_LABEL, load_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS)))
             model = scale_model(model, rng.uniform(0.4, 1.0))
@@ -123,19 +122,20 @@ def load_unknown_model(number: int) -> ObjectConfig:
 
 
 def draw_arrangement(
-    config: CellConfig, footprint: Array, shows_workspace: bool, table: Colour, rng: Generator
+    config: CellConfig, footprint: Array, shows_workspace: bool, table_colour: Colour, rng: Generator
 ) -> list[SceneObject]:
     """Return a random arrangement of 0 to 20 objects, possibly with unknown objects, stacks and heaps.
 
     Args:
         config: The cell file.
         footprint: Corners `(N, 2)` [m] of the visible part of the table.
-        shows_workspace: True if the image shows the workspace; most objects then lie in or near it.
-        table: Mean colour of the table.
+        shows_workspace: True to put most objects into the workspace or near the workspace.
+        table_colour: Mean colour of the table.
         rng: Random number generator.
     """
-    count = int(rng.integers(0, (MAX_SPARSE_COUNT if rng.random() < 0.45 else MAX_DENSE_COUNT) + 1))
-    objects = draw_objects(config, count, table, rng)
+    max_count = MAX_SPARSE_OBJECT_COUNT if rng.random() < 0.45 else MAX_DENSE_OBJECT_COUNT
+    count = int(rng.integers(0, max_count + 1))
+    objects = draw_objects(config, count, table_colour, rng)
     low = np.maximum(footprint.min(axis=0), (TABLE_X_RANGE[0], TABLE_Y_RANGE[0]))
     high = np.minimum(footprint.max(axis=0), (TABLE_X_RANGE[1], TABLE_Y_RANGE[1]))
     if (high - low < 0.05).any():
@@ -145,32 +145,33 @@ def draw_arrangement(
         margin = rng.uniform(0.0, 0.02 + 0.006 * count)
         low = np.maximum(low, np.array([config.table.x[0], config.table.y[0]]) - margin)
         high = np.minimum(high, np.array([config.table.x[1], config.table.y[1]]) + margin)
-    bins = [bin for bin in config.bins.values() if _overlaps(bin, low, high)]
-    choice = rng.random()
-    if choice < 0.15:
-        return drop_objects(config, _draw_heap(objects[:MAX_SPARSE_COUNT], low, high, bins, rng))
+    bins = [bin for bin in config.bins.values() if _is_in_rectangle(bin, low, high)]
+    random_number = rng.random()
+    if random_number < 0.15:
+        return simulate_fall(config, _draw_heap(objects[:MAX_SPARSE_OBJECT_COUNT], low, high, bins, rng))
     objects = _place_side_by_side(config, objects, low, high, bins, rng)
-    if choice < 0.23:
-        return drop_objects(config, [_lift_and_rotate(one, rng) for one in objects])
-    if choice < 0.40:
+    if random_number < 0.23:
+        return simulate_fall(config, [_lift_and_rotate(scene_object, rng) for scene_object in objects])
+    if random_number < 0.40:
         _stack_randomly(objects, rng)
     return objects
 
 
-def _lift_and_rotate(lying: SceneObject, rng: Generator) -> SceneObject:
+def _lift_and_rotate(scene_object: SceneObject, rng: Generator) -> SceneObject:
     """Return an object lifted by 4 cm and randomly rotated."""
-    return replace(lying, X_WO=Pose(_draw_rotation(rng), lying.X_WO.position + np.array([0, 0, 0.04])))
+    position = scene_object.X_WO.position + np.array([0, 0, 0.04])
+    return replace(scene_object, X_WO=Pose(_draw_rotation(rng), position))
 
 
 def draw_held_object(X_WT: Pose, config: CellConfig, rng: Generator) -> SceneObject:
     """Return a random object that hangs upright at the tip of the tool."""
-    (held,) = draw_objects(config, 1, (0.5, 0.5, 0.5), rng)
-    position = X_WT.position - [0, 0, load_mesh(held.model).top]
-    return replace(held, X_WO=Pose(rotate_about_z(rng.uniform(0, math.tau)), position))
+    (held_object,) = draw_objects(config, 1, (0.5, 0.5, 0.5), rng)
+    position = X_WT.position - [0, 0, load_mesh(held_object.model).top]
+    return replace(held_object, X_WO=Pose(rotate_about_z(rng.uniform(0, math.tau)), position))
 
 
-def drop_objects(config: CellConfig, objects: Sequence[SceneObject]) -> list[SceneObject]:
-    """Return objects at their simulated poses 1.5 s after their release.
+def simulate_fall(config: CellConfig, objects: Sequence[SceneObject]) -> list[SceneObject]:
+    """Simulate the fall of objects onto table and bins for 1.5 s, and return the objects at the final poses.
 
     Each call uses a new physics world, so that the result depends only on the initial poses.
     """
@@ -179,48 +180,47 @@ def drop_objects(config: CellConfig, objects: Sequence[SceneObject]) -> list[Sce
         client.setGravity(0, 0, -9.81)
         client.setTimeStep(STEP)
         client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
-        table = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[2, 2, 0.5])
-        client.createMultiBody(0, table, basePosition=[0, 0, -0.5])
+        table_shape = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[2, 2, 0.5])
+        client.createMultiBody(0, table_shape, basePosition=[0, 0, -0.5])
         for bin in config.bins.values():
             add_bin(client, bin)
-        bodies = [add_body(client, one.model, one.X_WO) for one in objects]
+        bodies = [add_body(client, scene_object.model, scene_object.X_WO) for scene_object in objects]
         for _ in range(SETTLING_STEP_COUNT):
             client.stepSimulation()
-        pairs = zip(bodies, objects, strict=True)
-        return [replace(one, X_WO=_get_object_pose(client, body, one.model)) for body, one in pairs]
+        final_objects = []
+        for body, scene_object in zip(bodies, objects, strict=True):
+            X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
+            X_OI = compute_upright_pose(scene_object.model) @ get_inertial_pose(client, body)
+            final_objects.append(replace(scene_object, X_WO=X_WI @ X_OI.inverse()))
+        return final_objects
     finally:
         client.disconnect()
 
 
-def _get_object_pose(client: BulletClient, body: int, model: ObjectConfig) -> Pose:
-    X_LI = Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
-    X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
-    return X_WI @ (compute_upright_pose(model) @ X_LI).inverse()
-
-
 def _move_tool(world: World, X_WT: Pose) -> None:
-    """Move the tool near `X_WT`; an error does not matter, because labels use the actual camera pose."""
-    X_WE = X_WT @ Pose.of([0, 0, -(world.robot.flange_offset + world.config.tool.length)])
-    for _ in range(3):
+    """Move the tool near `X_WT`; the accuracy is unimportant, because labels use the actual camera pose."""
+    X_WL = X_WT @ Pose.of([0, 0, -(world.robot.flange_offset + world.config.tool.length)])
+    for _ in range(3):  # X_WL is the pose of the flange link
         q = world.client.calculateInverseKinematics(
-            world.arm, world.flange_index, X_WE.position, X_WE.quaternion,
+            world.arm, world.flange_index, X_WL.position, X_WL.quaternion,
             maxNumIterations=60, residualThreshold=1e-4,
         )  # fmt: skip
         world.set_joint_positions(q[: world.robot.joint_count])
 
 
 def _draw_rotation(rng: Generator) -> Array:
+    """Return a random rotation matrix with uniform distribution."""
     return rotation_from_quaternion(rng.normal(size=4))
 
 
-def _overlaps(bin: BinConfig, low: Array, high: Array) -> bool:
-    """Return True if a bin overlaps the rectangle from `low` to `high` `(2,)` [m] by at least 4 cm."""
+def _is_in_rectangle(bin: BinConfig, low: Array, high: Array) -> bool:
+    """Return True if a bin is over 4 cm inside the rectangle from `low` to `high` `(2,)` [m]."""
     half_size = np.array(bin.size[:2]) / 2
     centre = np.array(bin.position[:2])
     return bool((centre + half_size > low + 0.04).all() and (centre - half_size < high - 0.04).all())
 
 
-def _contains(bin: BinConfig, point: Array, margin: float) -> bool:
+def _has_in_outline(bin: BinConfig, point: Array, margin: float) -> bool:
     """Return True if a point `(2,)` [m] is inside the outline of a bin, enlarged by a margin [m]."""
     return bool((np.abs(point - bin.position[:2]) < np.array(bin.size[:2]) / 2 + margin).all())
 
@@ -228,17 +228,16 @@ def _contains(bin: BinConfig, point: Array, margin: float) -> bool:
 def _draw_heap(
     objects: Sequence[SceneObject], low: Array, high: Array, bins: list[BinConfig], rng: Generator
 ) -> list[SceneObject]:
-    """Return objects one above the other, over a point of the table or over a bin."""
+    """Return objects above each other, over a point of the table or over a bin."""
     if bins and rng.random() < 0.6:
         centre = np.array(bins[int(rng.integers(len(bins)))].position[:2])
     else:
         centre = rng.uniform(low + 0.03, np.maximum(high - 0.03, low + 0.031))
     std = rng.uniform(0.01, 0.06)
-    positions = [[*(centre + rng.normal(0, std, 2)), 0.05 + 0.055 * i] for i in range(len(objects))]
-    return [
-        replace(one, X_WO=Pose(_draw_rotation(rng), np.array(position)))
-        for one, position in zip(objects, positions, strict=True)
-    ]
+    heights = 0.05 + 0.055 * np.arange(len(objects))
+    positions = [np.array([*(centre + rng.normal(0, std, 2)), height]) for height in heights]
+    pairs = zip(objects, positions, strict=True)
+    return [replace(item, X_WO=Pose(_draw_rotation(rng), position)) for item, position in pairs]
 
 
 def _stack_randomly(objects: list[SceneObject], rng: Generator) -> None:
@@ -247,12 +246,13 @@ def _stack_randomly(objects: list[SceneObject], rng: Generator) -> None:
         if len(objects) < 2:
             return
         upper, lower = (int(index) for index in rng.choice(len(objects), 2, replace=False))
-        base = objects[lower]
-        point = base.X_WO.position[:2]
-        if any(math.dist(one.X_WO.position[:2], point) < 0.01 for one in objects if one is not base):
+        lower_object = objects[lower]
+        point = lower_object.X_WO.position[:2]
+        distances = [math.dist(item.X_WO.position[:2], point) for item in objects if item is not lower_object]
+        if min(distances) < 0.01:
             continue
-        height = load_mesh(base.model).top - load_mesh(objects[upper].model).bottom
-        position = base.X_WO.position + np.array([*rng.normal(0, 0.003, 2), height])
+        height = load_mesh(lower_object.model).top - load_mesh(objects[upper].model).bottom
+        position = lower_object.X_WO.position + np.array([*rng.normal(0, 0.003, 2), height])
         X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), position)
         objects[upper] = replace(objects[upper], X_WO=X_WO)
 
@@ -265,30 +265,29 @@ def _place_side_by_side(
     bins: list[BinConfig],
     rng: Generator,
 ) -> list[SceneObject]:
-    """Return objects at random free positions on the table or in `bins`, without those that find no room."""
+    """Return objects at random free positions on the table or in `bins`; objects without room are omitted."""
     gap = rng.uniform(0.0, 0.02)
-    placed: list[SceneObject] = []
+    placed_objects: list[SceneObject] = []
     for candidate in objects:
         radius = candidate.model.radius
         for _ in range(30):
-            point, floor = rng.uniform(low, high), 0.0
+            point, floor_height = rng.uniform(low, high), 0.0
             if bins and rng.random() < 0.35:
                 bin = bins[int(rng.integers(len(bins)))]
                 max_offset = np.maximum(np.array(bin.size[:2]) / 2 - radius, 0.0)
                 point = np.array(bin.position[:2]) + rng.uniform(-max_offset, max_offset)
-            containing = [bin for bin in config.bins.values() if _contains(bin, point, -radius)]
-            if containing:
-                floor = containing[0].position[2] + BIN_THICKNESS
-            elif any(_contains(bin, point, radius + BIN_THICKNESS) for bin in config.bins.values()):
+            bins_at_point = [bin for bin in config.bins.values() if _has_in_outline(bin, point, -radius)]
+            if bins_at_point:
+                floor_height = bins_at_point[0].position[2] + BIN_THICKNESS
+            elif any(_has_in_outline(bin, point, radius + BIN_THICKNESS) for bin in config.bins.values()):
                 continue
             is_free = all(
-                np.linalg.norm(other.X_WO.position[:2] - point) > radius + other.model.radius + gap
-                for other in placed
+                np.linalg.norm(item.X_WO.position[:2] - point) > radius + item.model.radius + gap
+                for item in placed_objects
             )
-            if is_free and np.linalg.norm(point) > BASE_RADIUS:
-                position = np.array([*point, floor - load_mesh(candidate.model).bottom])
-                placed.append(
-                    replace(candidate, X_WO=Pose(rotate_about_z(rng.uniform(0, math.tau)), position))
-                )
+            if is_free and np.linalg.norm(point) > MIN_BASE_DISTANCE:
+                position = np.array([*point, floor_height - load_mesh(candidate.model).bottom])
+                X_WO = Pose(rotate_about_z(rng.uniform(0, math.tau)), position)
+                placed_objects.append(replace(candidate, X_WO=X_WO))
                 break
-    return placed
+    return placed_objects

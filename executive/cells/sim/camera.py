@@ -67,14 +67,20 @@ class RenderedImage:
     """A rendered region of a camera image, without noise.
 
     Attributes:
-        image: Colour image `(H, W, 3)` uint8, RGB.
+        image: Colour image of the region `(H, W, 3)` uint8, RGB.
         bodies: Visible body at each pixel `(H, W)`, -1 for none.
         depth_buffer: Depth buffer of OpenGL `(H, W)`, 0 to 1.
+        matrix: Camera matrix of the camera image `(3, 3)` [pixel].
+        X_WC: Pose of the camera.
+        region: The region of the camera image.
     """
 
     image: Image
     bodies: NDArray[np.int32]
     depth_buffer: NDArray[np.float32]
+    matrix: Array
+    X_WC: Pose
+    region: Region
 
     @property
     def depth(self) -> Array:
@@ -112,12 +118,10 @@ def render(world: World, matrix: Array, X_WC: Pose, region: Region, light: Light
         lightSpecularCoeff=light.specular,
         renderer=pybullet.ER_TINY_RENDERER,
     )
-    image = np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3]
-    return RenderedImage(
-        np.ascontiguousarray(image),
-        np.asarray(segmentation, dtype=np.int32).reshape(height, width),
-        np.asarray(depth_buffer, dtype=np.float32).reshape(height, width),
-    )
+    image = np.ascontiguousarray(np.asarray(rgba, dtype=np.uint8).reshape(height, width, 4)[..., :3])
+    bodies = np.asarray(segmentation, dtype=np.int32).reshape(height, width)
+    depth_buffer = np.asarray(depth_buffer, dtype=np.float32).reshape(height, width)
+    return RenderedImage(image, bodies, depth_buffer, matrix, X_WC, region)
 
 
 def add_noise(image: Image, noise: NoiseConfig, rng: np.random.Generator) -> Image:

@@ -17,7 +17,7 @@ from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import build_simulated_class, find_model_errors
-from executive.cells.sim.poses import find_places_out_of_reach, find_unusable_poses
+from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
 from executive.cells.sim.rebuild import InterruptedState, rebuild_world
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.scene_world import build_light
@@ -125,7 +125,7 @@ class SimCell(CellWithoutHardware):
             *find_places_out_of_reach(config),
             *find_lack_of_room(config),
             # The check of the poses builds a world, which is impossible if a model is missing.
-            *(() if model_errors else find_unusable_poses(config)),
+            *(() if model_errors else find_pose_errors(config)),
         )
 
     @staticmethod

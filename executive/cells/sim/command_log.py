@@ -20,29 +20,29 @@ from executive.geometry import Array
 from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 
-VERSION = 2
+FORMAT_VERSION = 2
 """Version of the format of the log."""
-MAX_JOINTS = 100
+MAX_JOINT_COUNT = 100
 """Maximum number of joints of an arm in a log."""
-MAGIC = b"executive world "
-"""Start of the first line of every log, which continues with version and joint count, as `2 joints 7`."""
-RUN_STEP, IDLE_STEP, VACUUM_ON, VACUUM_OFF, SEAL_BREAK = b"SICOP"
-"""Kinds of commands: a physics step in a control step of the run, a physics step outside of control steps,
-vacuum on, vacuum off, and break of the seal."""
-JOINT_TARGETS, MOTION, MOTION_END, SET_POSE, REMOVE = b"JMDXR"
-"""More kinds: joint targets, start and end of a motion, new pose of an object, removal of an object."""
+FILE_SIGNATURE = b"executive world "
+"""Start of the first line of every log; version and joint count follow, for example `2 joints 7`."""
+RUN_STEP, IDLE_STEP, VACUUM_ON, VACUUM_OFF, SEAL_BREAK = map(ord, "SICOP")
+"""Kinds of commands, each the code of a letter: a physics step inside or outside of a control step of the
+run, vacuum on, vacuum off, and break of the seal."""
+JOINT_TARGETS, MOTION, MOTION_END, SET_POSE, REMOVE = map(ord, "JMDXR")
+"""Kinds of commands: joint targets, start and end of a motion, new pose and removal of an object."""
 _PAYLOAD_FORMATS = {
     **dict.fromkeys((RUN_STEP, IDLE_STEP, VACUUM_ON, VACUUM_OFF, SEAL_BREAK, MOTION_END), ""),
     MOTION: "2dI", SET_POSE: "i7d", REMOVE: "i",
 }  # fmt: skip
-"""Formats (of `struct`) of the numbers of each kind except JOINT_TARGETS: a time and a position per joint."""
+"""Formats (of `struct`) of the numbers of each kind; the format of JOINT_TARGETS depends on the arm."""
 
 
 class Command(NamedTuple):
     """One command in a log.
 
     Attributes:
-        kind: Kind of the command, one of the constants above.
+        kind: Kind of the command, for example `RUN_STEP`.
         numbers: Arguments of the command.
         states: Positions, velocities and accelerations of the `n` joints at the `N` samples of a motion
             `(N, 3 n)`; None for other kinds.
@@ -69,7 +69,7 @@ class CommandLog:
         self._file: LogFile | None = None
         if path is None:
             return
-        header = MAGIC + f"{VERSION} joints {joint_count}\n".encode()
+        header = FILE_SIGNATURE + f"{FORMAT_VERSION} joints {joint_count}\n".encode()
         self._length = max((end for _, end in _read_with_ends(path)), default=len(header)) if resume else 0
         self._file = LogFile(path, "the log of the world", self._length)
         if not resume:
@@ -109,7 +109,7 @@ def is_command_log(path: Path) -> bool:
     Raises:
         InputError: The file cannot be read.
     """
-    return _read_content(path).startswith(MAGIC)
+    return _read_content(path).startswith(FILE_SIGNATURE)
 
 
 def read_commands(path: Path) -> Iterator[Command]:
@@ -125,26 +125,27 @@ def read_commands(path: Path) -> Iterator[Command]:
 def _read_with_ends(path: Path) -> Iterator[tuple[Command, int]]:
     """Yield the complete commands of a log, each with the offset of its end in the file [byte]."""
     data = _read_content(path)
-    if not data.startswith(MAGIC):
-        raise InputError(f'"{path}" is no log of a world: it does not begin with {MAGIC.decode().strip()!r}')
+    if not data.startswith(FILE_SIGNATURE):
+        signature = FILE_SIGNATURE.decode().strip()
+        raise InputError(f'"{path}" is no log of a world: it does not begin with {signature!r}')
     header, _, _ = data.partition(b"\n")
-    version, *rest = header.removeprefix(MAGIC).split()
-    if version != str(VERSION).encode() or rest[:1] != [b"joints"]:
+    version, *joint_words = header.removeprefix(FILE_SIGNATURE).split()
+    if version != str(FORMAT_VERSION).encode() or joint_words[:1] != [b"joints"]:
         raise InputError(
             f'the log of the world "{path}" has version {version.decode(errors="replace")}; this program '
-            f"reads version {VERSION}; run the mission again"
+            f"reads version {FORMAT_VERSION}; run the mission again"
         )
-    if not (len(rest) == 2 and rest[1].isdigit() and 0 < int(rest[1]) <= MAX_JOINTS):
+    joint_count = int(joint_words[1]) if len(joint_words) == 2 and joint_words[1].isdigit() else 0
+    if not 0 < joint_count <= MAX_JOINT_COUNT:
         raise InputError(f'the log of the world "{path}" does not state its number of joints; it was changed')
-    offset, joint_count = len(header) + 1, int(rest[1])
+    offset = len(header) + 1
     formats, state_size = {**_PAYLOAD_FORMATS, JOINT_TARGETS: f"{1 + joint_count}d"}, 3 * joint_count
     while offset < len(data):
-        kind, start = data[offset], offset
+        kind, command_offset = data[offset], offset
         if kind not in formats:
             if not data[offset:].strip(b"\0"):
-                # A power failure left the last blocks empty.
-                return
-            raise _make_damage_error(path, start)
+                return  # a power failure left the last blocks empty
+            raise _make_damage_error(path, command_offset)
         payload = struct.Struct(f"<{formats[kind]}")
         if offset + 1 + payload.size > len(data):
             return
@@ -152,23 +153,23 @@ def _read_with_ends(path: Path) -> Iterator[tuple[Command, int]]:
         offset += 1 + payload.size
         states = None
         if kind == MOTION:
-            count = state_size * int(numbers[-1])
-            if offset + 8 * count > len(data):
+            number_count = state_size * int(numbers[-1])
+            if offset + 8 * number_count > len(data):
                 return
-            states = np.frombuffer(data, "<f8", count, offset).reshape(-1, state_size)
-            offset += 8 * count
-        # The second number of a motion is the start of its guarded part, infinite if there is no such part.
+            states = np.frombuffer(data, "<f8", number_count, offset).reshape(-1, state_size)
+            offset += 8 * number_count
+        # The second number of a motion is the start of the guarded part; infinite: there is no guarded part.
         finite_numbers = numbers if states is None else (numbers[0], *states.flat)
         if not all(map(math.isfinite, finite_numbers)):
-            raise _make_damage_error(path, start)
+            raise _make_damage_error(path, command_offset)
         yield Command(kind, numbers, states), offset
 
 
 def _make_damage_error(path: Path, offset: int) -> InputError:
     """Return the error for a log without a valid command at an offset [byte]."""
     return InputError(
-        f'the log of the world "{path}" is damaged at byte {offset}: a log is only ever appended to, so '
-        "somebody changed it after the run, or the disk lost a part of it; restore a copy"
+        f'the log of the world "{path}" is damaged at byte {offset}: somebody changed it after the run, '
+        "or the disk lost a part of it; restore a copy"
     )
 
 
@@ -179,6 +180,6 @@ def _read_content(path: Path) -> bytes:
 
 
 def get_joint_states(command: Command) -> JointState:
-    """Return the states in a MOTION command as arrays `(N, n)`."""
+    """Return the states of the joints in a MOTION command, as arrays `(N, n)`."""
     assert command.states is not None
     return JointState(*np.hsplit(command.states, 3))

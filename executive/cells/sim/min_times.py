@@ -13,10 +13,10 @@ from executive.geometry import Array, make_tool_down_pose
 from executive.motion.arms import build_kinematics
 from executive.motion.limits import JointLimits, compute_min_time
 
-ANGLE_STEP = np.radians(20.0)
+REDUNDANCY_ANGLE_STEP = np.radians(20.0)
 """Difference between neighbouring samples of the redundancy angle [rad]."""
 SAFETY_FACTOR = 0.8
-"""Factor on the computed transport time, because other joint configurations and heights may be faster."""
+"""Factor on the minimum transport time of the samples, because other heights and angles may be faster."""
 
 
 class SimMinTimes(CellMinTimes):
@@ -32,7 +32,7 @@ class SimMinTimes(CellMinTimes):
 
     def __init__(self, config: CellConfig) -> None:
         self._pile_height = compute_max_pile_height(config)
-        min_height = min(kind.height for kind in config.objects.values())
+        min_height = min(model.height for model in config.objects.values())
         super().__init__(config, TOUCH_DISTANCE, self._pile_height - min_height)
         self._limits = JointLimits.from_config(config.arm.limits)
         self._kinematics = build_kinematics(config)
@@ -52,23 +52,26 @@ class SimMinTimes(CellMinTimes):
         return self._transport_times[bin]
 
     def _compute_min_time(self, positions: Array, slots: Array) -> float:
-        """Return the minimum time [s] from `positions` to `slots`, both `(N, 2)` [m], for the nearest row."""
-        nearest = np.argmin(np.linalg.norm(positions - slots, axis=1))
-        starts, ends = (self._solve_configurations(points[nearest]) for points in (positions, slots))
+        """Return the minimum time [s] between the nearest pair of a position and a slot.
+
+        Row i of `positions` `(N, 2)` [m] forms a pair with row i of `slots` `(N, 2)` [m].
+        """
+        nearest_row = np.argmin(np.linalg.norm(positions - slots, axis=1))
+        starts, ends = (self._solve_configurations(points[nearest_row]) for points in (positions, slots))
         return float(compute_min_time(ends - starts[:, None], self._limits).min())
 
     def _solve_configurations(self, position: Array) -> Array:
         """Return joint configurations `(N, n)` [rad] with the tool over a position `(2,)` [m].
 
-        The last joint is at 0, and the tool is as high as the highest pile of objects.
+        The last joint is at 0, and the tool is at the height of the highest pile of objects.
 
         Raises:
             Unreachable: No joint configuration is within the limits.
         """
         pose = make_tool_down_pose(np.array([*position, self._pile_height]))
-        qs = self._kinematics.solve_all(pose, np.zeros(self._limits.joint_count), ANGLE_STEP).qs
+        qs = self._kinematics.solve_all(pose, np.zeros(self._limits.joint_count), REDUNDANCY_ANGLE_STEP).qs
         qs[:, -1] = 0.0
-        allowed = qs[self._limits.position.contains(qs)]
-        if not len(allowed):
+        valid_qs = qs[self._limits.position.contains(qs)]
+        if not len(valid_qs):
             raise Unreachable("no configuration of the arm is inside its joint limits")
-        return allowed
+        return valid_qs

@@ -1,4 +1,4 @@
-"""Readers of model files, URDF and meshes, that find errors before PyBullet opens the files."""
+"""Readers and checks of model files (URDF and meshes) before PyBullet opens the files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from executive.errors import InputError
 from executive.geometry import Array
 
 MAX_MODEL_SIZE = 20_000_000
-"""Maximum size of a model file [byte], which limits the duration of the check."""
+"""Maximum size of a model file [byte], to limit the duration of the check."""
 MAX_TRIANGLE_COUNT = 20_000
 """Maximum number of triangles of a mesh: a collision takes PyBullet 3 s with 20,000, 60 s with 300,000."""
 
@@ -70,11 +70,7 @@ def find_mesh(urdf: Path, mesh: ElementTree.Element) -> Path:
 
 
 def _normalize_name(urdf: Path, name: str) -> str:
-    """Return the name of a file in a URDF without a leading `package://`.
-
-    Raises:
-        InputError: The file is outside of the folder of the URDF.
-    """
+    """Return a file name of a URDF without `package://`; raise `InputError` outside of the folder."""
     name = name.removeprefix("package://")
     if is_outside_path(name) or has_outside_link(urdf.parent, name):
         raise InputError(f'the model {urdf.name} names the file "{name}", which is outside of its folder')
@@ -82,11 +78,7 @@ def _normalize_name(urdf: Path, name: str) -> str:
 
 
 def _check_triangle_count(path: Path) -> None:
-    """Check the number of triangles of a Wavefront or STL file.
-
-    Raises:
-        InputError: The file cannot be read, or has more than `MAX_TRIANGLE_COUNT` triangles.
-    """
+    """Raise `InputError` if a Wavefront or STL file is unreadable or exceeds `MAX_TRIANGLE_COUNT`."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -125,8 +117,9 @@ def read_wavefront(path: Path) -> tuple[Array, NDArray[np.intp]]:
                 numbers = [int(word.split("/")[0]) for word in words]
                 indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
                 triangles += [(indices[0], *pair) for pair in pairwise(indices[1:])]
-        faces = np.array(triangles, dtype=np.intp).reshape(-1, 3)
-        return _check_mesh(np.array(vertices, dtype=float), faces)
+        mesh = np.array(vertices, dtype=float), np.array(triangles, dtype=np.intp).reshape(-1, 3)
+        _check_mesh(*mesh)
+        return mesh
     except (OSError, ValueError, IndexError, OverflowError) as error:
         raise InputError(f"the model {path.name} is no Wavefront mesh: {error}") from None
 
@@ -144,20 +137,15 @@ def parse_numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, 
     except ValueError:
         numbers = ()
     if len(numbers) != len(default) or not np.isfinite(numbers).all():
-        raise InputError(f'a URDF has "{text}" in place of {len(default)} finite number(s)')
+        raise InputError(f'a URDF has "{text}" instead of {len(default)} finite number(s)')
     return numbers
 
 
-def _check_mesh(vertices: Array, triangles: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    """Return vertices `(N, 3)` and triangles `(M, 3)` unchanged.
-
-    Raises:
-        ValueError: Vertices and triangles are no valid mesh.
-    """
+def _check_mesh(vertices: Array, triangles: NDArray[np.intp]) -> None:
+    """Raise `ValueError` if vertices `(N, 3)` and triangles `(M, 3)` are no valid mesh."""
     if not triangles.size:
         raise ValueError("it has no faces (lines beginning with f)")
     if vertices.shape != (len(vertices), 3) or not np.isfinite(vertices).all():
         raise ValueError("a vertex (lines beginning with v) needs three finite numbers")
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise ValueError(f"a face names a vertex that is not there; there are {len(vertices)}")
-    return vertices, triangles

@@ -57,7 +57,8 @@ class Mesh:
     @cached_property
     def centroid(self) -> Array:
         """Centroid of the enclosed volume `(3,)` [m]; without a volume, the centre of the bounding box."""
-        # Each triangle and the origin form a tetrahedron with a signed volume and its own centroid.
+        # Each triangle (a, b, c) and the origin form a tetrahedron with the signed volume a · (b x c) / 6 and
+        # the centroid (a + b + c) / 4.
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
         if abs(volumes.sum()) < 1e-12:
@@ -70,7 +71,7 @@ class Mesh:
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         normals = np.cross(b - a, c - a)
         lengths = np.linalg.norm(normals, axis=1)
-        has_area = lengths > 0
+        has_area = lengths > 0  # triangles without an area have no normal
         normals, a = normals[has_area] / lengths[has_area, None].clip(1e-12), a[has_area]
         distances = self.vertices @ normals.T - (a * normals).sum(axis=1)
         return bool(distances.max() < 1e-4)
@@ -144,15 +145,14 @@ def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for the height and the radius of a class if the model has another size.
+    """Yield key and message if the declared height or radius of a class is not the size of the model.
 
-    The executive computes the centre, the top and the free space of an object from these sizes. The size of
-    a model without a Wavefront mesh is not checked.
+    The executive computes the centre, the top and the free space of an object from height and radius.
     """
     try:
         mesh = load_mesh(config)
     except InputError:
-        return
+        return  # the size of a model without a Wavefront mesh is unknown
     for name, model_size in (("height", mesh.top - mesh.bottom), ("radius", mesh.radius)):
         declared_size = getattr(config, name)
         if not abs(declared_size - model_size) <= SIZE_TOLERANCE:  # also True for NaN

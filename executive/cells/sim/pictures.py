@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from itertools import pairwise
@@ -78,20 +78,15 @@ def render_pictures(
         pending: deque[Future[list[Image]]] = deque()
         # The number of pending blocks is limited, because their pictures occupy memory.
         for block in blocks:
-            pending.append(pool.submit(_render_block, source, block))
+            pending.append(pool.submit(render_pictures_in_process, source, block))
             if len(pending) > worker_count:
                 yield from pending.popleft().result()
         while pending:
             yield from pending.popleft().result()
 
 
-def _render_block(source: PictureSource, steps: Sequence[int]) -> list[Image]:
-    """Return the pictures of a block as a list, because a worker process cannot return an iterator."""
-    return list(render_pictures_in_process(source, steps))
-
-
-def render_pictures_in_process(source: PictureSource, steps: Sequence[int]) -> Iterator[Image]:
-    """Yield pictures `(H, W, 3)` uint8 RGB of the world after the given control steps, in ascending order."""
+def render_pictures_in_process(source: PictureSource, steps: Sequence[int]) -> list[Image]:
+    """Return pictures `(H, W, 3)` uint8 RGB of the world after the given control steps."""
     scene = load_scene(source.scene, source.config)
     world, viewpoint = build_initial_world(source.config, source.seed, scene=scene), source.viewpoint
     try:
@@ -99,15 +94,16 @@ def render_pictures_in_process(source: PictureSource, steps: Sequence[int]) -> I
         world.client.changeVisualShape(world.floor, -1, rgbaColor=[1, 1, 1, 0])
         rebuilder = WorldRebuilder(world, SuctionTool(world, source.config.tool))
         commands = read_commands(source.log)
-        executed_step_count = 0
+        executed_step_count, pictures = 0, []
         for step in steps:
             while executed_step_count < step:
                 command = next(commands)
                 rebuilder.execute(command)
                 executed_step_count += command.kind == RUN_STEP
-            yield _compose_picture(
-                render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, *viewpoint.size), FILM_LIGHT)
-            )
+            region = (0, 0, *viewpoint.size)
+            rendered = render(world, viewpoint.matrix, viewpoint.X_WC, region, FILM_LIGHT)
+            pictures.append(_compose_picture(rendered))
+        return pictures
     finally:
         world.close()
 

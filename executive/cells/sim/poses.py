@@ -1,4 +1,4 @@
-"""Checks of a cell file: reach of bins and safe place, clearance of poses, and view of the cameras."""
+"""Checks of a cell file: reach of bins, poses and safe place, clearance of poses, view of the cameras."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from executive.motion.arms import build_planner
 from executive.perception.camera_model import compute_calibration
 
 POINTS_PER_SIDE = 9
-"""Number of points along each side of the workspace at which every camera must see the flattest object."""
+"""Number of positions of the flattest object along each side of the workspace for the check of occlusion."""
 
 
 def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -32,10 +32,10 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
     height in one inverse kinematics branch. Each named pose must be within the joint limits.
     """
     planner = build_planner(config)
-    max_height = max(kind.height for kind in config.objects.values())
+    max_height = max(model.height for model in config.objects.values())
 
-    def require_reachable(position: Array, floor: float) -> None:
-        planner.require_reachable(Goal((float(position[0]), float(position[1]), floor + max_height)))
+    def require_reachable(position: Array, floor_height: float) -> None:
+        planner.require_reachable(Goal((float(position[0]), float(position[1]), floor_height + max_height)))
 
     ranges = config.arm.limits.position_ranges_deg
     for name, pose in config.arm.poses_deg.items():
@@ -49,11 +49,11 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
     yield from find_unreachable_places(config, require_reachable)
 
 
-def find_unusable_poses(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each named pose, scan pose and bin that violates clearance or view.
+def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield key and message for each pose without clearance, and each pose or bin that occludes the table.
 
     In each named pose, arm and tool must keep the margin to table, bins and the arm itself, because otherwise
-    no motion can end in the pose. From each scan pose the camera must see the whole workspace.
+    no motion can end in the pose. From each scan pose, the camera must see the whole workspace.
     """
     with contextlib.closing(ClearanceChecker(config)) as checker:
         for name, pose in config.arm.poses_deg.items():
@@ -95,7 +95,7 @@ def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator
 def _find_occluding_bin(config: CellConfig, world: World, camera_position: Array) -> str | None:
     """Return a bin that occludes the centre of the flattest object somewhere in the workspace, or None."""
     xs, ys = (np.linspace(*side, POINTS_PER_SIDE) for side in (config.table.x, config.table.y))
-    height = min(kind.height for kind in config.objects.values()) / 2
+    height = min(model.height for model in config.objects.values()) / 2
     points = [(x, y, height) for x in xs for y in ys]
     hit_bodies = {hit[0] for hit in world.client.rayTestBatch(points, [tuple(camera_position)] * len(points))}
     return next((name for name, body in world.bin_bodies.items() if body in hit_bodies), None)

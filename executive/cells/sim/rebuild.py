@@ -96,13 +96,9 @@ class WorldRebuilder:
             world.place_object(int(numbers[0]), Pose.of(numbers[1:4], numbers[4:]))
         elif kind == command_log.REMOVE:
             world.remove_object(int(numbers[0]))
-        elif kind == command_log.VACUUM_ON:
-            tool.close()
-        elif kind == command_log.VACUUM_OFF:
-            tool.open()
         else:
-            assert kind == command_log.SEAL_BREAK
-            tool.break_seal()
+            actions = {command_log.VACUUM_ON: tool.close, command_log.VACUUM_OFF: tool.open}
+            actions.get(kind, tool.break_seal)()
 
 
 def rebuild_world(world: World, tool: SuctionTool, commands: Iterable[Command]) -> InterruptedState:

@@ -19,11 +19,11 @@ class RobotModel:
         flange_offset: Distance from the origin of the flange link to the flange along the link's z axis [m].
         max_torques: Maximum torque of each joint [Nm].
         first_moving_link: Index of the first link that can approach other bodies.
-        wrist_link: Index of the first link that a held object may touch, because the object hangs there.
+        wrist_link: Index of the first link that a held object may touch.
         self_collision_pairs: Pairs of indices of links that can collide with each other.
         link_radius: Radius of a cylinder around the housing of each link [m].
-        forward_pose_deg: Positions of the joints after the first, from which the numerical inverse kinematics
-            finds a solution for every position on the table [degree].
+        forward_pose_deg: Positions of the joints except the first [degree] at the start of the numerical
+            inverse kinematics.
     """
 
     flange_link: str

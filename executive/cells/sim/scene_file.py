@@ -10,9 +10,9 @@ from pydantic import AfterValidator, Field
 
 from executive.cell.config import CameraConfig, CellConfig, Colour, NoiseConfig, Section
 from executive.cell.config.section import Fraction, Natural, check_ascending
-from executive.cells.sim.arrangements import DAMAGED_MODEL, UNKNOWN_MODEL_COUNT
+from executive.cells.sim.arrangements import DAMAGED_MODEL_NUMBER, UNKNOWN_MODEL_COUNT
 from executive.cells.sim.camera import Light
-from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN, TEXTURES, WOOD
+from executive.cells.sim.table_top import PATTERN_COUNT, PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, make_error, sort_findings, suggest_choice
 from executive.mission.parse.validate import find_span, validate
@@ -21,40 +21,29 @@ from executive.mission.text.yaml_text import YamlNode, parse_yaml
 from executive.perception.camera_model import compute_calibration, compute_field_of_view
 
 ANY_CLASS = "any"
-"""Key in `objects` of the section for all classes without a section of their own."""
+"""Key in `objects` of the section for all other classes."""
 MAX_FOV_DEG = 178.0
 """Maximum vertical field of view of a camera [degree]."""
 
 
 def check_texture(name: str) -> str:
-    """Return the name of a texture unchanged.
-
-    Raises:
-        ValueError: There is no such texture.
-    """
+    """Return the name of a texture, or raise `ValueError` for an unknown name."""
     if name not in TEXTURES:
-        choices = f'"{WOOD}", "{PLAIN}", or "pattern 0" to "pattern {PATTERN_COUNT - 1}"'
+        choices = f'"{WOOD_TEXTURE}", "{PLAIN_TEXTURE}", or "pattern 0" to "pattern {PATTERN_COUNT - 1}"'
         raise ValueError(f'must be {choices}, not "{name}"')
     return name
 
 
 def check_model_range(numbers: tuple[int, int]) -> tuple[int, int]:
-    """Return first and last number of a range of models unchanged.
-
-    Raises:
-        ValueError: The range contains only the damaged model.
-    """
-    if numbers == (DAMAGED_MODEL, DAMAGED_MODEL):
-        raise ValueError(f"contains only number {DAMAGED_MODEL}, whose mesh is damaged; name a wider range")
+    """Return a range of model numbers, or raise `ValueError` if it contains only the damaged model."""
+    if set(numbers) == {DAMAGED_MODEL_NUMBER}:
+        message = f"contains only number {DAMAGED_MODEL_NUMBER}, whose mesh is damaged; name a wider range"
+        raise ValueError(message)
     return numbers
 
 
 def check_palette(colours: tuple[Colour, ...]) -> tuple[Colour, ...]:
-    """Return the colours of a palette unchanged.
-
-    Raises:
-        ValueError: The palette has no colour.
-    """
+    """Return the colours of a palette, or raise `ValueError` if there is no colour."""
     if not colours:
         raise ValueError("needs at least one colour [r, g, b], each 0 to 1")
     return colours
@@ -82,7 +71,7 @@ class SceneTableConfig(Section):
 
     colour: Colour = (1.0, 1.0, 1.0)
     """Factors on the texture: r, g, b, each 0 to 1."""
-    texture: Annotated[str, AfterValidator(check_texture)] = WOOD
+    texture: Annotated[str, AfterValidator(check_texture)] = WOOD_TEXTURE
     """`wood`, `plain` (white), or a generated texture, `pattern 0` to `pattern 23`."""
     objects: CountRange | None = None
     """Minimum and maximum number of objects of the cell's classes; by default as in the cell file."""
@@ -179,14 +168,14 @@ def load_scene(path: Path | None, config: CellConfig) -> SceneConfig:
     if root is None:
         raise MissionError(sort_findings(findings, source.path))
     scene, validation_errors = validate(root, SceneConfig)
-    mismatches = () if scene is None else _find_mismatches(scene, root, config)
-    all_findings = (*findings, *validation_errors, *mismatches)
+    cell_findings = () if scene is None else _find_cell_findings(scene, root, config)
+    all_findings = (*findings, *validation_errors, *cell_findings)
     if scene is None or all_findings:
         raise MissionError(sort_findings(all_findings, source.path))
     return scene
 
 
-def _find_mismatches(scene: SceneConfig, root: YamlNode, config: CellConfig) -> Iterator[Finding]:
+def _find_cell_findings(scene: SceneConfig, root: YamlNode, config: CellConfig) -> Iterator[Finding]:
     """Yield a finding for every value of a scene that the cell does not allow."""
     for label in scene.objects:
         if label not in (ANY_CLASS, *config.objects):
@@ -205,10 +194,10 @@ def _find_mismatches(scene: SceneConfig, root: YamlNode, config: CellConfig) -> 
 
 def _check_field_of_view(scene: SceneConfig, root: YamlNode, camera: CameraConfig) -> Iterator[Finding]:
     """Yield a finding if the field of view of the camera in the scene exceeds `MAX_FOV_DEG`."""
-    declared = compute_field_of_view(compute_calibration(camera)[0], camera.height)
-    if declared * scene.camera.fov_factor > MAX_FOV_DEG:
+    declared_fov = compute_field_of_view(compute_calibration(camera)[0], camera.height)
+    if declared_fov * scene.camera.fov_factor > MAX_FOV_DEG:
         yield make_error(
             find_span(root, ("camera", "fov_factor")), "out-of-range",
-            f"camera.fov_factor must be at most {MAX_FOV_DEG / declared:.2f}, because the declared field of "
-            f"view is {declared:.1f} degrees, and no lens has more than {MAX_FOV_DEG:g}",
+            f"camera.fov_factor must be at most {MAX_FOV_DEG / declared_fov:.2f}, because the declared field "
+            f"of view is {declared_fov:.1f} degrees, and no lens has more than {MAX_FOV_DEG:g}",
         )  # fmt: skip

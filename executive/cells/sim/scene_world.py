@@ -1,4 +1,4 @@
-"""Application of a scene file to the simulated world: cell, lamp, table and unknown objects."""
+"""Changes of a scene file to the simulated world: cell, lamp, table and unknown objects."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, ObjectConfig, TransformConfig
 from executive.cell.config.cameras import POSE_AND_FOV_KEYS
-from executive.cells.sim.arrangements import DAMAGED_MODEL, load_unknown_model, scale_model
+from executive.cells.sim.arrangements import DAMAGED_MODEL_NUMBER, load_unknown_model, scale_model
 from executive.cells.sim.camera import Light
 from executive.cells.sim.scene_file import (
     ANY_CLASS,
@@ -18,7 +18,7 @@ from executive.cells.sim.scene_file import (
     SceneObjectConfig,
     UnknownConfig,
 )
-from executive.cells.sim.table_top import WOOD
+from executive.cells.sim.table_top import WOOD_TEXTURE
 from executive.cells.sim.world import World
 from executive.geometry import Pose
 from executive.perception.camera_model import (
@@ -29,7 +29,7 @@ from executive.perception.camera_model import (
 )
 
 
-def make_true_config(config: CellConfig, scene: SceneConfig) -> CellConfig:
+def apply_scene(config: CellConfig, scene: SceneConfig) -> CellConfig:
     """Return the cell configuration with the objects, the table and the camera of a scene."""
     settings = {key: getattr(scene.table, key) for key in ("objects", "gap", "stacked")}
     table = {key: value for key, value in settings.items() if value is not None}
@@ -54,7 +54,7 @@ def build_light(light: LightConfig) -> Light:
 
 def paint_table(world: World, scene: SceneConfig) -> None:
     """Give the table of a world the colour and the texture of a scene."""
-    if (scene.table.colour, scene.table.texture) != ((1.0, 1.0, 1.0), WOOD):
+    if (scene.table.colour, scene.table.texture) != ((1.0, 1.0, 1.0), WOOD_TEXTURE):
         world.table_top.paint(scene.table.colour, scene.table.texture)
 
 
@@ -63,36 +63,36 @@ def draw_unknown_models(unknown: UnknownConfig | None, rng: np.random.Generator)
     if unknown is None:
         return []
     first, last = unknown.models
-    numbers = [number for number in range(first, last + 1) if number != DAMAGED_MODEL]
+    numbers = [number for number in range(first, last + 1) if number != DAMAGED_MODEL_NUMBER]
     count = int(rng.integers(*unknown.count, endpoint=True))
     models = [load_unknown_model(int(number)) for number in rng.choice(numbers, count)]
     colours = {"colours": unknown.colours}
     return [scale_model(model, unknown.scale).model_copy(update=colours) for model in models]
 
 
-def _change_object(model: ObjectConfig, change: SceneObjectConfig | None) -> ObjectConfig:
+def _change_object(model: ObjectConfig, section: SceneObjectConfig | None) -> ObjectConfig:
     """Return an object class with the colours and the size of a scene."""
-    if change is None:
+    if section is None:
         return model
-    colours = change.colours or model.colours
+    colours = section.colours or model.colours
     if len(colours) == 1:
-        # The number of colours is kept, because it determines which random numbers the later choices get.
+        # The number of colours stays, because each later random choice depends on it.
         colours *= len(model.colours)
-    return scale_model(model, change.scale).model_copy(update={"colours": colours})
+    return scale_model(model, section.scale).model_copy(update={"colours": colours})
 
 
-def _change_camera(camera: CameraConfig, error: SceneCameraConfig) -> CameraConfig:
-    """Return a camera with the errors of a scene; its pose and intrinsics are given as a calibration."""
-    if error.noise is not None:
-        camera = camera.model_copy(update={"noise": error.noise})
-    if not any((*error.shift, *error.turn_deg, *error.orbit_deg)) and error.fov_factor == 1:
+def _change_camera(camera: CameraConfig, section: SceneCameraConfig) -> CameraConfig:
+    """Return a camera with the errors of a scene, with pose and intrinsics as a calibration."""
+    if section.noise is not None:
+        camera = camera.model_copy(update={"noise": section.noise})
+    if not any((*section.shift, *section.turn_deg, *section.orbit_deg)) and section.fov_factor == 1:
         return camera
     matrix, X_MC = compute_calibration(camera)
-    if any(error.orbit_deg):
+    if any(section.orbit_deg):
         centre = intersect_plane(matrix, X_MC, matrix[:2, 2], 0.0)
-        X_MC = Pose.of(centre) @ _make_rotation(error.orbit_deg) @ Pose.of(-centre) @ X_MC
-    X_MC = Pose.of(error.shift) @ X_MC @ _make_rotation(error.turn_deg)
-    fov = compute_field_of_view(matrix, camera.height) * error.fov_factor
+        X_MC = Pose.of(centre) @ _make_rotation(section.orbit_deg) @ Pose.of(-centre) @ X_MC
+    X_MC = Pose.of(section.shift) @ X_MC @ _make_rotation(section.turn_deg)
+    fov = compute_field_of_view(matrix, camera.height) * section.fov_factor
     factor = compute_camera_matrix(camera.width, camera.height, fov)[1, 1] / matrix[1, 1]
     (fx, fy), (cx, cy) = factor * matrix.diagonal()[:2], matrix[:2, 2] - 0.5
     pose = TransformConfig(rotation=tuple(X_MC.rotation_vector), translation=tuple(X_MC.position))

@@ -1,7 +1,7 @@
 """Random labelled scenes of a cell, for the training and the evaluation of detectors.
 
-A sample depends only on cell file, camera and seed. Labels are amodal and have subpixel accuracy: the box of
-an object is that of its whole silhouette, computed from the mesh, including occluded parts.
+A sample depends only on cell file, camera and seed. Labels are amodal with subpixel accuracy: the box of an
+object contains the whole silhouette of the mesh, including occluded parts.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.config import CellConfig, NoiseConfig
+from executive.cell.config import CellConfig
 from executive.cell.frame import Box
 from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim import arrangements, variations
@@ -23,6 +23,7 @@ from executive.cells.sim.camera import (
     CELL_LIGHT,
     Image,
     Region,
+    RenderedImage,
     add_depth_noise,
     add_noise,
     get_camera_pose,
@@ -30,27 +31,25 @@ from executive.cells.sim.camera import (
 )
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig
-from executive.cells.sim.scene_world import build_light, make_true_config, paint_table
+from executive.cells.sim.scene_world import apply_scene, build_light, paint_table
 from executive.cells.sim.silhouette import compute_bounding_box, compute_visible_fraction
 from executive.cells.sim.spawn import spawn_objects
-from executive.cells.sim.table_top import WOOD
+from executive.cells.sim.table_top import WOOD_TEXTURE
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
 
 BLACK = (0.0, 0.0, 0.0)
-"""Colour of objects whose colour is not used."""
+"""Placeholder for an unused colour."""
 IMAGE_SIZE = 256
 """Side of the image of a sample, as a detector gets it [pixel]."""
-MIN_LABELLED_FRACTION = 0.5
-"""Minimum visible fraction of the silhouette of a labelled object."""
-MIN_VISIBLE_FRACTION = 0.15
-"""Visible fraction below which an object counts as background; between both minima, an object is ignored."""
+MIN_VISIBLE_FRACTION, MIN_LABELLED_FRACTION = 0.15, 0.5
+"""Minimum visible fractions of the silhouettes of half occluded objects and of labelled objects."""
 MAX_HALF_OCCLUDED_FRACTION = 1 / 6
-"""Maximum fraction of the objects with a visible fraction between both minima; one such object is allowed."""
+"""Maximum fraction of half occluded objects in a scene with several half occluded objects."""
 MAX_ATTEMPTS = 50
-"""Number of random scenes after which a lack of room for the objects is an error."""
+"""Maximum number of random scenes for a sample if the objects find no room."""
 DECLARED_FRACTION = 0.2
 """Fraction of the scenes with table, lamp, camera and noise as in the cell file."""
 MIN_CONTRAST = 5
@@ -66,13 +65,13 @@ class Sample:
         labels: Classes of the `N` labelled objects.
         boxes: Boxes of the labelled objects `(N, 4)` [pixel], clipped to `image`.
         visible_fraction: Visible fraction of each labelled object `(N,)`, 0 to 1.
-        positions: Points in the world `(N, 3)` [m] at which the ray through the centre of the box of the
-            silhouette has the height of the object's centre: the result of localization without any error.
+        positions: Positions `(N, 3)` [m] of the objects in the world from a localization without errors: the
+            ray through the centre of the whole box, at the height of the centre of the object.
         centres: Centres of the bounding boxes of the labelled objects in the world `(N, 3)` [m].
         ignored: Boxes `(M, 4)` [pixel] of objects that are neither labelled nor background.
         region: Region of the camera image that `image` shows.
-        matrix: Camera matrix of the camera image; for an initial scene, that of the cell file.
-        X_WC: Pose of the camera; for an initial scene, that of the cell file.
+        matrix: Camera matrix `(3, 3)` [pixel]; for an initial scene, the matrix of the cell file.
+        X_WC: Pose of the camera; for an initial scene, the pose of the cell file.
         frame: Camera image of an initial scene `(H, W, 3)`; None for a random scene.
         depth: Depth image of an initial scene `(H, W)` [m]; None without a depth sensor.
         second_frame: Camera image of an initial scene `(H, W, 3)` with different noise.
@@ -93,52 +92,31 @@ class Sample:
     second_frame: Image | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class RenderedRegion:
-    """A region of a camera image without noise.
-
-    Attributes:
-        image: Image of the region `(H, W, 3)` uint8, RGB.
-        bodies: Visible body at each pixel `(H, W)`, -1 for none.
-        region: The region of the camera image.
-        matrix: Camera matrix of the camera image.
-        X_WC: Pose of the camera.
-        noise: Noise that determines the minimum contrast of a labelled object.
-    """
-
-    image: Image
-    bodies: NDArray[np.int32]
-    region: Region
-    matrix: Array
-    X_WC: Pose
-    noise: NoiseConfig
-
-
 class SceneRenderer:
     """Renders samples of one camera of a cell.
 
     Args:
         config: The cell file.
         camera: Name of the camera.
-        randomized: True for random scenes, whose variation exceeds that of runs, for training. False for
-            initial scenes of runs, with the arm in a scan pose.
+        is_random: True for random scenes, which vary more than runs, for training. False for initial scenes
+            of runs, with the arm in a scan pose.
         scene: Changes to initial scenes of runs.
     """
 
     def __init__(
-        self, config: CellConfig, camera: str, *, randomized: bool = True, scene: SceneConfig = DECLARED_SCENE
+        self, config: CellConfig, camera: str, *, is_random: bool = True, scene: SceneConfig = DECLARED_SCENE
     ) -> None:
-        self._randomized = randomized
+        self._is_random = is_random
         self._scene = scene
         self._declared_camera = config.cameras[camera]
-        self._config = make_true_config(config, scene)
+        self._config = apply_scene(config, scene)
         self._camera = self._config.cameras[camera]
         self._world = World(self._config)
         paint_table(self._world, scene)
         self._matrix, _ = compute_calibration(self._camera)
 
     def render_sample(self, seed: int) -> Sample:
-        """Return the sample of a seed: its first random scene without too many half occluded objects.
+        """Return the sample of a seed: the first scene of the seed with few half occluded objects.
 
         Raises:
             InputError: The workspace has no room for the objects.
@@ -148,14 +126,13 @@ class SceneRenderer:
             rng = np.random.default_rng([seed, attempt])
             attempt += 1
             try:
-                sample = self._render_random(rng) if self._randomized else self._render_initial(rng)
+                sample = self._render_random(rng) if self._is_random else self._render_initial(rng)
+                if sample is not None:
+                    return sample
             except InputError:
-                # Whether the objects of a random scene fit into the workspace depends on chance.
+                # Whether the objects of a random scene find room in the workspace depends on chance.
                 if attempt == MAX_ATTEMPTS:
                     raise
-                continue
-            if sample is not None:
-                return sample
 
     def close(self) -> None:
         """Close the world; the renderer cannot be used afterwards."""
@@ -166,25 +143,25 @@ class SceneRenderer:
         world = self._world
         is_holding = arrangements.move_arm_randomly(world, self._camera, rng)
         matrix, X_WC = self._matrix, get_camera_pose(world, self._camera)
-        (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD), CELL_LIGHT, self._camera.noise
+        (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD_TEXTURE), CELL_LIGHT, self._camera.noise
         if rng.random() >= DECLARED_FRACTION:
             matrix, X_WC = variations.draw_camera(self._camera, matrix, X_WC, rng)
             (colour, texture), light = variations.draw_table_appearance(rng), variations.draw_light(rng)
             noise = variations.draw_noise(noise, rng)
         region = arrangements.draw_region(self._camera, rng)
-        table = colour if texture != WOOD else tuple(np.multiply(colour, variations.WOOD_COLOUR).tolist())
+        wood_colour = tuple(np.multiply(colour, variations.WOOD_COLOUR).tolist())
+        table_colour = wood_colour if texture == WOOD_TEXTURE else colour
         corners = [(x, y) for x in region[::2] for y in region[1::2]]
         footprint = np.array([intersect_plane(matrix, X_WC, corner, 0.0)[:2] for corner in corners])
         shows_table = region == self._camera.table_view
-        drawn = arrangements.draw_arrangement(self._config, footprint, shows_table, table, rng)
+        objects = arrangements.draw_arrangement(self._config, footprint, shows_table, table_colour, rng)
         if is_holding:
-            drawn.append(arrangements.draw_held_object(world.get_tool_pose(), self._config, rng))
-        objects = {world.add_object(one.label, one.X_WO, one.colour, one.model): one for one in drawn}
-        with _remove_at_end(world, objects):
+            objects.append(arrangements.draw_held_object(world.get_tool_pose(), self._config, rng))
+        objects_by_body = {world.add_object(o.label, o.X_WO, o.colour, o.model): o for o in objects}
+        with _remove_at_end(world, objects_by_body):
             world.table_top.paint(colour, texture)
             rendered = render(world, matrix, X_WC, region, light)
-        shown = RenderedRegion(rendered.image, rendered.bodies, region, matrix, X_WC, noise)
-        sample = self._label(shown, objects)
+        sample = _build_sample(rendered, MIN_CONTRAST * noise.read, objects_by_body)
         if sample is None:
             return None
         return replace(sample, image=_resize(add_noise(rendered.image, noise, rng)))
@@ -209,59 +186,70 @@ class SceneRenderer:
         depth = None if camera.depth is None else add_depth_noise(rendered.depth, camera.depth, rng)
         second_frame = add_noise(rendered.image, camera.noise, rng)
         left, top, right, bottom = region = camera.table_view
-        image, visible = rendered.image[top:bottom, left:right], rendered.bodies[top:bottom, left:right]
-        # The minimum contrast follows from the declared noise, so that more noise does not reduce the labels.
-        noise = self._declared_camera.noise
-        shown = RenderedRegion(image, visible, region, self._matrix, X_WC, noise)
-        sample = self._label(shown, objects)
+        pixels = np.s_[top:bottom, left:right]
+        shown = replace(rendered, image=rendered.image[pixels], bodies=rendered.bodies[pixels], region=region)
+        # The minimum contrast depends on the declared noise, so that more noise does not reduce the labels.
+        sample = _build_sample(shown, MIN_CONTRAST * self._declared_camera.noise.read, objects)
         if sample is None:
             return None
         # A run uses the declared matrix and pose, even if the scene has errors of the camera.
         sample = replace(sample, matrix=compute_calibration(self._declared_camera)[0], X_WC=declared_X_WC)
-        image = _resize(frame[top:bottom, left:right])
+        image = _resize(frame[pixels])
         return replace(sample, image=image, frame=frame, depth=depth, second_frame=second_frame)
 
-    def _label(self, shown: RenderedRegion, objects: Mapping[int, SceneObject]) -> Sample | None:
-        """Return the labelled region, or None if too many of the objects, by body, are half occluded."""
-        labelled: list[tuple[str, list[float], float, Array, Array]] = []
-        ignored, half_occluded_count = [], 0
-        corner = np.array(shown.region[:2], dtype=float)
-        scale = IMAGE_SIZE / (shown.region[2] - shown.region[0])
-        for body, scene_object in objects.items():
-            mask = shown.bodies == body
-            if scene_object.label == UNKNOWN_LABEL or not mask.any():
-                continue
-            mesh = load_mesh(scene_object.model)
-            vertices = scene_object.X_WO.apply(mesh.vertices)
-            pixels = project(shown.matrix, shown.X_WC, vertices)
-            fraction = compute_visible_fraction(mesh, pixels, mask)
-            whole_box = compute_bounding_box(pixels)
-            box = _transform_box(whole_box, corner, scale)
-            if fraction < MIN_VISIBLE_FRACTION:
-                continue
-            is_half_occluded = fraction < MIN_LABELLED_FRACTION
-            half_occluded_count += is_half_occluded
-            if is_half_occluded or measure_contrast(shown.image, mask) < MIN_CONTRAST * shown.noise.read:
-                ignored.append(box)
-                continue
-            centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-            pixel = ((whole_box[0] + whole_box[2]) / 2, (whole_box[1] + whole_box[3]) / 2)
-            position = intersect_plane(shown.matrix, shown.X_WC, pixel, float(centre[2]))
-            labelled.append((scene_object.label, box, fraction, position, centre))
-        if half_occluded_count > max(1, len(objects) * MAX_HALF_OCCLUDED_FRACTION):
-            return None
-        return Sample(
-            image=shown.image,
-            labels=tuple(label for label, *_ in labelled),
-            boxes=np.array([box for _, box, *_ in labelled]).reshape(-1, 4),
-            visible_fraction=np.array([fraction for *_, fraction, _, _ in labelled]),
-            positions=np.array([position for *_, position, _ in labelled]).reshape(-1, 3),
-            centres=np.array([centre for *_, centre in labelled]).reshape(-1, 3),
-            ignored=np.array(ignored).reshape(-1, 4),
-            region=shown.region,
-            matrix=shown.matrix,
-            X_WC=shown.X_WC,
-        )
+
+def _build_sample(
+    rendered: RenderedImage, min_contrast: float, objects: Mapping[int, SceneObject]
+) -> Sample | None:
+    """Return a sample without noise, or None if too many objects are half occluded.
+
+    Args:
+        rendered: The rendered region, whose image becomes the image of the sample.
+        min_contrast: Minimum contrast of a labelled object [grey level].
+        objects: The objects of the scene, by body.
+    """
+    labels, boxes, fractions, positions, centres = [], [], [], [], []
+    ignored, half_occluded_count = [], 0
+    corner = np.array(rendered.region[:2], dtype=float)
+    scale = IMAGE_SIZE / (rendered.region[2] - rendered.region[0])
+    for body, scene_object in objects.items():
+        mask = rendered.bodies == body
+        if scene_object.label == UNKNOWN_LABEL or not mask.any():
+            continue
+        mesh = load_mesh(scene_object.model)
+        vertices = scene_object.X_WO.apply(mesh.vertices)
+        pixels = project(rendered.matrix, rendered.X_WC, vertices)
+        fraction = compute_visible_fraction(mesh, pixels, mask)
+        whole_box = compute_bounding_box(pixels)
+        box = _transform_box(whole_box, corner, scale)
+        if fraction < MIN_VISIBLE_FRACTION:
+            continue
+        is_half_occluded = fraction < MIN_LABELLED_FRACTION
+        half_occluded_count += is_half_occluded
+        if is_half_occluded or measure_contrast(rendered.image, mask) < min_contrast:
+            ignored.append(box)
+            continue
+        centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        pixel = ((whole_box[0] + whole_box[2]) / 2, (whole_box[1] + whole_box[3]) / 2)
+        labels.append(scene_object.label)
+        boxes.append(box)
+        fractions.append(fraction)
+        positions.append(intersect_plane(rendered.matrix, rendered.X_WC, pixel, float(centre[2])))
+        centres.append(centre)
+    if half_occluded_count > max(1, len(objects) * MAX_HALF_OCCLUDED_FRACTION):
+        return None
+    return Sample(
+        image=rendered.image,
+        labels=tuple(labels),
+        boxes=np.array(boxes).reshape(-1, 4),
+        visible_fraction=np.array(fractions),
+        positions=np.array(positions).reshape(-1, 3),
+        centres=np.array(centres).reshape(-1, 3),
+        ignored=np.array(ignored).reshape(-1, 4),
+        region=rendered.region,
+        matrix=rendered.matrix,
+        X_WC=rendered.X_WC,
+    )
 
 
 @contextmanager

@@ -33,12 +33,12 @@ def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
     return float(mask.sum()) / SUBPIXEL_COUNT**2
 
 
-def compute_visible_fraction(mesh: Mesh, pixels: Array, visible: NDArray[np.bool_]) -> float:
-    """Return the fraction (0 to 1) of the silhouette of a mesh that the mask `visible` `(H, W)` contains."""
-    return min(1.0, float(visible.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))
+def compute_visible_fraction(mesh: Mesh, pixels: Array, visible_mask: NDArray[np.bool_]) -> float:
+    """Return the fraction (0 to 1) of the silhouette of a mesh that `visible_mask` `(H, W)` contains."""
+    return min(1.0, float(visible_mask.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))
 
 
 def _select_front_faces(triangles: Array) -> Array:
-    """Return the projected triangles `(M, 3, 2)` of one winding, which cover the silhouette of the mesh."""
+    """Return the projected triangles `(M, 3, 2)` with clockwise corners, which cover the whole silhouette."""
     (ax, ay), (bx, by) = (triangles[:, 1] - triangles[:, 0]).T, (triangles[:, 2] - triangles[:, 0]).T
     return np.asarray(triangles[ax * by - ay * bx > 0])

@@ -13,27 +13,27 @@ from executive.cell.workcell import KeyPath
 from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, UnknownConfig
-from executive.cells.sim.scene_world import draw_unknown_models, make_true_config, paint_table
+from executive.cells.sim.scene_world import apply_scene, draw_unknown_models, paint_table
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.geometry import Array, Pose, rotate_about_z
 
 MAX_POSITION_ATTEMPTS = 2000
 """Number of random positions for one set of objects after which the workspace counts as too small."""
-LAYOUT_COUNT = 5
+OBJECT_SET_COUNT = 5
 """Number of random sets of objects for which `find_lack_of_room` tries to find positions."""
 DROP_HEIGHT = 0.002
 """Height above its support at which an object is released [m]."""
 MAX_REST_SPEED = 0.002
 """Speed below which an object counts as at rest [m/s]."""
 MIN_SETTLING_STEPS, MAX_SETTLING_STEPS = 60, 480
-"""Minimum and maximum number of physics steps until rest; falling objects are slow in the first steps."""
+"""Minimum and maximum number of physics steps until rest; released objects are slow in the first steps."""
 MAX_STACK_OFFSET = 0.004
 """Maximum offset between the axes of two stacked objects, along x and y [m]."""
 PUSH_SPEED = 0.1
 """Horizontal speed given to an upper object to test a stack [m/s]; a stable object stops within 1 mm."""
 MAX_DISPLACEMENT = 0.005
-"""Distance from its goal up to which an object counts as not moved [m]."""
+"""Maximum distance from the goal of an object of a stable stack [m]."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def build_initial_world(
     Raises:
         InputError: The workspace has no room for the objects.
     """
-    world = World(make_true_config(config, scene), gui=gui)
+    world = World(apply_scene(config, scene), gui=gui)
     paint_table(world, scene)
     spawn_objects(world, world.config, PartSeeds.of(seed).objects, unknown=scene.unknown)
     world.rest_positions.clear()
@@ -114,9 +114,9 @@ def spawn_objects(
 
 
 def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message if none of `LAYOUT_COUNT` random sets of the maximum size fits the workspace."""
+    """Yield key and message if all random sets with the maximum number of objects find no room."""
     message = ""
-    for seed in range(LAYOUT_COUNT):
+    for seed in range(OBJECT_SET_COUNT):
         rng = np.random.default_rng(seed)
         labels = [str(label) for label in rng.choice(list(config.objects), config.table.objects[1])]
         try:
@@ -151,7 +151,8 @@ def _draw_positions(config: CellConfig, radii: Sequence[float], rng: np.random.G
         if len(positions) == len(radii):
             return positions
         position, radius = rng.uniform(low, high), radii[len(positions)]
-        gaps = [np.linalg.norm(position - p) - radius - r for p, r in zip(positions, radii, strict=False)]
+        circles = zip(positions, radii, strict=False)
+        gaps = [np.linalg.norm(position - centre) - radius - other_radius for centre, other_radius in circles]
         if min(gaps, default=math.inf) >= config.table.gap:
             positions.append(position)
         elif rng.random() < 0.02:
@@ -164,15 +165,15 @@ def _draw_positions(config: CellConfig, radii: Sequence[float], rng: np.random.G
 
 
 def _stack_objects(world: World, bodies: Sequence[int], probability: float, rng: np.random.Generator) -> None:
-    """Put random objects on others, in stacks of two, and undo the unstable stacks.
+    """Put random objects on others, in stacks of two.
 
-    A simulation tests each stack: if the upper object falls, with or without a push, all objects return to
-    their poses. Balls are therefore never stacked.
+    A simulation tests each stack, first without and then with a push. If the upper object falls, all objects
+    return to their previous poses. Balls are therefore never stacked.
 
     Args:
         world: The world with the objects at rest.
         bodies: The objects.
-        probability: Probability with which an object is put on another one, 0 to 1.
+        probability: Probability of a stack for each object, 0 to 1.
         rng: Random number generator.
     """
     unstacked = set(bodies)
@@ -188,10 +189,11 @@ def _stack_objects(world: World, bodies: Sequence[int], probability: float, rng:
 def _try_stack(world: World, upper: int, lower: int, rng: np.random.Generator) -> bool:
     """Put one object on another and return True if the stack is stable; otherwise restore all poses."""
     initial_poses = {body: world.get_object_pose(body) for body in world.labels}
-    base = initial_poses[lower].position
+    lower_position = initial_poses[lower].position
     lower_mesh, upper_mesh = (load_mesh(world.models[body]) for body in (lower, upper))
-    height = base[2] + lower_mesh.top - upper_mesh.bottom + DROP_HEIGHT
-    position = np.array([*(base[:2] + rng.uniform(-MAX_STACK_OFFSET, MAX_STACK_OFFSET, 2)), height])
+    height = lower_position[2] + lower_mesh.top - upper_mesh.bottom + DROP_HEIGHT
+    offset = rng.uniform(-MAX_STACK_OFFSET, MAX_STACK_OFFSET, 2)
+    position = np.array([*(lower_position[:2] + offset), height])
     goals = {**initial_poses, upper: Pose(rotate_about_z(rng.uniform(0, math.tau)), position)}
     world.place_object(upper, goals[upper])
     _step_until_rest(world, list(goals), lambda: _has_moved(world, goals))
@@ -215,11 +217,11 @@ def _has_moved(world: World, goals: Mapping[int, Pose]) -> bool:
 
 
 def _step_until_rest(
-    world: World, bodies: Sequence[int], is_done: Callable[[], bool] = lambda: False
+    world: World, bodies: Sequence[int], must_end: Callable[[], bool] = lambda: False
 ) -> None:
-    """Step until all bodies are at rest or `is_done` returns True, at most `MAX_SETTLING_STEPS` times."""
+    """Step until all bodies are at rest or `must_end` returns True, at most `MAX_SETTLING_STEPS` times."""
     for step in range(MAX_SETTLING_STEPS):
         world.step()
         speeds = [np.linalg.norm(world.client.getBaseVelocity(body)[0]) for body in bodies]
-        if (step >= MIN_SETTLING_STEPS and max(speeds, default=0.0) < MAX_REST_SPEED) or is_done():
+        if (step >= MIN_SETTLING_STEPS and max(speeds, default=0.0) < MAX_REST_SPEED) or must_end():
             return

@@ -14,7 +14,7 @@ from executive.cell.config import ToolConfig
 from executive.geometry import Array, Pose
 
 RIM_RAY_COUNT = 16
-"""Number of rays on the rim of the cup; a ring at half the radius has half as many; the centre has one."""
+"""Number of rays on the rim of the cup; the ring at half the radius has half of this number of rays."""
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class CupContact:
     Attributes:
         body: Nearest body under the cup.
         distance: Distance from the face of the cup to the nearest point of the body, along the tool axis [m].
-        gap: Maximum distance between rim and surface [m] if the cup touches the surface and its bellows has
-            tilted with the surface; infinite if a part of the cup is not over the body.
-        tilt: Angle between the tool axis and the normal of the plane fitted to the surface under the
-            cup [rad]; the bellows tilts by this angle.
+        gap: Maximum distance between rim and surface [m] after the cup has touched and the bellows has
+            tilted; infinite if a part of the cup is not over the body.
+        tilt: Tilt of the bellows [rad]: the angle between the tool axis and the normal of the plane that is
+            fitted to the surface under the cup.
     """
 
     body: int
@@ -43,7 +43,7 @@ def measure_contact(
 
     Rays along the tool axis hit the collision shapes of `bodies` and pass through all other bodies. They
     start at the distance `reach` behind the lip, because a cup in contact penetrates the surface a little.
-    They end `reach` plus the diameter of the cup in front of the lip; no lip seals on slopes over 45 deg.
+    They end `reach` plus the diameter of the cup in front of the lip, enough for slopes up to 45°.
 
     Args:
         client: The pybullet client of the bodies.
@@ -54,11 +54,12 @@ def measure_contact(
     """
     face_points = _sample_face(cup_radius)
     hit_bodies, distances = _cast_rays(client, X_WT, bodies, face_points, reach, reach + 2 * cup_radius)
-    nearest = int(np.argmin(distances))
-    if not math.isfinite(distances[nearest]):
+    nearest_ray = int(np.argmin(distances))
+    if not math.isfinite(distances[nearest_ray]):
         return None
-    body = int(hit_bodies[nearest])
+    body = int(hit_bodies[nearest_ray])
     is_hit = hit_bodies == body
+    # Least-squares fit of the plane z = slope_x x + slope_y y + offset, in the axes of the tool.
     points = np.column_stack([face_points[is_hit], np.ones(np.count_nonzero(is_hit))])
     (slope_x, slope_y, offset), *_ = np.linalg.lstsq(points, distances[is_hit], rcond=None)
     tilt = math.atan(math.hypot(slope_x, slope_y))
@@ -66,18 +67,17 @@ def measure_contact(
     if is_hit.all():
         residuals = (distances - points @ (slope_x, slope_y, offset)) * math.cos(tilt)
         gap = float(residuals[-RIM_RAY_COUNT:].max() - residuals.min())
-    return CupContact(body, float(distances[nearest]), gap, tilt)
+    return CupContact(body, float(distances[nearest_ray]), gap, tilt)
 
 
 def compute_breakaway_force(contact: CupContact | None, tool: ToolConfig) -> float:
     """Return the pull at which the seal of a contact breaks [N]; 0 if no seal forms.
 
     The force is `force * (1 - gap / gap_max) * (1 - tilt / tilt_max)`, clipped at zero, where `force` is
-    vacuum times lip area. The compliant lip bridges a gap; its contact pressure falls and its leak grows in
-    proportion to its deflection, and at `gap_max` the pressure is zero. The bellows bends to compensate a
-    tilt, which loads one side of the lip and peels the other. Both are first-order terms of independent
-    causes, hence linear and multiplied; manufacturers publish only the two ends (full force on a flat
-    surface, largest bend). The force is continuous: a slightly worse grasp is slightly weaker.
+    vacuum times lip area. The compliant lip bridges a gap; the contact pressure of the lip falls with the
+    deflection and is zero at `gap_max`. The bellows compensates a tilt, which loads one side of the lip and
+    peels the other side. Gap and tilt are independent causes, so the factors are multiplied. The factors are
+    linear, because manufacturers publish only the full force and the maximum tilt.
     """
     if contact is None or contact.distance > tool.reach:
         return 0.0
@@ -111,15 +111,16 @@ def _cast_rays(
     starts = X_WT.apply(np.column_stack([face_points, np.full(count, -start)]))
     ends = X_WT.apply(np.column_stack([face_points, np.full(count, end)]))
     pending = np.arange(count)
-    layer = 0
+    hit_number = 0
     while pending.size:
-        # The rays start inside the tool, so their first hits are ignored. New rays from behind an ignored
-        # surface are no alternative, because Bullet's rays hit again within a millimetre of their start.
-        hits = client.rayTestBatch(starts[pending].tolist(), ends[pending].tolist(), reportHitNumber=layer)
+        # The first hits are on the tool. The next hits of the rays are read by number, because a new ray from
+        # behind a surface would hit the surface again within a millimetre.
+        segments = starts[pending].tolist(), ends[pending].tolist()
+        hits = client.rayTestBatch(*segments, reportHitNumber=hit_number)
         for ray, (body, _, fraction, *_) in zip(pending, hits, strict=True):
             distance = fraction * (start + end) - start
             if body in bodies and distance < distances[ray]:
                 hit_bodies[ray], distances[ray] = body, distance
         pending = pending[[hit[0] >= 0 for hit in hits]]
-        layer += 1
+        hit_number += 1
     return hit_bodies, distances

@@ -13,11 +13,11 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.cell.config import Colour
 
-WOOD, PLAIN = "wood", "plain"
-"""Names of the texture in the URDF of the table, and of a white surface without texture."""
+WOOD_TEXTURE, PLAIN_TEXTURE = "wood", "plain"
+"""Names of the texture in the URDF of the table, and of a white surface."""
 PATTERN_COUNT = 24
 """Number of generated textures, whose names are `pattern 0` to `pattern 23`."""
-TEXTURES = (WOOD, PLAIN, *(f"pattern {number}" for number in range(PATTERN_COUNT)))
+TEXTURES = (WOOD_TEXTURE, PLAIN_TEXTURE, *(f"pattern {number}" for number in range(PATTERN_COUNT)))
 """Names of all textures."""
 TEXTURE_SIZE = 256
 """Side of a generated texture [pixel]."""
@@ -36,9 +36,9 @@ class TableTop:
         self._table = table
         shapes = client.getVisualShapeData(table, pybullet.VISUAL_SHAPE_DATA_TEXTURE_UNIQUE_IDS)
         # A world without visual shapes needs no textures.
-        self._textures = {PLAIN: -1, WOOD: shapes[0][8] if shapes else -1}
+        self._textures = {PLAIN_TEXTURE: -1, WOOD_TEXTURE: shapes[0][8] if shapes else -1}
 
-    def paint(self, colour: Colour, texture: str = WOOD) -> None:
+    def paint(self, colour: Colour, texture: str = WOOD_TEXTURE) -> None:
         """Give the table a texture of `TEXTURES`, with RGB values multiplied by `colour`."""
         if texture not in self._textures:
             self._textures[texture] = self._load_pattern(texture)
@@ -61,11 +61,9 @@ def generate_pattern(seed: int) -> NDArray[np.uint8]:
     rng = np.random.default_rng(seed)
     contrast = rng.uniform(15, 90)
     count = int(rng.choice([4, 8, 16, 32]))
-    kind = seed % 4
-    shape = ((count, count, 3), (1, count * 2, 3), (count, count, 1), (TEXTURE_SIZE, TEXTURE_SIZE, 1))[kind]
-    interpolation = cv2.INTER_CUBIC if kind in (0, 3) else cv2.INTER_NEAREST
-    values = 255 - rng.uniform(0, contrast, shape) * np.ones(3)
+    pattern_kind = seed % 4  # clouds, stripes, tiles or speckles
     size = (TEXTURE_SIZE, TEXTURE_SIZE)
-    return np.asarray(
-        cv2.resize(values.astype(np.float32), size, interpolation=interpolation).clip(0, 255), np.uint8
-    )
+    shape = ((count, count, 3), (1, count * 2, 3), (count, count, 1), (*size, 1))[pattern_kind]
+    interpolation = cv2.INTER_CUBIC if pattern_kind in (0, 3) else cv2.INTER_NEAREST
+    values = (255 - rng.uniform(0, contrast, shape) * np.ones(3)).astype(np.float32)
+    return np.asarray(cv2.resize(values, size, interpolation=interpolation).clip(0, 255), np.uint8)

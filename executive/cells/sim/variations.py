@@ -14,7 +14,7 @@ import numpy as np
 
 from executive.cell.config import CameraConfig, Colour, NoiseConfig
 from executive.cells.sim.camera import CELL_LIGHT, Light
-from executive.cells.sim.table_top import PLAIN, TEXTURES, WOOD
+from executive.cells.sim.table_top import PLAIN_TEXTURE, TEXTURES, WOOD_TEXTURE
 from executive.geometry import Array, Pose, rotate_about_z
 from executive.perception.camera_model import intersect_plane
 
@@ -31,21 +31,24 @@ WOOD_COLOUR = (0.87, 0.78, 0.65)
 
 
 def draw_light(rng: np.random.Generator) -> Light:
-    """Return the light of the cell in 20 % of the scenes, else a light of normal, low or high brightness."""
+    """Return the light of the cell (probability 0.2), or a light with normal, low or high brightness."""
     shadow = bool(rng.random() < 0.35)
     if rng.random() < 0.2:
         return Light(shadow=shadow) if shadow else CELL_LIGHT
     azimuth, elevation = rng.uniform(0, math.tau), rng.uniform(math.radians(18), math.pi / 2)
-    horizontal = math.cos(elevation)
+    x, y = math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth)
     red, green, blue = rng.uniform(0.72, 1.0, 3)
-    choice = rng.random()
-    brightness = 1.0 if choice < 0.5 else math.exp(rng.uniform(math.log(0.12), 0.0)) if choice < 0.8 else 1.5
+    random_number = rng.random()
+    if random_number < 0.5:
+        brightness = 1.0
+    else:
+        brightness = math.exp(rng.uniform(math.log(0.12), 0.0)) if random_number < 0.8 else 1.5
     return Light(
-        direction=(horizontal * math.cos(azimuth), horizontal * math.sin(azimuth), math.sin(elevation)),
+        direction=(x, y, math.sin(elevation)),
         colour=(red, green, blue),
         ambient=brightness * rng.uniform(0.40, 0.70),
         diffuse=brightness * rng.uniform(0.20, 0.60),
-        specular=rng.uniform(0.0, 0.8) if choice >= 0.8 else brightness * rng.uniform(0.0, 0.30),
+        specular=rng.uniform(0.0, 0.8) if random_number >= 0.8 else brightness * rng.uniform(0.0, 0.30),
         shadow=shadow,
     )
 
@@ -55,35 +58,37 @@ def draw_table_appearance(rng: np.random.Generator) -> tuple[Colour, str]:
 
     In the other scenes the table has a random colour, and a wood texture, no texture or a random texture.
     """
-    choice = rng.random()
-    if choice < 0.3:
-        return (1.0, 1.0, 1.0), WOOD
-    if choice < 0.5:
+    random_number = rng.random()
+    if random_number < 0.3:
+        return (1.0, 1.0, 1.0), WOOD_TEXTURE
+    if random_number < 0.5:
         red, green, blue = rng.uniform(0.75, 1.0) * rng.uniform(0.88, 1.0, 3)
-        return (red, green, blue), WOOD
-    texture = WOOD if choice < 0.6 else PLAIN if choice < 0.75 else str(rng.choice(TEXTURES))
+        return (red, green, blue), WOOD_TEXTURE
+    texture = WOOD_TEXTURE if random_number < 0.6 else PLAIN_TEXTURE
+    if random_number >= 0.75:
+        texture = str(rng.choice(TEXTURES))
     return draw_hsv_colour(rng, 0.0, 0.8, 0.10, 1.0), texture
 
 
-def draw_object_colour(palette: Sequence[Colour], table: Colour, rng: np.random.Generator) -> Colour:
+def draw_object_colour(palette: Sequence[Colour], table_colour: Colour, rng: np.random.Generator) -> Colour:
     """Return a colour of an object: of its class, any hue, grey, nearly black, or similar to the table.
 
     Args:
         palette: Colours of the class of the object.
-        table: Mean colour of the table.
+        table_colour: Mean colour of the table.
         rng: Random number generator.
     """
-    choice = rng.random()
-    if choice < 0.35:
+    random_number = rng.random()
+    if random_number < 0.35:
         return palette[int(rng.integers(len(palette)))]
-    if choice < 0.65:
+    if random_number < 0.65:
         return draw_hsv_colour(rng, 0.3, 1.0, 0.25, 1.0)
-    if choice < 0.78:
+    if random_number < 0.78:
         grey = rng.uniform(0.05, 1.0)
         return grey, grey, grey
-    if choice < 0.93:
+    if random_number < 0.93:
         return draw_hsv_colour(rng, 0.0, 0.6, 0.02, 0.16)
-    red, green, blue = np.clip(table + rng.normal(0, 0.12, 3), 0.02, 1.0)
+    red, green, blue = np.clip(table_colour + rng.normal(0, 0.12, 3), 0.02, 1.0)
     return float(red), float(green), float(blue)
 
 
@@ -113,8 +118,8 @@ def draw_camera(
         return matrix, X_WC
     centre = np.array([camera.width - 1, camera.height - 1]) / 2
     half_fov = math.atan(camera.height / 2 / matrix[1, 1])
-    factor = math.tan(half_fov) / math.tan(half_fov * (1 + rng.uniform(-1, 1) * MAX_FOV_CHANGE))
-    matrix = np.diag([factor, factor, 1.0]) @ matrix
+    focal_factor = math.tan(half_fov) / math.tan(half_fov * (1 + rng.uniform(-1, 1) * MAX_FOV_CHANGE))
+    matrix = np.diag([focal_factor, focal_factor, 1.0]) @ matrix
     matrix[:2, 2] = centre
     if camera.mount == "wrist":
         return matrix, X_WC

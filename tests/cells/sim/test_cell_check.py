@@ -14,7 +14,7 @@ import pytest
 from executive.cell.config import ArmConfig, CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.cells.sim.cell import SimCell
-from executive.cells.sim.poses import find_places_out_of_reach, find_unusable_poses
+from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
 from executive.cells.sim.robot_models import ROBOT_MODELS
 from executive.mission.parse.cell_file import load_cell
 from executive.motion.arms import ARMS_BY_URDF, build_kinematics
@@ -103,7 +103,7 @@ def test_a_check_loads_no_model_and_none_of_what_runs_one(missions: Path) -> Non
 def test_a_pose_too_near_to_something_is_named_with_the_distance(overhead: CellConfig) -> None:
     near, inside, fit = (reaching(overhead, 0.5, 0.0, z) for z in (0.003, -0.01, 0.0055))
     folded = (0, -40, 0, -120, 0, -120, 0)
-    found = dict(find_unusable_poses(posed(overhead, near=near, inside=inside, fit=fit, folded=folded)))
+    found = dict(find_pose_errors(posed(overhead, near=near, inside=inside, fit=fit, folded=folded)))
     free = "0.005 m must stay free"
     assert found == {
         ("arm", "poses_deg", "near"): f'the pose "near" brings the tool 0.003 m from the table; {free}',
@@ -113,7 +113,7 @@ def test_a_pose_too_near_to_something_is_named_with_the_distance(overhead: CellC
 
 
 def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wrist: CellConfig) -> None:
-    assert list(find_unusable_poses(posed(overhead, aside=reaching(overhead, 0.53, 0.0, 0.2)))) == [
+    assert list(find_pose_errors(posed(overhead, aside=reaching(overhead, 0.53, 0.0, 0.2)))) == [
         (
             ("cameras", "overhead", "scan_poses", 1),
             'from the pose "aside" the camera overhead does not see the whole workspace: a part of it is '
@@ -121,7 +121,7 @@ def test_a_scan_pose_without_a_view_of_it_all_is_found(overhead: CellConfig, wri
         )
     ]
     turned = (40.0, *wrist.arm.poses_deg["scan"][1:])
-    assert [key for key, _ in find_unusable_poses(posed(wrist, scan=turned))] == [
+    assert [key for key, _ in find_pose_errors(posed(wrist, scan=turned))] == [
         ("cameras", "wrist", "scan_poses", 0)
     ]
 

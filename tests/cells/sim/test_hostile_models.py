@@ -24,8 +24,8 @@ BOMB = f"<!DOCTYPE r [<!ENTITY a0 'ha'>{LEVELS}]><robot name='&a9;'/>"
         (BOMB, "the model m.urdf is no URDF: "),
         ("<svg/>", "the model m.urdf is no URDF: its root is <svg>, not <robot>"),
         ("<?xml version='1.0' encoding='none'?><robot/>", "the model m.urdf is no URDF: "),
-        ("<robot><inertial><mass value='nan'/></inertial></robot>", 'a URDF has "nan" in place of 1 finite'),
-        ("<robot><inertial><mass value='1 2'/></inertial></robot>", 'a URDF has "1 2" in place of 1 finite'),
+        ("<robot><inertial><mass value='nan'/></inertial></robot>", 'a URDF has "nan" instead of 1 finite'),
+        ("<robot><inertial><mass value='1 2'/></inertial></robot>", 'a URDF has "1 2" instead of 1 finite'),
     ],
     ids=["garbage", "empty", "XML bomb", "other XML", "encoding", "not finite", "two numbers"],
 )

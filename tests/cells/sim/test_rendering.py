@@ -17,8 +17,8 @@ from executive.cells.sim.arrangements import (
     draw_arrangement,
     draw_held_object,
     draw_objects,
-    drop_objects,
     scale_model,
+    simulate_fall,
 )
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scenes import IMAGE_SIZE, Sample, SceneRenderer
@@ -29,8 +29,8 @@ from executive.processes import WorkerPool
 from executive.training.rendering import generate_dataset, render_run_frames, to_labelled_frame
 
 
-def samples(config: CellConfig, seeds: range, *, randomized: bool = True) -> list[Sample]:
-    renderer = SceneRenderer(config, next(iter(config.cameras)), randomized=randomized)
+def samples(config: CellConfig, seeds: range, *, is_random: bool = True) -> list[Sample]:
+    renderer = SceneRenderer(config, next(iter(config.cameras)), is_random=is_random)
     try:
         return [renderer.render_sample(seed) for seed in seeds]
     finally:
@@ -121,7 +121,7 @@ def test_what_is_dropped_comes_to_lie_on_the_table_or_in_a_bin(overhead: CellCon
     tilted = Pose.of([0.5, 0.0, 0.06], [0.3, 0.1, 0.2, 0.9])
     starts = [("cube", tilted), ("duck", Pose.of([0.6, 0.1, 0.01])), ("cube", Pose.of([0.52, 0.46, 0.1]))]
     items = [SceneObject(label, overhead.objects[label], X_WO, (1.0, 1.0, 1.0)) for label, X_WO in starts]
-    cube, duck, above = (item.X_WO for item in drop_objects(overhead, items))
+    cube, duck, above = (item.X_WO for item in simulate_fall(overhead, items))
     assert cube.position[2] == pytest.approx(0.025, abs=1e-3)
     assert duck.rotation[2, 2] == pytest.approx(1.0, abs=1e-2)
     assert above.position[2] == pytest.approx(0.03, abs=1e-3), "the bin's floor is 5 mm thick"
@@ -194,7 +194,7 @@ def test_cells_with_different_classes_make_no_dataset(overhead: CellConfig, tmp_
 def test_a_frame_is_the_cameras_whole_image_labelled_where_a_run_searches_it(overhead: CellConfig) -> None:
     camera = overhead.cameras["overhead"].model_copy(update={"depth": DepthConfig()})
     config = overhead.model_copy(update={"cameras": {"overhead": camera}})
-    (drawn,) = samples(config, range(3, 4), randomized=False)
+    (drawn,) = samples(config, range(3, 4), is_random=False)
     frame = to_labelled_frame(drawn, "overhead", "a")
     left, top, right, bottom = frame.region or ()
     assert frame.image.shape == (480, 640, 3)
