@@ -208,10 +208,7 @@ class SimArm:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
     def _check_positions(self, q: Array, tolerance: float, description: str) -> None:
-        """Store a fault message if a joint is over `tolerance` [rad] away from `q`.
-
-        The message starts with `description`, a noun phrase for `q`.
-        """
+        """Store a fault message if a joint is over `tolerance` [rad] away from `q`, named `description`."""
         errors = np.abs(self.q - q)
         joint = int(np.argmax(errors))
         if errors[joint] > tolerance:

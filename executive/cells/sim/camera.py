@@ -165,6 +165,19 @@ class SimCamera(MountedCamera):
 
     The noise of a frame depends only on the seed and on the number of the frame. A depth sensor does not
     change the image noise.
+
+    Args:
+        world: The observed world.
+        name: Name of the camera in the cell file.
+        config: Section of the camera in the cell file.
+        clock: Clock for the time stamps of the frames.
+        seed: Seed of the noise.
+        occlusion: Occlusion by the arm; None: nothing is occluded, and the table is always visible.
+        get_change_count: Returns the number of changes of the table (see `Ledger`).
+        light: Light of the scene.
+        true_config: True pose, lens and noise of the camera; None: those of `config`. The frames contain the
+            matrix and the pose of `config`.
+        bins: Bins from whose positions in a frame a displacement of the camera is detected.
     """
 
     def __init__(
@@ -181,21 +194,6 @@ class SimCamera(MountedCamera):
         true_config: CameraConfig | None = None,
         bins: Sequence[Bin] = (),
     ) -> None:
-        """Create the camera.
-
-        Args:
-            world: The observed world.
-            name: Name of the camera in the cell file.
-            config: Section of the camera in the cell file.
-            clock: Clock for the time stamps of the frames.
-            seed: Seed of the noise.
-            occlusion: Occlusion by the arm; None: nothing is occluded, and the table is always visible.
-            get_change_count: Returns the number of changes of the table (see `Ledger`).
-            light: Light of the scene.
-            true_config: True pose, lens and noise of the camera; None: those of `config`. The frames contain
-                the matrix and the pose of `config`.
-            bins: Bins from whose positions in a frame a displacement of the camera is detected.
-        """
         super().__init__(name, config, world.get_flange_pose, clock, get_change_count)
         self._true_config = true_config or config
         self._world = world

@@ -189,8 +189,5 @@ def _find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, s
         return
     for name, camera in config.cameras.items():
         if camera.depth is None:
-            yield (
-                ("localization",),
-                f'localization "depth" needs a camera with depth, and {name} has none; give it a section '
-                '"depth: {}", or use "plane"',
-            )
+            message = f'localization "depth" needs a camera with depth, and {name} has none; give it a '
+            yield ("localization",), message + 'section "depth: {}", or use "plane"'

@@ -148,7 +148,8 @@ class ClearanceChecker:
         self.world.client.resetBasePositionAndOrientation(load_body, X_WH.position, X_WH.quaternion)
         part = name_load(load.label)
         for name, body in bodies:
-            max_support_height = self._get_base_height(name) + BIN_THICKNESS + SUPPORT_TOLERANCE
+            bin = self.world.config.bins.get(name)
+            max_support_height = (bin.position[2] if bin else 0.0) + BIN_THICKNESS + SUPPORT_TOLERANCE
             for point in get_points(load_body, body, self._margin):
                 is_support = point[POSITION_B][2] <= max_support_height and name not in self._obstacles
                 yield ClosestApproach(part, name, point[DISTANCE], 0.0 if is_support else self._margin)
@@ -170,9 +171,8 @@ class ClearanceChecker:
                 bodies.append(int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION)))
             body = bodies[placed_counts[size]]
             placed_counts[size] += 1
-            client.resetBasePositionAndOrientation(
-                body, [obstacle.x, obstacle.y, obstacle.top / 2], [0, 0, 0, 1]
-            )
+            position = [obstacle.x, obstacle.y, obstacle.top / 2]
+            client.resetBasePositionAndOrientation(body, position, [0, 0, 0, 1])
             self._obstacles[obstacle.name] = (*self._obstacles.get(obstacle.name, ()), body)
         try:
             yield
@@ -181,11 +181,6 @@ class ClearanceChecker:
                 for body in cylinders:
                     client.resetBasePositionAndOrientation(body, PARKING_POSITION, [0, 0, 0, 1])
             self._obstacles = {}
-
-    def _get_base_height(self, name: str) -> float:
-        """Return the height of the base of a bin above the table [m]; 0 for other bodies."""
-        bin = self.world.config.bins.get(name)
-        return bin.position[2] if bin else 0.0
 
     def _get_load_body(self, load: ObjectClass) -> int:
         """Return the body that models a held object of a class, created at the first call."""

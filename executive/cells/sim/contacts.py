@@ -33,11 +33,7 @@ class ContactMonitor:
         self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
 
     def describe_new_contact(self, lip_may_touch: bool) -> str | None:
-        """Return the description of a new contact, or None. Each step needs one call.
-
-        Args:
-            lip_may_touch: True to ignore contacts of the lip of the cup.
-        """
+        """Return the description of a contact that began in this step; None: no contact that is forbidden."""
         now, last_steps = self._world.step_count, self._last_contact_steps
         oldest = now - SEPARATION_STEP_COUNT
         self._last_contact_steps = {pair: step for pair, step in last_steps.items() if step >= oldest}

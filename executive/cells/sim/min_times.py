@@ -52,10 +52,7 @@ class SimMinTimes(CellMinTimes):
         return self._transport_times[bin]
 
     def _compute_min_time(self, positions: Array, slots: Array) -> float:
-        """Return the minimum time [s] between the nearest pair of a position and a slot.
-
-        Row i of `positions` `(N, 2)` [m] forms a pair with row i of `slots` `(N, 2)` [m].
-        """
+        """Return the minimum time [s] between the nearest rows of `positions` and `slots`, `(N, 2)` [m]."""
         nearest_row = np.argmin(np.linalg.norm(positions - slots, axis=1))
         starts, ends = (self._solve_configurations(points[nearest_row]) for points in (positions, slots))
         return float(compute_min_time(ends - starts[:, None], self._limits).min())

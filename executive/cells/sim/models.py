@@ -105,16 +105,10 @@ def _add_mesh(client: BulletClient, config: ObjectConfig, X_WL: Pose) -> int:
     """
     shape = {"fileName": str(find_model(config.mesh)), "meshScale": [config.scale] * 3}
     centroid = compute_upright_pose(config).inverse().apply(load_mesh(config).centroid)
-    return int(
-        client.createMultiBody(
-            baseMass=config.mass,
-            baseCollisionShapeIndex=client.createCollisionShape(pybullet.GEOM_MESH, **shape),
-            baseVisualShapeIndex=client.createVisualShape(pybullet.GEOM_MESH, **shape),
-            basePosition=X_WL.position,
-            baseOrientation=X_WL.quaternion,
-            baseInertialFramePosition=centroid,
-        )
-    )
+    collision = client.createCollisionShape(pybullet.GEOM_MESH, **shape)
+    visual = client.createVisualShape(pybullet.GEOM_MESH, **shape)
+    body = client.createMultiBody(config.mass, collision, visual, X_WL.position, X_WL.quaternion, centroid)
+    return int(body)
 
 
 def compute_mass(config: ObjectConfig) -> float:

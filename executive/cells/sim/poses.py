@@ -42,10 +42,8 @@ def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]
         for joint, (angle, (lower, upper)) in enumerate(zip(pose, ranges, strict=True), start=1):
             if not lower <= angle <= upper:
                 limit = f"{upper:g}" if lower == -upper else f"{lower:g} to {upper:g}"
-                yield (
-                    ("arm", "poses_deg", name),
-                    f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}',
-                )
+                message = f'joint {joint} of the pose "{name}" is at {angle:g} degrees; its limit is {limit}'
+                yield ("arm", "poses_deg", name), message
     yield from find_unreachable_places(config, require_reachable)
 
 
@@ -59,10 +57,8 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
         for name, pose in config.arm.poses_deg.items():
             violation = checker.find_violation(np.radians(pose))
             if violation:
-                yield (
-                    ("arm", "poses_deg", name),
-                    f'the pose "{name}" brings {violation}; {config.motion.margin:.3f} m must stay free',
-                )
+                message = f'the pose "{name}" brings {violation}; {config.motion.margin:.3f} m must stay free'
+                yield ("arm", "poses_deg", name), message
         yield from _find_occluding_poses_and_bins(config, checker.world)
 
 
@@ -79,17 +75,12 @@ def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator
             world.set_joint_positions(np.radians(config.arm.poses_deg[pose]))
             X_WC = get_camera_pose(world, camera)
             if not occlusion.is_table_visible(matrix, X_WC, (camera.width, camera.height)):
-                yield (
-                    ("cameras", name, "scan_poses", index),
-                    f'from the pose "{pose}" the camera {name} does not see the whole workspace: a part '
-                    "of it is outside of the image or behind the arm",
-                )
+                message = f'from the pose "{pose}" the camera {name} does not see the whole workspace: a '
+                message += "part of it is outside of the image or behind the arm"
+                yield ("cameras", name, "scan_poses", index), message
             elif bin := _find_occluding_bin(config, world, X_WC.position):
-                yield (
-                    ("bins", bin, "position"),
-                    f'the bin "{bin}" hides a part of the workspace from the camera {name} in the pose '
-                    f'"{pose}"; move or lower the bin',
-                )
+                message = f'the bin "{bin}" hides a part of the workspace from the camera {name} in the pose '
+                yield ("bins", bin, "position"), message + f'"{pose}"; move or lower the bin'
 
 
 def _find_occluding_bin(config: CellConfig, world: World, camera_position: Array) -> str | None:

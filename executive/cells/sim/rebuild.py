@@ -60,11 +60,9 @@ class WorldRebuilder:
 
     @property
     def interrupted_state(self) -> InterruptedState:
-        """State after the executed commands.
-
-        The arm brakes from the joint positions of the last physics step. From newer joint positions, the arm
-        would move by two steps at once, which may tear a load off the cup.
-        """
+        """State after the executed commands."""
+        # If the arm started from joint targets that no physics step has used, the arm would move by two steps
+        # at once, which may tear a load off the cup.
         command, time = self._command, self._motion_time
         if self._applied_command and self._motion is not None:
             command, time = self._applied_command

@@ -201,12 +201,9 @@ class SceneRenderer:
 def _build_sample(
     rendered: RenderedImage, min_contrast: float, objects: Mapping[int, SceneObject]
 ) -> Sample | None:
-    """Return a sample without noise, or None if too many objects are half occluded.
+    """Return a sample without noise, or None if too many of the objects, by body, are half occluded.
 
-    Args:
-        rendered: The rendered region, whose image becomes the image of the sample.
-        min_contrast: Minimum contrast of a labelled object [grey level].
-        objects: The objects of the scene, by body.
+    A labelled object has at least `min_contrast` [grey level].
     """
     labels, boxes, fractions, positions, centres = [], [], [], [], []
     ignored, half_occluded_count = [], 0
@@ -286,8 +283,8 @@ def _transform_box(box: Box, corner: Array, scale: float) -> list[float]:
 
 
 def _resize(image: Image) -> Image:
+    """Return a square image in the size of a sample."""
     if image.shape[0] == IMAGE_SIZE:
         return image
-    return np.asarray(
-        cv2.resize(image, (IMAGE_SIZE, IMAGE_SIZE), interpolation=cv2.INTER_AREA), dtype=np.uint8
-    )
+    size = (IMAGE_SIZE, IMAGE_SIZE)
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)

@@ -121,10 +121,9 @@ def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
         labels = [str(label) for label in rng.choice(list(config.objects), config.table.objects[1])]
         try:
             _draw_positions(config, [config.objects[label].radius for label in labels], rng)
+            return
         except InputError as error:
             message = str(error)
-        else:
-            return
     yield ("table", "objects"), message
 
 

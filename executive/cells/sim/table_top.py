@@ -42,9 +42,8 @@ class TableTop:
         """Give the table a texture of `TEXTURES`, with RGB values multiplied by `colour`."""
         if texture not in self._textures:
             self._textures[texture] = self._load_pattern(texture)
-        self._client.changeVisualShape(
-            self._table, -1, textureUniqueId=self._textures[texture], rgbaColor=[*colour, 1]
-        )
+        texture_id = self._textures[texture]
+        self._client.changeVisualShape(self._table, -1, textureUniqueId=texture_id, rgbaColor=[*colour, 1])
 
     def _load_pattern(self, texture: str) -> int:
         """Generate a texture, load it into the physics server, and return its id there."""

@@ -19,11 +19,8 @@ TOUCH_DISTANCE = 0.001
 LIP_LENGTH = 0.002
 """Length of the lip at the end of the tool [m]; other contacts of the tool are contacts of the shaft."""
 PULL_SMOOTHING = 0.25
-"""Weight of the newest step in the low-pass filter of the pull on the seal.
-
-The time constant is 3.5 steps or 14 ms: a seal breaks within milliseconds, but the impact forces of the
-solver last a single step.
-"""
+"""Weight of the newest step in the low-pass filter of the pull on the seal: the time constant is 3.5 steps
+or 14 ms, because a seal breaks within milliseconds, but impact forces of the solver last a single step."""
 
 
 @dataclass
@@ -108,7 +105,7 @@ class SuctionTool:
         if self._grip is not None:
             body = self._grip.body
             self._world.rest_positions.setdefault(body, []).append(self._world.get_object_pose(body).position)
-        self._release()
+            self._release(self._grip)
 
     def break_seal(self) -> None:
         """Break the seal, so that the held body falls."""
@@ -116,7 +113,7 @@ class SuctionTool:
         if self._grip is not None:
             self._separating_body = self._grip.body
             self.dropped_bodies.add(self._grip.body)
-            self._release()
+            self._release(self._grip)
 
     def advance(self) -> None:
         """Update the seal after a physics step."""
@@ -163,11 +160,9 @@ class SuctionTool:
             )
         )  # fmt: skip
 
-    def _release(self) -> None:
-        if self._grip is None:
-            return
-        self._world.client.removeConstraint(self._grip.constraint)
-        self._set_collision(self._grip.body, True)
+    def _release(self, grip: _Grip) -> None:
+        self._world.client.removeConstraint(grip.constraint)
+        self._set_collision(grip.body, True)
         self._grip = None
 
     def _set_collision(self, body: int, enabled: bool) -> None:

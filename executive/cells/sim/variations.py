@@ -139,6 +139,5 @@ def draw_noise(noise: NoiseConfig, rng: np.random.Generator) -> NoiseConfig:
     """
     if rng.random() < 0.6:
         return noise
-    return NoiseConfig(
-        gain=noise.gain + rng.exponential(0.06), read=noise.read * math.exp(rng.uniform(-1, 2.2))
-    )
+    gain, read = noise.gain + rng.exponential(0.06), noise.read * math.exp(rng.uniform(-1, 2.2))
+    return NoiseConfig(gain=gain, read=read)

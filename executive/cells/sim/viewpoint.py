@@ -45,12 +45,8 @@ def compute_viewpoint(config: CellConfig, size: tuple[int, int], region: Box) ->
         region: Left, top, right and bottom of the region [pixel].
     """
     matrix = compute_camera_matrix(*size, FIELD_OF_VIEW_DEG)
-    direction = [
-        math.cos(CAMERA_ELEVATION) * math.cos(CAMERA_AZIMUTH),
-        math.cos(CAMERA_ELEVATION) * math.sin(CAMERA_AZIMUTH),
-        math.sin(CAMERA_ELEVATION),
-    ]
-    R_WC = compute_look_at_pose(direction, [0, 0, 0], [0, 0, 1]).rotation
+    x, y = (math.cos(CAMERA_ELEVATION) * function(CAMERA_AZIMUTH) for function in (math.cos, math.sin))
+    R_WC = compute_look_at_pose([x, y, math.sin(CAMERA_ELEVATION)], [0, 0, 0], [0, 0, 1]).rotation
     points = _list_hull_points(config) @ R_WC
     # In camera axes, low and high are the slopes of the rays through the corners of the region. A camera at p
     # shows a point q in the region if low (q_z - p_z) <= q_x - p_x <= high (q_z - p_z), and likewise for y.

@@ -76,13 +76,9 @@ class World:
         self.client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
         flags = 0 if visuals else pybullet.URDF_IGNORE_VISUAL_SHAPES
         self.floor = self.client.loadURDF(str(find_model("plane.urdf")), [0, 0, -TABLE_HEIGHT], flags=flags)
-        self.table = self.client.loadURDF(
-            str(find_model("table/table.urdf")),
-            [*TABLE_CENTRE, -TABLE_HEIGHT],
-            self.client.getQuaternionFromEuler([0, 0, np.pi / 2]),
-            useFixedBase=True,
-            flags=flags,
-        )
+        table, position = str(find_model("table/table.urdf")), [*TABLE_CENTRE, -TABLE_HEIGHT]
+        quaternion = self.client.getQuaternionFromEuler([0, 0, np.pi / 2])
+        self.table = self.client.loadURDF(table, position, quaternion, useFixedBase=True, flags=flags)
         self.table_top = TableTop(self.client, self.table)
         self.arm = self._load_arm(flags)
         self.bin_bodies = {name: add_bin(self.client, bin) for name, bin in config.bins.items()}
@@ -151,14 +147,11 @@ class World:
         If a command precedes every physics step, the full position gain leaves a tracking error of 0.0005°.
         """
         self.log.append(command_log.JOINT_TARGETS, time, *q)
+        joint_count = self.robot.joint_count
         self.client.setJointMotorControlArray(
-            self.arm,
-            range(self.robot.joint_count),
-            pybullet.POSITION_CONTROL,
-            targetPositions=q.tolist(),
-            forces=self.robot.max_torques,
-            positionGains=[1.0] * self.robot.joint_count,
-        )
+            self.arm, range(joint_count), pybullet.POSITION_CONTROL, targetPositions=q.tolist(),
+            forces=self.robot.max_torques, positionGains=[1.0] * joint_count,
+        )  # fmt: skip
 
     def get_flange_pose(self) -> Pose:
         """Return `X_WF`, the pose of the flange."""
@@ -230,16 +223,14 @@ def _make_tool_urdf(length: float, cup_radius: float, robot: RobotModel) -> str:
         robot: Model of the arm.
     """
     shaft_length = length - NECK_LENGTH
-    cylinders = (
-        (shaft_length, TOOL_RADIUS, shaft_length / 2),
-        (NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2),
-    )
+    shaft = shaft_length, TOOL_RADIUS, shaft_length / 2
+    neck = NECK_LENGTH, cup_radius, length - NECK_LENGTH / 2
     shapes = "".join(
         f'<{tag}><origin xyz="0 0 {z}"/><geometry>'
         f'<cylinder length="{cylinder_length - 2 * margin}" radius="{radius - margin}"/></geometry>'
         + ('<material name="Grey"/>' if tag == "visual" else "")
         + f"</{tag}>"
-        for cylinder_length, radius, z in cylinders
+        for cylinder_length, radius, z in (shaft, neck)
         for tag, margin in (("visual", 0.0), ("collision", CYLINDER_MARGIN))
     )
     return f"""
