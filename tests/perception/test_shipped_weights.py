@@ -6,7 +6,7 @@ import pytest
 
 from executive.cells.sim.scenes import SceneRenderer
 from executive.mission.parse.cell_file import load_cell
-from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH, WEIGHTS_FOLDER
+from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH
 from executive.perception.detectors.onnx_model import read_labels
 from executive.training.evaluation.cell_detector import CellDetector
 from executive.training.evaluation.evaluate import evaluate
@@ -16,7 +16,7 @@ from executive.training.labelled_image import LabelledImage
 def test_the_weights_fit_into_a_package_and_a_card_goes_with_them(missions):
     fasteners = missions / "cells" / "fasteners"
     for cell, model, labels, card in (
-        ("overhead", MODEL_PATH, LABELS_PATH, WEIGHTS_FOLDER / "embedded.card.md"),
+        ("overhead", MODEL_PATH, LABELS_PATH, MODEL_PATH.with_suffix(".card.md")),
         ("fasteners", fasteners / "model.onnx", fasteners / "labels.txt", fasteners / "card.md"),
     ):
         assert model.stat().st_size < 20_000_000

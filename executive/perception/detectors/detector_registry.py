@@ -26,7 +26,7 @@ def find_detector_kinds() -> dict[str, PluginEntry]:
 def build_detectors(
     configs: Mapping[str, DetectorConfig], *, camera: CameraConfig, clock: Clock, base: Path, seed: int
 ) -> dict[str, ClosableDetector]:
-    """Return the detectors of a cell file by name, in its order.
+    """Return the detectors of a cell file by name, in the order of the file.
 
     Args:
         configs: The section `detectors` of the cell file.
@@ -39,29 +39,29 @@ def build_detectors(
         InputError: A kind is not installed, an option is invalid, or a detector depends on itself.
     """
     kinds = find_detector_kinds()
-    built: dict[str, ClosableDetector] = {}
-    in_progress: list[str] = []
+    detectors: dict[str, ClosableDetector] = {}
+    unfinished_names: list[str] = []
 
     def build(name: str) -> ClosableDetector:
-        if name in built:
-            return built[name]
+        if name in detectors:
+            return detectors[name]
         if name not in configs:
             raise InputError(f'the cell has no detector "{name}"; it has: {", ".join(configs)}')
-        if name in in_progress:
-            raise InputError(f"the detectors {' -> '.join([*in_progress, name])} depend on each other")
+        if name in unfinished_names:
+            raise InputError(f"the detectors {' -> '.join([*unfinished_names, name])} depend on each other")
         kind = configs[name].kind
         if kind not in kinds:
             raise InputError(_describe_missing_kind(name, kind, kinds))
-        in_progress.append(name)
+        unfinished_names.append(name)
         setting = DetectorSetting(name, camera, clock, base, seed, build)
-        built[name] = kinds[kind].load().from_config(configs[name], setting)
-        in_progress.remove(name)
-        return built[name]
+        detectors[name] = kinds[kind].load().from_config(configs[name], setting)
+        unfinished_names.remove(name)
+        return detectors[name]
 
     try:
         return {name: build(name) for name in configs}
     except BaseException:
-        for detector in built.values():
+        for detector in detectors.values():
             detector.close()
         raise
 
@@ -69,7 +69,7 @@ def build_detectors(
 def find_detector_problems(
     configs: Mapping[str, DetectorConfig], base: Path
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key in the cell file and an error message for each error that prevents a detector.
+    """Yield each error in the sections of the detectors: its key in the cell file, and an error message.
 
     A kind may check its options in a static method `check(config, base, others)`, where `others` are the
     sections of all detectors of the cell. No model is loaded.
@@ -92,7 +92,7 @@ def find_detector_problems(
 def find_detectable_labels(
     configs: Mapping[str, DetectorConfig], base: Path
 ) -> dict[str, tuple[str, ...] | None]:
-    """Return, by detector of a cell file, the labels of the classes that it can find; None if unknown.
+    """Return the detectable labels of each detector of a cell file, by its name; None if unknown.
 
     A kind of detector may have a static method `labels(config, base)` that returns them. No model is loaded.
     """

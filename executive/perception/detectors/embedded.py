@@ -15,13 +15,13 @@ from executive.perception.detectors.setting import (
     read_options,
 )
 
-WEIGHTS_FOLDER = Path(__file__).parent.parent / "weights"
-MODEL_PATH = WEIGHTS_FOLDER / "embedded.onnx"
-LABELS_PATH = WEIGHTS_FOLDER / "embedded.labels.txt"
+MODEL_PATH = Path(__file__).parent.parent / "weights" / "embedded.onnx"
+"""Exported model with the shipped weights."""
+LABELS_PATH = MODEL_PATH.with_suffix(".labels.txt")
 
 
 class EmbeddedDetector(RfdetrDetector):
-    """Finds cubes, spheres and ducks with the shipped weights; see `weights/embedded.card.md`."""
+    """Detector of cubes, spheres and ducks with shipped weights (model card: `weights/embedded.card.md`)."""
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> EmbeddedDetector:

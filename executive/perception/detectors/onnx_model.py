@@ -35,7 +35,7 @@ class OnnxModel:
         threads: Maximum number of threads of one inference.
 
     Raises:
-        InputError: The file cannot be read, is not an RF-DETR model, or has another number of classes.
+        InputError: The file cannot be read, is not an RF-DETR model, or does not have one class per label.
     """
 
     def __init__(self, path: Path, labels: Sequence[str], threads: int = 2) -> None:
@@ -59,23 +59,23 @@ class OnnxModel:
         self.labels = tuple(labels)
         self.input_size = self._check_shapes(path)
 
-    def detect(self, image: NDArray[np.uint8], floor: float) -> list[Detection]:
-        """Return the detections with a confidence of at least `floor` in an RGB image `(H, W, 3)`.
-
-        The most confident detection is the first.
+    def detect(self, image: NDArray[np.uint8], min_confidence: float) -> list[Detection]:
+        """Return the detections of at least `min_confidence` in an RGB image `(H, W, 3)`, best first.
 
         Raises:
             Unavailable: onnxruntime failed.
         """
         try:
-            boxes, logits = self._session.run(["dets", "labels"], {"input": self._prepare(image)})
+            boxes, logits = self._session.run(["dets", "labels"], {"input": self._make_input(image)})
         except Exception as error:
             raise Unavailable(f"onnxruntime failed: {error}") from error
         confidences = 1 / (1 + np.exp(-logits[0, :, :-1].astype(np.float64)))
-        found = self._decode(boxes[0].astype(np.float64), confidences, image.shape[1], image.shape[0], floor)
-        return remove_duplicates(found)
+        size = np.array(image.shape[1::-1], dtype=float)
+        detections = self._make_detections(boxes[0].astype(np.float64), confidences, size, min_confidence)
+        return remove_duplicates(detections)
 
-    def _prepare(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    def _make_input(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Return the normalized image `(1, 3, R, R)`."""
         if image.shape[:2] != (self.input_size, self.input_size):
             image = np.asarray(
                 cv2.resize(image, (self.input_size, self.input_size), interpolation=cv2.INTER_LINEAR),
@@ -84,19 +84,19 @@ class OnnxModel:
         normalized = (image.astype(np.float32) / 255 - CHANNEL_MEAN) / CHANNEL_STD
         return np.ascontiguousarray(normalized.transpose(2, 0, 1)[None])
 
-    def _decode(
-        self, boxes: Array, confidences: Array, width: int, height: int, floor: float
+    def _make_detections(
+        self, boxes: Array, confidences: Array, size: Array, min_confidence: float
     ) -> list[Detection]:
-        size = np.array([width, height], dtype=float)
-        found = []
-        for query, label in np.argwhere(confidences >= floor):
-            centre, extent = boxes[query, :2] * size, boxes[query, 2:] * size
-            left, top = np.clip(centre - extent / 2, 0, size)
-            right, bottom = np.clip(centre + extent / 2, 0, size)
+        """Return the detections in an image of `size` (width, height) [pixel], most confident first."""
+        detections = []
+        for query, label in np.argwhere(confidences >= min_confidence):
+            centre, box_size = boxes[query, :2] * size, boxes[query, 2:] * size
+            left, top = np.clip(centre - box_size / 2, 0, size)
+            right, bottom = np.clip(centre + box_size / 2, 0, size)
             box: Box = (float(left), float(top), float(right), float(bottom))
-            rival = max(np.delete(confidences[query], label), default=0.0)
-            found.append(Detection(self.labels[label], float(confidences[query, label]), box, float(rival)))
-        return sorted(found, key=lambda detection: -detection.confidence)
+            second = float(max(np.delete(confidences[query], label), default=0.0))
+            detections.append(Detection(self.labels[label], float(confidences[query, label]), box, second))
+        return sorted(detections, key=lambda detection: -detection.confidence)
 
     def _check_shapes(self, path: Path) -> int:
         """Check names and shapes of inputs and outputs, and return the side of the input image [pixel]."""
@@ -105,7 +105,7 @@ class OnnxModel:
         if list(inputs) != ["input"] or not {"dets", "labels"} <= set(outputs):
             raise InputError(
                 f"{path} is not an exported RF-DETR model: it has the inputs {', '.join(inputs)} and the "
-                f"outputs {', '.join(outputs)}; expected are the input input and the outputs dets and labels"
+                f"outputs {', '.join(outputs)}; it needs the input input and the outputs dets and labels"
             )
         size, classes = inputs["input"][-1], outputs["labels"][-1]
         if not isinstance(size, int):

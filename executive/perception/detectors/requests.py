@@ -1,4 +1,4 @@
-"""Searches of frames in another thread, whose answers become available at defined times of the run."""
+"""Search of frames in a thread, with answers that become available at reproducible times of the run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from executive.perception.detectors.setting import DetectorSetting
 from executive.perception.detectors.views import Region, list_regions
 
 MAX_BLOCKING_TIME = 0.05
-"""Maximum uninterrupted wait for an overdue answer [s]; a second Ctrl-C takes effect after it."""
+"""Maximum uninterrupted wait for an overdue answer [s], which is the maximum delay of a second Ctrl-C."""
 CLOCK_ROUNDING_ERROR = 1e-9
 """Maximum rounding error of a time on the clock [s]."""
 
@@ -31,12 +31,12 @@ class ChangedRequest:
 
     Attributes:
         request: The original request.
-        change: Function that returns the changed answer for the original answer.
-        detector: Name of the detector, which is inserted before error messages; "" for unchanged messages.
+        change_answer: Function that returns the changed answer for the original answer.
+        detector: Name of the detector, added to error messages; "" for unchanged messages.
     """
 
     request: Request
-    change: Callable[[Answer], Answer]
+    change_answer: Callable[[Answer], Answer]
     detector: str = ""
 
     @property
@@ -56,7 +56,7 @@ class ChangedRequest:
             if not self.detector:
                 raise
             raise Unavailable(f"detector {self.detector}: {error}") from error
-        return self.change(answer)
+        return self.change_answer(answer)
 
 
 @dataclass(eq=False)
@@ -64,12 +64,12 @@ class PendingSearch:
     """Running search; implements `executive.cell.protocols.Request`.
 
     Attributes:
-        future: Future detections of the thread.
+        future: Detections of the thread, when the search has ended.
         due_time: Time from which the answer is available [s].
         clock: Clock of the run.
         detector: Name of the detector.
         error_rates: Error rates of the detector.
-        expiry_time: Time from which the error is available if the detector misses its deadline [s].
+        expiry_time: Time from which the error of a missed deadline is available [s].
     """
 
     future: Future[list[Detection]]
@@ -81,10 +81,10 @@ class PendingSearch:
 
     @property
     def ready(self) -> bool:
-        """True from `due_time`, or after a missed deadline from `expiry_time`.
+        """True from `due_time` on, or from `expiry_time` on if the detector missed its deadline.
 
-        At `due_time`, this property waits for the thread, so that the time at which an answer becomes
-        available does not depend on the speed of the computer.
+        At `due_time`, this property waits for the thread. The time at which an answer becomes available
+        therefore does not depend on the speed of the computer.
         """
         if self.clock.now < self.due_time - CLOCK_ROUNDING_ERROR:
             return False
@@ -113,11 +113,11 @@ class ThreadedDetector:
     Args:
         config: Section of the detector in the cell file.
         setting: Parts of the cell and of the run that the detector uses.
-        deadline: Time after a request from which the error of a missed deadline is available [s].
+        timeout: Time from a request until the error of a missed deadline is available [s].
     """
 
-    def __init__(self, config: DetectorConfig, setting: DetectorSetting, deadline: float = -math.inf) -> None:
-        self._config, self._setting, self._deadline = config, setting, deadline
+    def __init__(self, config: DetectorConfig, setting: DetectorSetting, timeout: float = -math.inf) -> None:
+        self._config, self._setting, self._timeout = config, setting, timeout
         self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
 
     def request(self, frame: Frame, view: str) -> PendingSearch:
@@ -125,7 +125,7 @@ class ThreadedDetector:
         regions = self._list_regions(view, frame.image.shape[1::-1])
         future = self._thread.submit(lambda: self._search(frame.image, regions))
         clock, config = self._setting.clock, self._config
-        due_time, expiry_time = clock.now + config.latency, clock.now + self._deadline
+        due_time, expiry_time = clock.now + config.latency, clock.now + self._timeout
         return PendingSearch(future, due_time, clock, self._setting.name, config.error_rates, expiry_time)
 
     def close(self) -> None:

@@ -48,7 +48,7 @@ class RfdetrOptions(Section):
 
 
 class RfdetrDetector(ThreadedDetector):
-    """Runs a model on regions of a frame in a thread; implements `cell.protocols.Detector`.
+    """Detector that runs a model in a thread; implements `executive.cell.protocols.Detector`.
 
     Args:
         model: The model.
@@ -85,14 +85,11 @@ class RfdetrDetector(ThreadedDetector):
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
-        """Yield each missing, unknown or invalid option, with an error message.
-
-        The model is not loaded.
-        """
+        """Yield each missing, unknown or invalid option, with an error message; load no model."""
         del others
-        wrong = list(find_option_errors(RfdetrOptions, config))
-        yield from wrong
-        if wrong:
+        errors = list(find_option_errors(RfdetrOptions, config))
+        yield from errors
+        if errors:
             return
         options = read_options(RfdetrOptions, config)
         if not (base / options.model_path).is_file():
@@ -134,7 +131,7 @@ class RfdetrDetector(ThreadedDetector):
         small_crop = np.asarray(cv2.resize(crop, (size, size), interpolation=cv2.INTER_AREA), dtype=np.uint8)
         scale_x, scale_y = width / size, height / size
         return [
-            replace(each, box=(left * scale_x, top * scale_y, right * scale_x, bottom * scale_y))
-            for each in self._model.detect(small_crop, self._config.floor)
-            for left, top, right, bottom in [each.box]
+            replace(detection, box=(left * scale_x, top * scale_y, right * scale_x, bottom * scale_y))
+            for detection in self._model.detect(small_crop, self._config.floor)
+            for left, top, right, bottom in [detection.box]
         ]

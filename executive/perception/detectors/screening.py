@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from itertools import filterfalse
 
 from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Frame
@@ -15,17 +16,16 @@ from executive.errors import Crowded, Unavailable
 from executive.perception.detectors.requests import ChangedRequest
 
 MIN_VISIBLE_FRACTION = 0.7
-"""Minimum fraction of a box that the arm must not occlude; other boxes are ignored."""
+"""Minimum unoccluded fraction of a box; boxes that the arm occludes more are ignored."""
 MAX_BOXES = 60
 """Maximum number of boxes in one answer, including doubtful boxes and unknown labels. Shipped cells have at
 most 20 objects, and the time for the assignment of boxes to items grows more than linearly."""
 MAX_COORDINATE = 1e5
-"""Maximum absolute coordinate of a box [pixel]: images are smaller, and squares of much larger coordinates
-overflow."""
+"""Maximum absolute coordinate of a box [pixel]; images are smaller, and larger squares could overflow."""
 MAX_LABEL_LENGTH = 100
 """Maximum number of characters of a label, which appears in messages and on the terminal."""
-MAX_RIVAL_RATIO = 0.5
-"""Maximum ratio of the confidences of second and first class of a detection that is not doubtful."""
+MAX_SECOND_CLASS_RATIO = 0.5
+"""Maximum confidence of the second class of a confident detection, as a fraction of its confidence."""
 
 
 def screen_answer(answer: Answer, frame: Frame, view: str, labels: Collection[str]) -> Answer:
@@ -49,27 +49,28 @@ def screen_answer(answer: Answer, frame: Frame, view: str, labels: Collection[st
             f"cannot all be objects; at most {MAX_BOXES} are allowed: raise `floor` of the detector in "
             "the cell file, or use another detector"
         )
-    if invalid := next((one for one in answer.confident if not _is_valid(one)), None):
+    if invalid := next(filterfalse(_is_valid, answer.confident), None):
         raise Unavailable(
             f"detector {answer.detector} returned an invalid box: {invalid.label[:MAX_LABEL_LENGTH]!r} "
             f"{invalid.confidence:g} at {invalid.box}"
         )
     threshold = answer.error_rates.threshold
-    visible = [
-        one for one in answer.confident if frame.compute_visible_fraction(one.box) >= MIN_VISIBLE_FRACTION
-    ]
-    known = [one for one in visible if one.label in labels]
-    return replace(
-        answer,
-        confident=tuple(one for one in known if _is_confident(one, threshold)),
-        doubtful=tuple(one for one in known if not _is_confident(one, threshold)),
-        unknown=tuple(one for one in visible if one.label not in labels and one.confidence >= threshold),
-    )
+    confident: list[Detection] = []
+    doubtful: list[Detection] = []
+    unknown: list[Detection] = []
+    for detection in answer.confident:
+        if frame.compute_visible_fraction(detection.box) < MIN_VISIBLE_FRACTION:
+            continue
+        if detection.label in labels:
+            (confident if _is_confident(detection, threshold) else doubtful).append(detection)
+        elif detection.confidence >= threshold:
+            unknown.append(detection)
+    return replace(answer, confident=tuple(confident), doubtful=tuple(doubtful), unknown=tuple(unknown))
 
 
 @dataclass(frozen=True, eq=False)
 class ScreenedDetector:
-    """A detector whose answers are screened; implements `executive.cell.protocols.Detector`.
+    """Detector with screened answers; implements `executive.cell.protocols.Detector`.
 
     Attributes:
         detector: The detector.
@@ -95,15 +96,15 @@ def screen_detectors(detectors: Mapping[str, Detector], labels: Collection[str])
 
 
 def _is_confident(detection: Detection, threshold: float) -> bool:
-    """Return True if a detection is confident enough, and its second class is at most half as likely."""
+    """Return True if a detection reaches the threshold, and its second class has a low confidence."""
     confidence = detection.confidence
-    return confidence >= threshold and detection.second_confidence <= MAX_RIVAL_RATIO * confidence
+    return confidence >= threshold and detection.second_confidence <= MAX_SECOND_CLASS_RATIO * confidence
 
 
 def _is_valid(detection: Detection) -> bool:
     """Return True if a detection has a valid box, a valid confidence and a printable label."""
     left, top, right, bottom = detection.box
-    # All comparisons with NaN are False.
+    # These comparisons also reject NaN.
     is_in_range = all(abs(edge) <= MAX_COORDINATE for edge in detection.box)
     is_printable = detection.label.isprintable() and len(detection.label) <= MAX_LABEL_LENGTH
     return is_in_range and left <= right and top <= bottom and 0 <= detection.confidence <= 1 and is_printable

@@ -1,4 +1,4 @@
-"""Inputs of a detector: parts of the cell and of the run, and the options of its kind."""
+"""Inputs of a detector: parts of the cell and of the run, and options in the cell file."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from executive.errors import InputError
 OptionErrors = Iterator[tuple[str, str]]
 """Names of missing, unknown or invalid options of a detector, each with an error message."""
 OptionsT = TypeVar("OptionsT", bound=Section)
+"""Class with the options of one kind of detector."""
 
 
 class ClosableDetector(Detector, Protocol):
@@ -36,7 +37,7 @@ class DetectorSetting:
         clock: Clock of the run, which determines when answers become available.
         base: Folder to which paths in options are relative.
         seed: Random seed of the detector.
-        get_detector: Function that returns another detector of the cell by name, which must not be closed.
+        get_detector: Function that returns a detector of the cell by name; the caller must not close it.
     """
 
     name: str
@@ -52,16 +53,16 @@ def find_option_errors(options: type[Section], config: DetectorConfig) -> Option
     try:
         options.model_validate(config.options)
     except ValidationError as error:
-        known = ", ".join(options.model_fields) or "none"
+        option_names = ", ".join(options.model_fields) or "none"
         problems: dict[str, ErrorDetails] = {}
-        for problem in error.errors():  # An option of several types has an error for each type.
+        for problem in error.errors():  # pydantic reports one error for each allowed type of an option.
             problems.setdefault(str(problem["loc"][0]), problem)
         for option, problem in problems.items():
-            place = ".".join(map(str, problem["loc"]))
+            key_path = ".".join(map(str, problem["loc"]))
             yield (
                 option,
-                f'option "{place}" of a detector of kind {config.kind}: {problem["msg"].lower()}; '
-                f"the options are {known}",
+                f'option "{key_path}" of a detector of kind {config.kind}: {problem["msg"].lower()}; '
+                f"the options are {option_names}",
             )
 
 
@@ -79,7 +80,7 @@ def read_options(options: type[OptionsT], config: DetectorConfig) -> OptionsT:
 def find_class_map_errors(
     config: DetectorConfig, class_map: Mapping[str, str], labels: Collection[str]
 ) -> OptionErrors:
-    """Yield the option `class_map` with an error message if it has a class that the model lacks."""
+    """Yield the option `class_map` with an error message if the model lacks a class of `class_map`."""
     unknown = [name for name in class_map if name not in labels]
     if unknown:
         yield (

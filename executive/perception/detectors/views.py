@@ -17,13 +17,15 @@ Region = tuple[int, int, int, int]
 """Left, top, right and bottom side [pixel] of a region of an image."""
 
 TILE_OVERLAP = 0.25
-"""Minimum overlap of neighbouring tiles, as a fraction of their side; larger than any object."""
+"""Minimum overlap of neighbouring tiles, as a fraction of their side; objects are smaller."""
 MAX_TRUNCATION_DISTANCE = 0.01
-"""Maximum distance, as a fraction of the width of the region, of a truncated box from its border."""
+"""Maximum distance of a truncated box from the border of its region, as a fraction of the region width."""
 MIN_DUPLICATE_IOU = 0.7
-"""Minimum intersection over union of two boxes of one object; it is lower for touching objects."""
-MIN_SAME_IOU, MIN_CONTAINED_FRACTION = 0.5, 0.7
-"""Minimum intersection over union, or over the smaller box, of boxes of one object in two tiles."""
+"""Minimum intersection over union of two boxes of one object; boxes of touching objects have less."""
+MIN_TILE_IOU = 0.5
+"""Minimum intersection over union of the boxes of one object in two tiles."""
+MIN_CONTAINED_FRACTION = 0.7
+"""Minimum intersection of the boxes of one object in two tiles, as a fraction of the smaller box."""
 
 
 @dataclass(frozen=True)
@@ -75,63 +77,63 @@ def search_regions(
         detect: Function that returns the detections in a crop, with boxes in pixels of the crop.
         class_map: Class names of the cell by class names from `detect`, if the names differ.
     """
-    found = []
+    detections = []
     for region in regions:
         left, top, right, bottom = region
         for detection in detect(image[top:bottom, left:right]):
-            x0, y0, x1, y1 = detection.box
-            box = left + x0, top + y0, left + x1, top + y1
+            box_left, box_top, box_right, box_bottom = detection.box
+            box = left + box_left, top + box_top, left + box_right, top + box_bottom
             label = class_map.get(detection.label, detection.label)
-            found.append(RegionDetection(replace(detection, label=label, box=box), region))
-    return merge_detections(found, (image.shape[1], image.shape[0]))
+            detections.append(RegionDetection(replace(detection, label=label, box=box), region))
+    return merge_detections(detections, (image.shape[1], image.shape[0]))
 
 
-def merge_detections(found: Sequence[RegionDetection], size: tuple[int, int]) -> list[Detection]:
+def merge_detections(detections: Sequence[RegionDetection], size: tuple[int, int]) -> list[Detection]:
     """Return one detection per object, most confident first.
 
-    Of several boxes of one object in overlapping regions, a box that is not truncated by the border of its
-    region is preferred, then the more confident box.
+    For an object with boxes in several regions, an untruncated box is preferred to a more confident box.
 
     Args:
-        found: Detections in all regions.
+        detections: Detections in all regions.
         size: Width and height of the image [pixel].
     """
-    ranked = sorted(found, key=lambda each: (_is_truncated(each, size), -each.detection.confidence))
-    is_same = _find_same_objects([each.detection.box for each in ranked])
-    kept: list[int] = []
-    for index, each in enumerate(ranked):
-        if not any(is_same[index, other] and each.region != ranked[other].region for other in kept):
-            kept.append(index)
-    return sorted((ranked[index].detection for index in kept), key=lambda detection: -detection.confidence)
+    candidates = sorted(detections, key=lambda item: (_is_truncated(item, size), -item.detection.confidence))
+    is_same_object = _compare_objects([candidate.detection.box for candidate in candidates])
+    selection: list[int] = []
+    for index, candidate in enumerate(candidates):
+        selected_elsewhere = [each for each in selection if candidates[each].region != candidate.region]
+        if not is_same_object[index, selected_elsewhere].any():
+            selection.append(index)
+    merged = (candidates[index].detection for index in selection)
+    return sorted(merged, key=lambda detection: -detection.confidence)
 
 
-def remove_duplicates(found: Sequence[Detection]) -> list[Detection]:
-    """Return `found`, most confident first, without duplicates of a more confident detection."""
-    if len(found) < 2:
-        return list(found)
+def remove_duplicates(detections: Sequence[Detection]) -> list[Detection]:
+    """Return the detections without duplicates of more confident ones; the input is most confident first."""
+    if len(detections) < 2:
+        return list(detections)
     from supervision import box_non_max_suppression
 
-    # Ranks are used instead of confidences, so that the first of equally confident detections is kept.
-    ranked = np.array([(*detection.box, -rank) for rank, detection in enumerate(found)])
-    keep = box_non_max_suppression(ranked, MIN_DUPLICATE_IOU)
-    return [detection for detection, is_kept in zip(found, keep, strict=True) if is_kept]
+    # The negative index replaces the confidence, because of equally confident boxes the first must remain.
+    scored_boxes = np.array([(*detection.box, -index) for index, detection in enumerate(detections)])
+    is_unique = box_non_max_suppression(scored_boxes, MIN_DUPLICATE_IOU)
+    return [detection for detection, is_kept in zip(detections, is_unique, strict=True) if is_kept]
 
 
-def _find_same_objects(boxes: Sequence[Box]) -> NDArray[np.bool_]:
-    """Return a matrix `(N, N)` that is True for each pair of boxes of one object, truncated or not."""
+def _compare_objects(boxes: Sequence[Box]) -> NDArray[np.bool_]:
+    """Return a matrix `(N, N)` that is True for each pair of boxes that show one object."""
     if len(boxes) < 2:
         return np.zeros((len(boxes), len(boxes)), dtype=np.bool_)
     from supervision import OverlapMetric, box_iou_batch
 
     corners = np.array(boxes)
-    contained = box_iou_batch(corners, corners, OverlapMetric.IOS) > MIN_CONTAINED_FRACTION
-    return np.asarray((box_iou_batch(corners, corners) > MIN_SAME_IOU) | contained)
+    is_contained = box_iou_batch(corners, corners, OverlapMetric.IOS) > MIN_CONTAINED_FRACTION
+    return np.asarray((box_iou_batch(corners, corners) > MIN_TILE_IOU) | is_contained)
 
 
-def _is_truncated(found: RegionDetection, size: tuple[int, int]) -> bool:
+def _is_truncated(detection: RegionDetection, size: tuple[int, int]) -> bool:
     """Return True if a box reaches a border of its region that is not a border of the image."""
-    left, top, right, bottom = found.detection.box
-    region = found.region
+    (left, top, right, bottom), region = detection.detection.box, detection.region
     margin = MAX_TRUNCATION_DISTANCE * (region[2] - region[0])
     return (
         (region[0] > 0 and left - region[0] < margin)
@@ -142,7 +144,7 @@ def _is_truncated(found: RegionDetection, size: tuple[int, int]) -> bool:
 
 
 def _list_tile_starts(length: int, side: int) -> list[int]:
-    """Return the first pixels of evenly spaced tiles of width `side` that cover `length` pixels."""
+    """Return the first pixel of each tile; evenly spaced tiles of width `side` cover `length` pixels."""
     if length <= side:
         return [0]
     count = math.ceil((length - TILE_OVERLAP * side) / (side * (1 - TILE_OVERLAP)))

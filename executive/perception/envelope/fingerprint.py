@@ -12,7 +12,7 @@ from executive.perception.camera_model import compute_calibration
 from executive.perception.detectors.detector_registry import find_detector_kinds
 
 Fingerprint = Mapping[str, str]
-"""Value of each property as text, by name; a measurement applies to detectors with an equal fingerprint."""
+"""Text of each property by its name; a measurement applies to all detectors with an equal fingerprint."""
 
 
 def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerprint:
@@ -43,7 +43,7 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Finger
 
 
 def list_changed_properties(measured: Fingerprint, current: Fingerprint) -> str:
-    """Return the names of the properties that differ between two fingerprints, or ""."""
+    """Return the names of the properties that differ between two fingerprints; "" if none."""
     return ", ".join(
         name for name in dict.fromkeys([*measured, *current]) if measured.get(name) != current.get(name)
     )
@@ -57,6 +57,7 @@ def _digest_weights(section: DetectorConfig, base: Path) -> str:
 
 
 def _describe_camera(camera: CameraConfig, config: CellConfig) -> dict[str, str]:
+    """Return the properties of a camera that affect error rates."""
     matrix, X_MC = compute_calibration(camera)
     poses = (
         {name: config.arm.poses_deg[name] for name in camera.scan_poses} if camera.mount == "wrist" else {}

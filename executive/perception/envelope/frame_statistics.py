@@ -15,16 +15,16 @@ from executive.perception.visibility import compute_hull_mask
 MIN_PIXELS = 400
 """Minimum number of visible pixels of the workspace for the computation of statistics."""
 ABSOLUTE_TOLERANCE = 6.0
-"""Minimum tolerance of a statistic outside the measured range [grey level]."""
+"""Minimum tolerance below and above the measured range of a statistic [grey level]."""
 RELATIVE_TOLERANCE = 0.08
-"""Tolerance as a fraction of the limit of the range; the larger of the two tolerances applies."""
+"""Minimum tolerance below and above the measured range of a statistic, as a fraction of the range limit."""
 
 
 @dataclass(frozen=True)
 class FrameStatistics:
     """Statistics of the workspace in one frame, all in grey levels from 0 to 255.
 
-    Medians describe the table also if objects cover a part of it.
+    Medians describe the colour of the table even if objects cover a part of the table.
 
     Attributes:
         brightness: Median over the pixels of the mean of the three colours.
@@ -54,16 +54,16 @@ class FrameRange(Section):
         if not samples:
             return None
         values = {name: [asdict(sample)[name] for sample in samples] for name in FrameRange.model_fields}
-        ranges = {name: (round(min(each), 1), round(max(each), 1)) for name, each in values.items()}
+        ranges = {name: (round(min(column), 1), round(max(column), 1)) for name, column in values.items()}
         return FrameRange.model_validate(ranges)
 
     def describe_difference(self, statistics: FrameStatistics) -> str:
-        """Return a text with name, value and range of each statistic outside its range, or ""."""
+        """Return a text with name, value and range of each statistic outside its range; "" if none."""
         differences = []
         for name, value in asdict(statistics).items():
-            low, high = getattr(self, name)
-            if not low - _compute_tolerance(low) <= value <= high + _compute_tolerance(high):
-                differences.append(f"{name} {value:.0f}, measured {low:.0f} to {high:.0f}")
+            lower, upper = getattr(self, name)
+            if not lower - _compute_tolerance(lower) <= value <= upper + _compute_tolerance(upper):
+                differences.append(f"{name} {value:.0f}, measured {lower:.0f} to {upper:.0f}")
         return "; ".join(differences)
 
 
@@ -79,7 +79,7 @@ def compute_frame_statistics(frame: Frame, table: TableConfig) -> FrameStatistic
     mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, (width, height))
     if mask is None or np.count_nonzero(mask := mask & frame.visible) < MIN_PIXELS:
         return None
-    # The mean of 3 x 3 pixels removes most of the image noise, which would increase the contrast.
+    # Image noise would increase the contrast; the mean of 3 x 3 pixels removes most of the noise.
     colours = cv2.blur(frame.image, (3, 3))[mask].astype(float)
     grey = colours.mean(axis=1)
     brightness = float(np.median(grey))
@@ -87,5 +87,5 @@ def compute_frame_statistics(frame: Frame, table: TableConfig) -> FrameStatistic
     return FrameStatistics(brightness, float(np.median(np.abs(grey - brightness))), red, green, blue)
 
 
-def _compute_tolerance(limit: float) -> float:
-    return max(ABSOLUTE_TOLERANCE, RELATIVE_TOLERANCE * limit)
+def _compute_tolerance(range_limit: float) -> float:
+    return max(ABSOLUTE_TOLERANCE, RELATIVE_TOLERANCE * range_limit)

@@ -15,13 +15,13 @@ from executive.errors import InputError
 from executive.perception.envelope.frame_statistics import FrameRange
 
 MEASUREMENT_SUFFIX = ".measured.json"
-"""Suffix of a measurement file; the name of the cell comes before it."""
+"""Suffix of a measurement file, after the name of the cell."""
 MAX_FILE_SIZE = 1_000_000
 """Maximum size of a measurement file [byte]."""
 
 
 class StoredErrorRates(Section):
-    """Stored fields of `executive.cell.error_rates.ErrorRates`."""
+    """Error rates of a detector in a measurement file; `executive.cell.error_rates` describes the fields."""
 
     miss_rate: float = Field(gt=0, lt=1)
     confusion_rate: float = Field(gt=0, lt=1)
@@ -36,7 +36,7 @@ class StoredErrorRates(Section):
 
 
 class ErrorCounts(Section):
-    """Numbers of objects and errors, for one class or for scenes with one number of objects."""
+    """Numbers of objects, missed and misclassified objects, and false detections, in a part of the scenes."""
 
     objects: int
     missed: int
@@ -56,6 +56,7 @@ class Measurement(Section):
     seconds: float
     """Duration of the measurement [s]."""
     images: int
+    """Number of measured images."""
     rates: StoredErrorRates
     """`miss_rate`, `confusion_rate`, `false_detections`: upper 95 % bounds; `repeated`: Laplace estimate;
     `jitter`, `bias`: standard deviations."""
@@ -95,7 +96,7 @@ def read_measurements(path: Path) -> tuple[Measurement, ...]:
 
 def format_measurements(measurements: Iterable[Measurement], new: Measurement) -> str:
     """Return the text of a measurement file in which `new` replaces the measurement of its detector."""
-    others = [each for each in measurements if each.detector != new.detector]
-    ordered = sorted((*others, new), key=lambda each: each.detector)
+    others = [measurement for measurement in measurements if measurement.detector != new.detector]
+    ordered = sorted((*others, new), key=lambda measurement: measurement.detector)
     content = MeasurementFile(measurements=tuple(ordered)).model_dump(mode="json")
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"

@@ -1,4 +1,4 @@
-"""Detectors of a cell with their error rates, which are measured, or assumed without a measurement."""
+"""Detectors of a cell with measured error rates, or with assumed error rates without a measurement."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MEASUREMENT_MINUTES = 2
 
 @dataclass(frozen=True)
 class DetectorEnvelope:
-    """Error rates of one detector, and the measured conditions to which they apply.
+    """Error rates of one detector, and the measured conditions to which the error rates apply.
 
     Attributes:
         error_rates: Measured error rates, or assumed error rates (with an `assumption_reason`).
@@ -60,7 +60,7 @@ class RatedDetector:
         if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
             reason = (
                 f"the workspace differs from all images with which detector {self.name} was measured: "
-                f"{difference}; {advise_measuring(self.config)}"
+                f"{difference}; {describe_measurement_command(self.config)}"
             )
             error_rates = assume_rates(error_rates.threshold, reason)
         request = self.detector.request(frame, view)
@@ -87,18 +87,18 @@ def build_rated_detectors(
         InputError: A detector cannot be built.
     """
     camera = next(iter(config.cameras.values()))
-    built = build_detectors(config.detectors, camera=camera, clock=clock, base=base, seed=seed)
+    detectors = build_detectors(config.detectors, camera=camera, clock=clock, base=base, seed=seed)
     envelopes = find_envelopes(config, base, folders)
     return {
         name: RatedDetector(detector, envelopes[name], config, name) if name in envelopes else detector
-        for name, detector in built.items()
+        for name, detector in detectors.items()
     }
 
 
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, DetectorEnvelope]:
     """Return the envelope of each measurable detector of a cell, by name.
 
-    A measurement applies if its fingerprint is that of the detector, also if it was made in another cell.
+    A measurement in another cell also applies if it has the same fingerprint as the detector.
 
     Args:
         config: The cell file.
@@ -106,24 +106,26 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
         folders: Folders with measurement files `CELL.measured.json`.
     """
     names = list(find_measurable_detectors(config))
-    stored, problems = _read_all_measurements(folders) if names else ([], [])
-    envelopes = {}
+    measurements, problems = _read_all_measurements(folders) if names else ([], [])
+    envelopes, advice = {}, describe_measurement_command(config)
     for name in names:
         threshold = config.detectors[name].threshold
-        current = compute_fingerprint(config, name, base)
-        match = next((each for _, each in stored if each.fingerprint == current), None)
+        fingerprint = compute_fingerprint(config, name, base)
+        match = next((entry for _, entry in measurements if entry.fingerprint == fingerprint), None)
         if match is not None:
             envelopes[name] = DetectorEnvelope(match.rates.build_error_rates(threshold), match.frames)
             continue
-        older = next((each for cell, each in stored if (cell, each.detector) == (config.cell, name)), None)
-        changes = list_changed_properties(older.fingerprint, current) if older else ""
-        cause = f"was measured before a change of {changes}" if changes else "was never measured in this cell"
-        reason = f"detector {name} {cause}, so high error rates are assumed; {advise_measuring(config)}"
-        envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([reason, *problems])))
+        own_entries = (entry for cell, entry in measurements if (cell, entry.detector) == (config.cell, name))
+        cause = "was never measured in this cell"
+        if outdated := next(own_entries, None):
+            changes = list_changed_properties(outdated.fingerprint, fingerprint)
+            cause = f"was measured before a change of {changes}"
+        cause = f"detector {name} {cause}, so high error rates are assumed"
+        envelopes[name] = DetectorEnvelope(assume_rates(threshold, "; ".join([cause, advice, *problems])))
     return envelopes
 
 
-def advise_measuring(config: CellConfig) -> str:
+def describe_measurement_command(config: CellConfig) -> str:
     """Return the advice to measure a detector, with the command: a clause for messages."""
     return f"measure it with `executive evaluate --cell {config.cell}` (about {MEASUREMENT_MINUTES} min)"
 
@@ -139,20 +141,20 @@ def find_unmeasured_detectors(
 
 def find_measurable_detectors(config: CellConfig) -> Iterator[str]:
     """Yield the names of the detectors that can be measured: their kind is installed and not fake."""
-    kinds = find_detector_kinds()
+    kinds = {} if config.kind == FAKE_KIND else find_detector_kinds()
     for name, section in config.detectors.items():
-        is_known = config.kind != FAKE_KIND and section.kind in kinds
-        if is_known and not getattr(kinds[section.kind].load(), "is_fake", False):
+        if section.kind in kinds and not getattr(kinds[section.kind].load(), "is_fake", False):
             yield name
 
 
 def _read_all_measurements(folders: Sequence[Path]) -> tuple[list[tuple[str, Measurement]], list[str]]:
     """Return all stored measurements, each with the name of its cell, and messages about unreadable files."""
-    stored: list[tuple[str, Measurement]] = []
+    measurements: list[tuple[str, Measurement]] = []
     problems = []
     for file in (file for folder in folders for file in sorted(folder.glob(f"*{MEASUREMENT_SUFFIX}"))):
         try:
-            stored += [(file.name.removesuffix(MEASUREMENT_SUFFIX), each) for each in read_measurements(file)]
+            cell = file.name.removesuffix(MEASUREMENT_SUFFIX)
+            measurements += [(cell, measurement) for measurement in read_measurements(file)]
         except InputError as error:
             problems.append(str(error))
-    return stored, problems
+    return measurements, problems

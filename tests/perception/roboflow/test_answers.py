@@ -154,7 +154,7 @@ def test_a_sentence_says_what_where_and_what_to_look_at():
         f"{HOST} has no model shapes/1 (404: no such model); check model_id and url"
     )
     unknown = {"failure": "status", "status": 599, "detail": ""}
-    assert describe_failure(unknown, OPTIONS) == f"{HOST} gave no answer (599); look at its log"
+    assert describe_failure(unknown, OPTIONS) == f"{HOST} reported an unexpected status (599); check its log"
 
 
 @pytest.mark.parametrize(
@@ -166,11 +166,11 @@ def test_a_sentence_says_what_where_and_what_to_look_at():
         ),
         (
             {"failure": "status", "status": 400, "detail": ""},
-            "could not use the request (400); check workspace and workflow_id and api",
+            "rejected the request (400); check workspace and workflow_id and api",
         ),
         (
-            {"failure": "no output", "detail": "its outputs: picture, top"},
-            'ran workflow acme/sorting, which has no output "boxes" (its outputs: picture, top); '
+            {"failure": "no output", "detail": "the outputs are picture, top"},
+            'ran workflow acme/sorting, which has no output "boxes" (the outputs are picture, top); '
             "check workflow_output",
         ),
     ],
@@ -180,7 +180,7 @@ def test_a_sentence_about_a_workflow_names_its_options(failure, sentence):
 
 
 def test_an_impossible_answer_is_reported_with_the_advice_to_check():
-    beginning = f"{HOST} gave an answer that cannot be right: no box; "
+    beginning = f"{HOST} sent an invalid answer: no box; "
     assert (
         describe_invalid_answer("no box", OPTIONS) == f"{beginning}is shapes/1 a model that detects objects?"
     )
@@ -190,12 +190,16 @@ def test_an_impossible_answer_is_reported_with_the_advice_to_check():
 
 def test_a_passed_deadline_is_reported_with_the_answers_of_the_server():
     for repeats, end in (
-        ((), "; look at its log and the network, or give it a longer deadline"),
+        ((), "; check its log and the network, or increase deadline"),
         (
             (None, 429),
-            ", which has been asked too often (429); ask less often, or look at the plan of the account",
+            ", which received too many requests (429); "
+            "reduce the request rate, or check the plan of the account",
         ),
-        ((599,), ", which gave no answer (599); look at its log"),
-        ((None,), ", to which there was no connection; is it running, and is url right?"),
+        ((599,), ", which reported an unexpected status (599); check its log"),
+        (
+            (None,),
+            ", which is not reachable; check that the server is running, and check url",
+        ),
     ):
         assert describe_delay(repeats, OPTIONS) == f"no answer within 1.0 s from {HOST}{end}"

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from executive.errors import Fault, Unavailable
-from executive.perception.detectors.roboflow import helper as module
-from executive.perception.detectors.roboflow.helper import InferenceProcess, NoAnswer
+from executive.perception.detectors.roboflow import inference_process as module
+from executive.perception.detectors.roboflow.inference_process import InferenceProcess, NoAnswer
 from executive.perception.detectors.roboflow.key import ApiKey
 
 HERE = Path(__file__).parent
@@ -163,7 +163,7 @@ def test_it_ends_with_its_parent_though_its_server_hangs():
 ORPHANING = """
 import sys, time
 import numpy as np
-from executive.perception.detectors.roboflow.helper import InferenceProcess
+from executive.perception.detectors.roboflow.inference_process import InferenceProcess
 from executive.perception.detectors.roboflow.key import ApiKey
 
 helper = InferenceProcess({"url": sys.argv[1], "model_id": "a/1", "api": "v1", "confidence": 0.5}, ApiKey())

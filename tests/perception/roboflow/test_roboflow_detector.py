@@ -147,7 +147,7 @@ def test_an_image_takes_the_requests_and_a_full_frame_the_images_that_the_option
 @pytest.mark.slow
 def test_one_deadline_covers_the_images_of_all_tiles(make, server):
     detector = make(**{**V1, "full": "tiles", "deadline": 1.0})
-    detector._helper.wait_until_ready()
+    detector._process.wait_until_ready()
     server.delay, began = 0.2, time.monotonic()
     with pytest.raises(DeadlinePassed, match=r"^no answer within 1\.0 s from"):
         search(detector, spot(), "full")
@@ -160,7 +160,7 @@ def test_an_output_that_a_workflow_lacks_is_named_with_those_that_it_has(make, s
     assert_unavailable(
         detector,
         f'^{server.url} ran workflow acme/sorting, which has no output "circles" '
-        r"\(its outputs: picture, boxes\); check workflow_output$",
+        r"\(the outputs are picture, boxes\); check workflow_output$",
     )
 
 
@@ -172,20 +172,20 @@ def test_what_is_below_the_floor_is_left_out_and_a_class_nobody_asked_for_is_not
 
 
 REFUSED = {
-    "400": "could not use the request",
+    "400": "rejected the request",
     "401": r"does not accept the key \(401: key \*\*\* is no good\); set ROBOFLOW_API_KEY to a key",
-    "402": "wants to be paid .* look at the plan",
+    "402": "requires a payment .* check the plan",
     "403": "does not accept the key .* set ROBOFLOW_API_KEY",
     "404": "has no model shapes/1 .* check model_id and url",
-    "413": "finds the image too large",
-    "418": "gave no answer",
-    "429": "asked too often",
-    "500": "has an error of its own .* look at its log",
-    "502": "has lost the server behind it",
+    "413": "rejected the image as too large",
+    "418": "reported an unexpected status",
+    "429": "received too many requests",
+    "500": "had an internal error .* check its log",
+    "502": "is a gateway without a connection to the server",
     "503": "is not ready, or cannot load model shapes/1",
 }
-GARBLED = "(answered with something that|gave an answer that)"
-ABSURD = "gave an answer that cannot be right: .*shapes/1"
+GARBLED = "sent an (answer that inference-sdk cannot read|invalid answer)"
+ABSURD = "sent an invalid answer: .*shapes/1"
 FAULTS = {
     **REFUSED,
     **dict.fromkeys(sorted(BODIES), GARBLED),
@@ -198,7 +198,7 @@ def asked_for(sentence, api):
     if api != "workflow":
         return sentence
     words = {
-        "right: .*shapes/1": 'right: .*"boxes"',
+        "invalid answer: .*shapes/1": 'invalid answer: .*"boxes"',
         "model shapes/1": "workflow acme/sorting",
         "model_id": "workspace and workflow_id",
     }
@@ -230,12 +230,14 @@ def test_every_fault_of_the_server_is_unavailable_with_what_to_do(make, server, 
 def test_a_server_that_is_gone_and_comes_back(detector, server):
     server.stop()
     try:
-        assert_unavailable(detector, f"^{server.url} refused the connection .*; is it running")
+        assert_unavailable(
+            detector, f"^{server.url} refused the connection .*; check that the server is running"
+        )
     finally:
         server.start()
     server.faults = lambda look: "stop"
     try:
-        assert_unavailable(detector, "broke off|refused the connection")
+        assert_unavailable(detector, "closed the connection|refused the connection")
     finally:
         server.over.wait(5)
         server.start()
@@ -247,9 +249,9 @@ def test_a_server_that_is_gone_and_comes_back(detector, server):
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"url": "http://nobody.invalid:9001"}, "http://nobody.invalid:9001 is not known by this name"),
-        ({"url": "https://127.0.0.1:{port}"}, r"https://127.0.0.1:\d+ cannot be trusted \(TLS\)"),
-        ({"key": "", "api": "v0"}, "wants a key .*; set ROBOFLOW_API_KEY"),
+        ({"url": "http://nobody.invalid:9001"}, "http://nobody.invalid:9001 has an unknown host name"),
+        ({"url": "https://127.0.0.1:{port}"}, r"https://127.0.0.1:\d+ failed the TLS handshake"),
+        ({"key": "", "api": "v0"}, "requires a key .*; set ROBOFLOW_API_KEY"),
     ],
 )
 def test_an_address_or_key_that_does_not_work_is_said(make, server, options, text):
@@ -276,7 +278,7 @@ def test_closing_does_not_wait_for_a_server_that_hangs(server):
 def test_a_server_that_never_answers_costs_its_deadline_and_shows_it_on_the_runs_clock(
     detector, server, fault
 ):
-    detector._helper.wait_until_ready()
+    detector._process.wait_until_ready()
     server.faults = lambda look: fault
     clock = detector._setting.clock
     clock.now, began = 10.0, time.monotonic()

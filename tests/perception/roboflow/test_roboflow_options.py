@@ -25,7 +25,7 @@ def configured(**options):
             "model_id",
             "^api: auto needs model_id: project/version, or a name such as rfdetr-",
         ),
-        ({"model_id": "a b"}, "model_id", "^model_id must be a name or project/version alone, without"),
+        ({"model_id": "a b"}, "model_id", "^model_id must be a name or project/version, without"),
         (
             {"workflow_id": "a"},
             "workflow_id",
@@ -45,7 +45,7 @@ def configured(**options):
         (
             {"api": "workflow", "workspace": "acme", "workflow_id": "a/b"},
             "workflow_id",
-            "^workflow_id must be a name alone, without /, ",
+            "^workflow_id must be a name without /, ",
         ),
         (
             {"api": "workflow", "workspace": "acme", "workflow_id": "a", "workflow_output": ""},

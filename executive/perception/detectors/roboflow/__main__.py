@@ -1,9 +1,9 @@
 """Client program of a Roboflow inference server: `python -m executive.perception.detectors.roboflow`.
 
-The argument is JSON with the server, the model or workflow, and the minimum confidence. The standard input
-has, for each image, a line of JSON with width and height, then the pixels. The standard output has a line of
-JSON when the program is ready, and at least one for each image. The API key is in an environment variable.
-The program exits at the end of its input, even during a request.
+The argument is JSON with the server, the model or workflow, and the minimum confidence. An environment
+variable contains the API key. On the standard input, an image is a line of JSON with width and height,
+followed by the pixels. The standard output contains one JSON message per line: a message when the program is
+ready, one for each retry, and one answer per image. The program exits at the end of its input.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ if TYPE_CHECKING:
     from inference_sdk import InferenceHTTPClient
 
 MAX_ANSWER_LENGTH = 1 << 20
-"""Maximum number of characters of an answer; 300 predictions need about a twentieth of this number."""
+"""Maximum number of characters of an answer, about 20 times the length of 300 predictions."""
 
-Write = Callable[..., None]
+WriteMessage = Callable[..., None]
 """Function that writes its keyword arguments as one line of JSON."""
+InferenceFunction = Callable[[NDArray[np.uint8]], Any]
+"""Function that sends an RGB image `(H, W, 3)` to the server and returns the answer."""
 
 
 class MissingOutput(Exception):
@@ -45,7 +47,7 @@ def main() -> None:
         infer = _make_inference_function(json.loads(sys.argv[1]))
     except Exception as error:
         write(setup_error=f"{type(error).__name__}: {error}")
-        # The reading thread holds the lock of the input, which makes a normal exit abort the interpreter.
+        # A normal exit would abort the interpreter, because the reading thread holds the lock of the input.
         os._exit(0)
     logging.getLogger("backoff").addHandler(_RetryHandler(write))
     logging.getLogger("backoff").setLevel(logging.DEBUG)
@@ -54,14 +56,14 @@ def main() -> None:
         _write_answer(infer, images.get(), write)
 
 
-def _open_output() -> Write:
+def _open_output() -> WriteMessage:
     """Return a function that writes to the standard output; redirect all other output to standard error."""
-    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)
+    output = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
 
     def write(**message: Any) -> None:
-        out.write(json.dumps(message) + "\n")
-        out.flush()
+        output.write(json.dumps(message) + "\n")
+        output.flush()
 
     return write
 
@@ -78,8 +80,8 @@ def _read_images(pipe: BinaryIO, images: queue.Queue[NDArray[np.uint8]]) -> None
     os._exit(0)
 
 
-def _make_inference_function(settings: dict[str, Any]) -> Callable[[NDArray[np.uint8]], Any]:
-    """Return a function that sends an RGB image to the model or workflow and returns the answer."""
+def _make_inference_function(settings: dict[str, Any]) -> InferenceFunction:
+    """Return the function for the model or the workflow in `settings`."""
     from inference_sdk import InferenceConfiguration, InferenceHTTPClient
 
     key = os.environ.get(KEY_VARIABLE, "").strip() or None
@@ -103,11 +105,11 @@ def _run_workflow(client: InferenceHTTPClient, settings: dict[str, Any], image: 
     images = {settings["workflow_input"]: image}
     (outputs,) = client.run_workflow(settings["workspace"], settings["workflow_id"], images=images)
     if settings["workflow_output"] not in outputs:
-        raise MissingOutput(f"its outputs: {', '.join(outputs)}")
+        raise MissingOutput(f"the outputs are {', '.join(outputs)}")
     return outputs[settings["workflow_output"]]
 
 
-def _write_answer(infer: Callable[[NDArray[np.uint8]], Any], image: NDArray[np.uint8], write: Write) -> None:
+def _write_answer(infer: InferenceFunction, image: NDArray[np.uint8], write: WriteMessage) -> None:
     """Send an image to the server, and write its answer, or the reason why there is none."""
     try:
         answer = infer(image)
@@ -129,34 +131,34 @@ def _describe_error(error: Exception) -> dict[str, Any]:
     import ssl
 
     import requests
-    from inference_sdk.http import errors as sdk
+    from inference_sdk.http import errors as sdk_errors
 
-    if isinstance(error, sdk.HTTPCallErrorError):
+    if isinstance(error, sdk_errors.HTTPCallErrorError):
         return {"failure": "status", "status": error.status_code, "detail": str(error.api_message or "")}
     if isinstance(error, MissingOutput):
         return {"failure": "no output", "detail": str(error)}
-    kinds: tuple[tuple[str, tuple[type[BaseException], ...]], ...] = (
-        ("no key", (sdk.APIKeyNotProvided,)),
-        ("no model", (sdk.InvalidModelIdentifier, sdk.ModelNotInitializedError)),
-        ("no detector", (sdk.ModelTaskTypeNotSupportedError,)),
+    failures: tuple[tuple[str, tuple[type[BaseException], ...]], ...] = (
+        ("no key", (sdk_errors.APIKeyNotProvided,)),
+        ("no model", (sdk_errors.InvalidModelIdentifier, sdk_errors.ModelNotInitializedError)),
+        ("no detector", (sdk_errors.ModelTaskTypeNotSupportedError,)),
         ("refused", (ConnectionRefusedError,)),
         ("unknown host", (socket.gaierror,)),
         ("tls", (ssl.SSLError,)),
         ("invalid", (ValueError, LookupError, AttributeError, TypeError, RecursionError)),
-        ("lost", (OSError, requests.RequestException, sdk.HTTPClientError)),
+        ("lost", (OSError, requests.RequestException, sdk_errors.HTTPClientError)),
     )
-    for kind, types in kinds:
-        found = next((cause for cause in _iterate_causes(error) if isinstance(cause, types)), None)
-        if found is not None:
-            return {"failure": kind, "detail": f"{type(found).__name__}: {found}"}
+    for failure, exception_types in failures:
+        for cause in _iterate_causes(error):
+            if isinstance(cause, exception_types):
+                return {"failure": failure, "detail": f"{type(cause).__name__}: {cause}"}
     return {"failure": "other", "detail": f"{type(error).__name__}: {error}"}
 
 
 def _iterate_causes(error: BaseException | None) -> Iterator[BaseException]:
     """Yield an exception and its chain of causes, latest first."""
-    seen: set[int] = set()
-    while error is not None and id(error) not in seen:
-        seen.add(id(error))
+    visited_ids: set[int] = set()
+    while error is not None and id(error) not in visited_ids:
+        visited_ids.add(id(error))
         yield error
         error = error.__cause__ or error.__context__
 
@@ -164,14 +166,14 @@ def _iterate_causes(error: BaseException | None) -> Iterator[BaseException]:
 class _RetryHandler(logging.Handler):
     """Log handler that reports each retry of a request by inference-sdk."""
 
-    def __init__(self, write: Write) -> None:
+    def __init__(self, write: WriteMessage) -> None:
         super().__init__()
         self._write = write
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write the HTTP status that caused a retry, the last argument of `record`; None: no connection."""
-        last = record.args[-1] if isinstance(record.args, tuple) else None
-        self._write(retry_status=getattr(last, "status_code", None))
+        """Write the HTTP status that caused a retry; None without a connection."""
+        cause = record.args[-1] if isinstance(record.args, tuple) else None
+        self._write(retry_status=getattr(cause, "status_code", None))
 
 
 if __name__ == "__main__":

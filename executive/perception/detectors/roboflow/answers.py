@@ -17,8 +17,8 @@ MAX_PREDICTIONS = 300
 MAX_OVERHANG = 0.1
 """Maximum extent of a box beyond the image, as a fraction of the image size; such boxes are clipped."""
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+FiniteFloat = Annotated[float, Field(allow_inf_nan=False)]
+PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class _Prediction(BaseModel):
@@ -26,22 +26,24 @@ class _Prediction(BaseModel):
 
     model_config = ConfigDict(strict=True)
 
-    x: Finite
-    y: Finite
-    width: Positive
-    height: Positive
+    x: FiniteFloat
+    y: FiniteFloat
+    width: PositiveFloat
+    height: PositiveFloat
     confidence: Annotated[float, Field(ge=0, le=1)]
     label: str = Field(alias="class", min_length=1)
 
 
-class _Size(BaseModel):
-    width: Finite
-    height: Finite
+class _ImageSize(BaseModel):
+    width: FiniteFloat
+    height: FiniteFloat
 
 
 class _Answer(BaseModel):
+    """Answer of a server, with the size of the searched image [pixel]."""
+
     predictions: list[_Prediction] = Field(max_length=MAX_PREDICTIONS)
-    image: _Size | None = None
+    image: _ImageSize | None = None
 
 
 def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
@@ -62,7 +64,7 @@ def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
         raise ValueError(_describe_first_error(error)) from None
     if validated.image is not None and (validated.image.width, validated.image.height) != size:
         raise ValueError(
-            f"it is about an image of {validated.image.width:g} x {validated.image.height:g} pixels, "
+            f"it belongs to an image of {validated.image.width:g} x {validated.image.height:g} pixels, "
             f"and {size[0]} x {size[1]} were sent"
         )
     return list(_convert_predictions(validated.predictions, size))
@@ -71,8 +73,8 @@ def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
 def read_output(output: Any, size: tuple[int, int]) -> list[Detection]:
     """Return the detections in an output of a workflow, in the order of the output.
 
-    An output is an answer, the list of predictions of an answer, or a mapping with all outputs of a step
-    (`$steps.model.*`) and the answer as `predictions`. Without predictions, the size of the image is null.
+    An output is an answer, or a list of predictions, or a mapping of all outputs of a step (`$steps.model.*`)
+    whose key `predictions` contains an answer. In an answer without predictions, the image size is null.
 
     Args:
         output: Decoded JSON of the output.
@@ -112,7 +114,7 @@ def _convert_predictions(predictions: list[_Prediction], size: tuple[int, int]) 
 def _describe_first_error(error: ValidationError) -> str:
     """Return position and message of the first error in an answer, without values of the answer."""
     problem = error.errors(include_url=False, include_input=False)[0]
-    place = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in problem["loc"])
-    # The user does not know the classes of this module.
+    position = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in problem["loc"])
+    # The rest of the message names classes of this module, which the user does not know.
     message = problem["msg"].partition(" or instance of")[0]
-    return f"{place.removeprefix('.')}: {message[0].lower()}{message[1:]}"
+    return f"{position.removeprefix('.')}: {message[0].lower()}{message[1:]}"

@@ -19,7 +19,7 @@ from executive.perception.detectors.roboflow.failure_messages import (
     describe_failure,
     describe_invalid_answer,
 )
-from executive.perception.detectors.roboflow.helper import InferenceProcess, NoAnswer
+from executive.perception.detectors.roboflow.inference_process import InferenceProcess, NoAnswer
 from executive.perception.detectors.roboflow.key import ApiKey
 from executive.perception.detectors.roboflow.server_options import (
     WORKFLOW_OPTIONS,
@@ -31,7 +31,7 @@ from executive.perception.detectors.views import Region, remove_duplicates, sear
 
 
 class RoboflowDetector(ThreadedDetector):
-    """Sends frames to a hosted or self-hosted inference server; implements the protocol `Detector`.
+    """Client of a hosted or self-hosted inference server; implements `executive.cell.protocols.Detector`.
 
     Args:
         config: Section of the detector in the cell file.
@@ -47,7 +47,7 @@ class RoboflowDetector(ThreadedDetector):
         self._options = options
         self._read_answer = read_output if options.api == "workflow" else read_answer
         server = options.model_dump(include={"url", "model_id", "api", *WORKFLOW_OPTIONS})
-        self._helper = InferenceProcess({**server, "confidence": config.floor}, key)
+        self._process = InferenceProcess({**server, "confidence": config.floor}, key)
 
     @classmethod
     def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> RoboflowDetector:
@@ -70,23 +70,23 @@ class RoboflowDetector(ThreadedDetector):
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
         """Return the class names of the cell that the model can find; None if not listed in the options."""
         del base
-        if any(True for _ in find_roboflow_option_errors(config)):
+        if list(find_roboflow_option_errors(config)):
             return None
         options = RoboflowOptions.model_validate(config.options)
         return tuple(options.class_map.get(name, name) for name in options.labels) or None
 
     def _list_regions(self, view: str, size: tuple[int, ...]) -> list[Region]:
-        is_whole = view == "full" and self._options.full != "tiles"
-        return [(0, 0, size[0], size[1])] if is_whole else super()._list_regions(view, size)
+        is_whole_image = view == "full" and self._options.full == "whole"
+        return [(0, 0, size[0], size[1])] if is_whole_image else super()._list_regions(view, size)
 
     def close(self) -> None:
-        """End the helper process and the thread, also during a request."""
-        self._helper.stop()
+        """End the helper process and the thread; a running request fails."""
+        self._process.stop()
         super().close()
-        self._helper.close()
+        self._process.close()
 
     def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
-        self._helper.wait_until_ready()
+        self._process.wait_until_ready()
         deadline = time.monotonic() + self._options.deadline
         return search_regions(
             image, regions, lambda crop: self._find_in_crop(crop, deadline), self._options.class_map
@@ -95,7 +95,7 @@ class RoboflowDetector(ThreadedDetector):
     def _find_in_crop(self, crop: NDArray[np.uint8], deadline: float) -> list[Detection]:
         """Return the detections of the server in a crop of a frame, with boxes in pixels of the crop."""
         try:
-            message = self._helper.request(crop, deadline)
+            message = self._process.request(crop, deadline)
         except NoAnswer as error:
             raise DeadlinePassed(describe_delay(error.retry_causes, self._options)) from None
         if "failure" in message:
@@ -104,5 +104,5 @@ class RoboflowDetector(ThreadedDetector):
             answer = self._read_answer(message["answer"], (crop.shape[1], crop.shape[0]))
         except ValueError as error:
             raise Unavailable(describe_invalid_answer(str(error), self._options)) from None
-        found = [detection for detection in answer if detection.confidence >= self._config.floor]
-        return remove_duplicates(sorted(found, key=lambda detection: -detection.confidence))
+        detections = [detection for detection in answer if detection.confidence >= self._config.floor]
+        return remove_duplicates(sorted(detections, key=lambda detection: -detection.confidence))

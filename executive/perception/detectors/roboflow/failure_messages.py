@@ -8,35 +8,37 @@ from typing import Any
 from executive.perception.detectors.roboflow.key import KEY_VARIABLE
 from executive.perception.detectors.roboflow.server_options import RoboflowOptions
 
-MAX_QUOTATION_LENGTH = 100
+MAX_DETAIL_LENGTH = 100
 """Maximum number of characters that are quoted from a message of a server."""
 
 _KEY_ADVICE = f"set {KEY_VARIABLE} to a key that may use it"
 _TEMPLATE_BY_STATUS: Mapping[int, tuple[str, str]] = {
-    400: ("could not use the request", "check {options} and api"),
+    400: ("rejected the request", "check {options} and api"),
     401: ("does not accept the key", _KEY_ADVICE),
-    402: ("wants to be paid", f"look at the plan of the account that {KEY_VARIABLE} belongs to"),
+    402: ("requires a payment", f"check the plan of the account to which {KEY_VARIABLE} belongs"),
     403: ("does not accept the key", _KEY_ADVICE),
-    404: ("has no {subject}", "check {options} and url"),
-    413: ("finds the image too large", "give the camera a smaller table_view, or set full: tiles"),
-    429: ("has been asked too often", "ask less often, or look at the plan of the account"),
-    500: ("has an error of its own", "look at its log"),
-    502: ("has lost the server behind it", "is that running?"),
-    503: ("is not ready, or cannot load {subject}", "look at its log, and check {options}"),
+    404: ("has no {model}", "check {options} and url"),
+    413: ("rejected the image as too large", "give the camera a smaller table_view, or set full: tiles"),
+    429: ("received too many requests", "reduce the request rate, or check the plan of the account"),
+    500: ("had an internal error", "check its log"),
+    502: ("is a gateway without a connection to the server", "check that the server is running"),
+    503: ("is not ready, or cannot load {model}", "check its log and {options}"),
 }
-_UNKNOWN_STATUS = ("gave no answer", "look at its log")
+"""Failure and advice by HTTP status, with placeholders for the names of the model and the options."""
+_UNKNOWN_STATUS = ("reported an unexpected status", "check its log")
 _TEMPLATE_BY_KIND: Mapping[str, tuple[str, str]] = {
-    "no key": ("wants a key", f"set {KEY_VARIABLE}"),
-    "no model": ("has no {subject}", "check {options}"),
-    "no detector": ("has a {subject} that detects no objects", "check {options}"),
-    "no output": ('ran {subject}, which has no output "{output}"', "check workflow_output"),
-    "refused": ("refused the connection", "is it running, and is url right?"),
-    "unknown host": ("is not known by this name", "check url and the network"),
-    "tls": ("cannot be trusted (TLS)", "check url, its certificate and the clock"),
-    "lost": ("broke off", "look at its log and the network"),
-    "invalid": ("answered with something that inference-sdk cannot read", "is it an inference server?"),
-    "other": ("could not be asked", "look at what inference-sdk says"),
+    "no key": ("requires a key", f"set {KEY_VARIABLE}"),
+    "no model": ("has no {model}", "check {options}"),
+    "no detector": ("has a {model} that detects no objects", "check {options}"),
+    "no output": ('ran {model}, which has no output "{output}"', "check workflow_output"),
+    "refused": ("refused the connection", "check that the server is running, and check url"),
+    "unknown host": ("has an unknown host name", "check url and the network"),
+    "tls": ("failed the TLS handshake", "check url, the certificate and the clock"),
+    "lost": ("closed the connection", "check its log and the network"),
+    "invalid": ("sent an answer that inference-sdk cannot read", "check that url is an inference server"),
+    "other": ("could not be queried", "check the error of inference-sdk"),
 }
+"""Failure and advice by `failure` in the messages of the helper process."""
 
 
 def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> str:
@@ -44,11 +46,11 @@ def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> st
     detail = shorten_to_line(str(failure.get("detail", "")))
     status = failure.get("status")
     if status is None:
-        event, advice = _fill_in(_TEMPLATE_BY_KIND[failure["failure"]], options)
+        problem, advice = _fill_in(_TEMPLATE_BY_KIND[failure["failure"]], options)
     else:
-        event, advice = _fill_in(_TEMPLATE_BY_STATUS.get(status, _UNKNOWN_STATUS), options)
+        problem, advice = _fill_in(_TEMPLATE_BY_STATUS.get(status, _UNKNOWN_STATUS), options)
         detail = f"{status}: {detail}" if detail else str(status)
-    return f"{options.host} {event}{f' ({detail})' if detail else ''}; {advice}"
+    return f"{options.host} {problem}{f' ({detail})' if detail else ''}; {advice}"
 
 
 def describe_delay(retry_causes: Sequence[int | None], options: RoboflowOptions) -> str:
@@ -60,13 +62,13 @@ def describe_delay(retry_causes: Sequence[int | None], options: RoboflowOptions)
     """
     message = f"no answer within {options.deadline} s from {options.host}"
     if not retry_causes:
-        return f"{message}; look at its log and the network, or give it a longer deadline"
+        return f"{message}; check its log and the network, or increase deadline"
     # inference-sdk retries requests; the status that caused the last retry explains the delay.
     status = retry_causes[-1]
     if status is None:
-        return f"{message}, to which there was no connection; is it running, and is url right?"
-    event, advice = _fill_in(_TEMPLATE_BY_STATUS.get(status, _UNKNOWN_STATUS), options)
-    return f"{message}, which {event} ({status}); {advice}"
+        return f"{message}, which is not reachable; check that the server is running, and check url"
+    problem, advice = _fill_in(_TEMPLATE_BY_STATUS.get(status, _UNKNOWN_STATUS), options)
+    return f"{message}, which {problem} ({status}); {advice}"
 
 
 def describe_invalid_answer(problem: str, options: RoboflowOptions) -> str:
@@ -74,17 +76,18 @@ def describe_invalid_answer(problem: str, options: RoboflowOptions) -> str:
     question = f"is {options.model_id} a model that detects objects?"
     if options.api == "workflow":
         question = f'is "{options.workflow_output}" the predictions of a model that detects objects?'
-    return f"{options.host} gave an answer that cannot be right: {shorten_to_line(problem)}; {question}"
+    return f"{options.host} sent an invalid answer: {shorten_to_line(problem)}; {question}"
 
 
 def _fill_in(template: tuple[str, str], options: RoboflowOptions) -> tuple[str, str]:
     """Return failure and advice of a template, with the names of model, workflow and options inserted."""
-    event, advice = template
-    event = event.format(subject=options.subject, output=options.workflow_output)
-    return event, advice.format(options=options.subject_options)
+    problem, advice = template
+    problem = problem.format(model=options.model_or_workflow, output=options.workflow_output)
+    return problem, advice.format(options=options.model_option_names)
 
 
 def shorten_to_line(text: str) -> str:
     """Return text from a server as one short line of printable characters."""
-    line = " ".join("".join(c if c.isprintable() else " " for c in text[: 10 * MAX_QUOTATION_LENGTH]).split())
-    return line if len(line) <= MAX_QUOTATION_LENGTH else f"{line[:MAX_QUOTATION_LENGTH]}..."
+    characters = (char if char.isprintable() else " " for char in text[: 10 * MAX_DETAIL_LENGTH])
+    line = " ".join("".join(characters).split())
+    return line if len(line) <= MAX_DETAIL_LENGTH else f"{line[:MAX_DETAIL_LENGTH]}..."

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 
 KEY_VARIABLE = "ROBOFLOW_API_KEY"
-"""Environment variable with the API key; there is no other source of the key."""
+"""Environment variable with the API key, the only source of the key."""
 MIN_KEY_LENGTH = 8
 """Minimum length of a secret key; shorter keys are placeholders for servers that accept any key."""
 REDACTED_KEY = "***"

@@ -48,11 +48,10 @@ class RoboflowOptions(Section):
     """Maximum time for all answers about one frame, on the wall clock and on the clock of the run [s],
     including the retries of inference-sdk after the HTTP statuses 429, 503 and 504."""
     full: Literal["whole", "tiles"] = "whole"
-    """Images that are sent for the view `full`: `whole`, the frame; `tiles`, one after the other, tiles of
-    the size of the table view that overlap by at least a quarter (9 tiles for a frame of 640 x 480 pixels and
-    a table view of 256 x 256). For the view `table`, one image is sent. An image needs one request with `v0`
-    and `workflow`, two requests with `v1` (list of loaded models; image), and three until the model is
-    loaded."""
+    """Images that are sent for the view `full`: `whole`, the frame; `tiles`, tiles of the size of the table
+    view that overlap by at least a quarter (9 tiles for 640 x 480 pixels and a table view of 256 x 256). For
+    the view `table`, one image is sent. An image needs one request with `v0` and `workflow`, and two requests
+    with `v1` (list of loaded models; image). Until `v1` has loaded the model, an image needs three."""
 
     @property
     def host(self) -> str:
@@ -61,29 +60,29 @@ class RoboflowOptions(Section):
         return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"
 
     @property
-    def subject(self) -> str:
+    def model_or_workflow(self) -> str:
         """Kind and name of the model or the workflow, for messages."""
         if self.api == "workflow":
             return f"workflow {self.workspace}/{self.workflow_id}"
         return f"model {self.model_id}"
 
     @property
-    def subject_options(self) -> str:
+    def model_option_names(self) -> str:
         """Names of the options that select the model or the workflow, for messages."""
         return "workspace and workflow_id" if self.api == "workflow" else "model_id"
 
 
 def find_roboflow_option_errors(config: DetectorConfig) -> OptionErrors:
     """Yield each invalid option, with a message."""
-    wrong = list(find_option_errors(RoboflowOptions, config))
-    for option, message in wrong:
+    errors = list(find_option_errors(RoboflowOptions, config))
+    for option, message in errors:
         if any(part in option.lower() for part in SECRET_WORDS):
             message = (
-                f'"{option}" does not belong in a cell file, where everybody may read it; '
-                f"delete it there and set the environment variable {KEY_VARIABLE}"
+                f'"{option}" does not belong in a cell file, because others can read the file; '
+                f"delete the option and set the environment variable {KEY_VARIABLE}"
             )
         yield option, message
-    if wrong:
+    if errors:
         return
     options = RoboflowOptions.model_validate(config.options)
     yield from _check_url(options.url)
@@ -94,15 +93,15 @@ def find_roboflow_option_errors(config: DetectorConfig) -> OptionErrors:
 
 def _check_model(options: RoboflowOptions) -> OptionErrors:
     """Yield the first invalid option for requests to a model, with a message."""
-    given = [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]
+    extras = [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]
     parts = options.model_id.split("/")
-    if given:
-        names = ", ".join(given)
-        yield given[0], f"api: {options.api} does not use {names}; write api: workflow, or delete {names}"
+    if extras:
+        names = ", ".join(extras)
+        yield extras[0], f"api: {options.api} does not use {names}; write api: workflow, or delete {names}"
     elif not options.model_id:
         yield "model_id", f"api: {options.api} needs model_id: project/version, or a name such as rfdetr-nano"
     elif any(character in options.model_id for character in FORBIDDEN_CHARACTERS):
-        yield "model_id", "model_id must be a name or project/version alone, without ?, &, #, = or a space"
+        yield "model_id", "model_id must be a name or project/version, without ?, &, #, = or a space"
     elif options.api == "v0" and (len(parts) > 2 or not all(parts)):
         yield (
             "model_id",
@@ -118,11 +117,11 @@ def _check_workflow(options: RoboflowOptions) -> OptionErrors:
         if not name:
             yield option, f"api: workflow needs workspace and workflow_id; {option} is missing"
         elif any(character in name for character in f"{FORBIDDEN_CHARACTERS}/"):
-            yield option, f"{option} must be a name alone, without /, ?, &, #, = or a space"
+            yield option, f"{option} must be a name without /, ?, &, #, = or a space"
 
 
 def _check_url(url: str) -> OptionErrors:
-    """Yield the option `url`, with a message, if the value is not exactly the address of a server."""
+    """Yield the option `url`, with a message, unless its value is only the address of a server."""
     try:
         parts = urlsplit(url)
         is_server_address = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
@@ -131,4 +130,4 @@ def _check_url(url: str) -> OptionErrors:
     if not is_server_address:
         yield "url", "url must be an address such as http://127.0.0.1:9001 or https://serverless.roboflow.com"
     elif "@" in parts.netloc or parts.query or parts.fragment:
-        yield "url", f"url must hold no user, query or fragment; put a key into the variable {KEY_VARIABLE}"
+        yield "url", f"url must not contain a user, query or fragment; set {KEY_VARIABLE} to the key"

@@ -27,9 +27,9 @@ PROGRAM = "executive.perception.detectors.roboflow"
 STARTUP_TIMEOUT = 30.0
 """Maximum time for the import of inference-sdk [s]; measured: 2 s, and 6 s on shared cores."""
 EXIT_TIMEOUT = 1.0
-"""Maximum time from the end of the output of the program to its exit [s]."""
+"""Maximum time between the end of the program's output and the exit of the program [s]."""
 MAX_STDERR_SIZE = 2000
-"""Size of the end of the standard error in which the last line is searched [byte]."""
+"""Maximum number of bytes at the end of the standard error that are read for an error message."""
 
 
 class NoAnswer(Exception):
@@ -45,24 +45,24 @@ class NoAnswer(Exception):
 
 
 class InferenceProcess:
-    """Runs inference-sdk in a separate process, from the construction of the object until `close`.
+    """Helper process that runs inference-sdk; the constructor starts the process, and `close` ends it.
 
-    Each call has a deadline: if the process does not answer before it, the process is killed and replaced.
-    One thread sends requests; another thread may call `stop`.
+    If the process does not answer before the deadline of a call, the process is killed and replaced. One
+    thread sends requests; another thread may call `stop`.
 
     Args:
-        settings: Server and model: the argument of the program.
+        settings: Server, model or workflow, and minimum confidence, for the program.
         key: API key of the user.
     """
 
     def __init__(self, settings: Mapping[str, Any], key: ApiKey) -> None:
         self._command = build_command(PROGRAM, json.dumps(settings))
         self._key = key
-        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 It lives as long as the helper.
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 `close` closes the file.
         self._lock = threading.Lock()
         self._is_stopped = False
         self._process: subprocess.Popen[bytes] | None = None
-        self._start_problem = ""
+        self._start_error = ""
         self._is_ready = False
         self._startup_deadline = 0.0
         self._start()
@@ -77,22 +77,22 @@ class InferenceProcess:
         if self._process is None:
             self._start()
         if self._process is None:
-            raise Unavailable(f"its helper process is not running: {self._start_problem}")
+            raise Unavailable(f"its helper process is not running: {self._start_error}")
         if self._is_ready:
             return
         try:
-            message = self._exchange(b"", self._startup_deadline)
+            message = self._send_and_receive(b"", self._startup_deadline)
         except TimeoutError:
             raise Unavailable(f"its helper process was not ready within {STARTUP_TIMEOUT:.0f} s") from None
         if "setup_error" in message:
-            self._end()
+            self._discard_process()
             raise Unavailable(
                 f"inference-sdk cannot be used: {message['setup_error']}; `executive doctor` checks packages"
             )
         self._is_ready = True
 
     def request(self, image: NDArray[np.uint8], deadline: float) -> Mapping[str, Any]:
-        """Send an image to the ready process; return its `answer`, or `failure` with the message `detail`.
+        """Send an image to the ready process; return a mapping with `answer`, or with `failure` and `detail`.
 
         Args:
             image: `(H, W, 3)` RGB.
@@ -108,7 +108,7 @@ class InferenceProcess:
         retry_causes: list[int | None] = []
         while True:
             try:
-                message = self._exchange(data, deadline)
+                message = self._send_and_receive(data, deadline)
             except TimeoutError:
                 raise NoAnswer(retry_causes) from None
             if "retry_status" not in message:
@@ -126,11 +126,11 @@ class InferenceProcess:
     def close(self) -> None:
         """Release all resources; no other call may be active."""
         self.stop()
-        self._end()
+        self._discard_process()
         self._stderr.close()
 
-    def _exchange(self, data: bytes, deadline: float) -> Mapping[str, Any]:
-        """Send `data` and return the next message; if this fails, replace the process and raise an error."""
+    def _send_and_receive(self, data: bytes, deadline: float) -> Mapping[str, Any]:
+        """Send `data` and return the next message of the process; replace a late or exited process."""
         process = self._process
         assert process is not None and process.stdin and process.stdout
         is_late = threading.Event()
@@ -154,15 +154,15 @@ class InferenceProcess:
             self._restart()
             raise TimeoutError
         if not line.endswith(b"\n"):
-            self._raise_exit(process)
+            self._raise_exit_error(process)
         try:
             message: Mapping[str, Any] = json.loads(self._key.redact(line.decode()))
         except RecursionError:
-            # The process could parse this answer, because its call stack was shallower.
+            # The helper process has a shallower call stack, so that its parser accepts deeper nesting.
             return {"failure": "invalid", "detail": "it is nested too deeply"}
         return message
 
-    def _raise_exit(self, process: subprocess.Popen[bytes]) -> None:
+    def _raise_exit_error(self, process: subprocess.Popen[bytes]) -> None:
         """Replace a process that has closed its output, and raise an error with the cause of its exit."""
         try:
             status = process.wait(EXIT_TIMEOUT)
@@ -174,18 +174,18 @@ class InferenceProcess:
         self._restart()
         if status < 0:
             raise Unavailable(f"its helper process was ended by signal {-status}")
-        last = self._key.redact(lines[-1].strip() if lines else "")
-        raise Fault(f"the program {PROGRAM} ended with status {status}: {last}")
+        last_line = self._key.redact(lines[-1].strip() if lines else "")
+        raise Fault(f"the program {PROGRAM} ended with status {status}: {last_line}")
 
     def _restart(self) -> None:
-        self._end()
+        self._discard_process()
         self._start()
 
     def _start(self) -> None:
         """Start a process in the background, unless the helper is stopped."""
         with self._lock:
             if self._is_stopped:
-                self._start_problem = "the detector is closed"
+                self._start_error = "the detector is closed"
                 return
             self._stderr.seek(0)
             self._stderr.truncate()
@@ -198,12 +198,12 @@ class InferenceProcess:
                     start_new_session=True,  # Ctrl-C does not interrupt the process.
                 )  # fmt: skip
             except OSError as error:
-                self._start_problem = (error.strerror or str(error)).lower()
+                self._start_error = (error.strerror or str(error)).lower()
                 return
             self._startup_deadline = time.monotonic() + STARTUP_TIMEOUT
             self._is_ready = False
 
-    def _end(self) -> None:
+    def _discard_process(self) -> None:
         """Kill the process, if any, and close its pipes."""
         with self._lock:
             process, self._process = self._process, None
@@ -212,7 +212,7 @@ class InferenceProcess:
         _kill(process)
         process.wait()
         for pipe in (process.stdin, process.stdout):
-            with contextlib.suppress(OSError):  # The pipe holds data that the process did not read.
+            with contextlib.suppress(OSError):  # Closing flushes unsent data, which fails for a dead process.
                 assert pipe is not None
                 pipe.close()
 
