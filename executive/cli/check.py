@@ -48,10 +48,8 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
                 findings = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
                 failures, is_valid = (), False
                 texts.append(str(error))
-            entries = [
-                {**asdict(finding), "excerpt": finding.shown_excerpt}
-                for finding in findings[:MAX_LISTED_FINDINGS]
-            ]
+            listed_findings = findings[:MAX_LISTED_FINDINGS]
+            entries = [{**asdict(finding), "excerpt": finding.shown_excerpt} for finding in listed_findings]
             endings = [*map(asdict, failures)]
             reports.append({"mission": mission, "ok": is_valid, "findings": entries, "endings": endings})
     if as_json:

@@ -81,8 +81,5 @@ def command(
                 output = fault_results.results_to_json(results)
                 text = fault_results.format_results(results)
                 exit_code = int(bool(results.failed_trials)) if results.complete else ExitCode.HALTED
-    if as_json:
-        print_json(output)
-    else:
-        click.echo(text)
+    print_json(output) if as_json else click.echo(text)
     ctx.exit(exit_code)

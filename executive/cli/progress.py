@@ -68,7 +68,5 @@ def report_polygons(folder: Path) -> None:
 
 def print_halt() -> None:
     """Print the consequences of the received Ctrl-C or SIGTERM."""
-    click.echo(
-        "halting: no new runs start, and current runs are halted; press Ctrl-C again to quit immediately",
-        err=True,
-    )
+    consequences = "no new runs start, and current runs are halted"
+    click.echo(f"halting: {consequences}; press Ctrl-C again to quit immediately", err=True)

@@ -62,10 +62,7 @@ def command(
             output = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
         else:
             output = draw_outline(nodes, shows_ports=ports, shows_reasons=reasons)
-    if as_json:
-        print_json(output)
-    else:
-        click.echo(output)
+    print_json(output) if as_json else click.echo(output)
 
 
 def _load_outline(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:

@@ -47,9 +47,8 @@ def write_project(folder: Path, package: str) -> list[str]:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise InputError(
-            f"{error.filename or folder} cannot be written: {error.strerror}; name a writable folder"
-        ) from None
+        problem = f"{error.filename or folder} cannot be written: {error.strerror}"
+        raise InputError(f"{problem}; name a writable folder") from None
     return list(files)
 
 

@@ -31,9 +31,8 @@ _STATUS_COLOUR_WEIGHT = 60
 def write_mp4(path: Path, frames: Iterable[Image.Image], frame_rate: float) -> None:
     """Write frames as an MP4 file with H.264, `frame_rate` frames per second."""
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
-        stream = container.add_stream(
-            "libx264", rate=round(frame_rate), options={"crf": "20", "preset": "medium"}
-        )
+        codec_options = {"crf": "20", "preset": "medium"}
+        stream = container.add_stream("libx264", rate=round(frame_rate), options=codec_options)
         stream.pix_fmt = "yuv420p"
         for number, image in enumerate(frames):
             if number == 0:

@@ -24,15 +24,7 @@ from executive.mission.outline import make_outline
 from executive.processes import build_command
 from executive.record.result import Result
 from executive.run.run import Run
-from executive.view.live.messages import (
-    CameraImage,
-    Message,
-    PageChange,
-    PageCommand,
-    RunOutcome,
-    SceneChange,
-    encode_poses,
-)
+from executive.view.live import messages
 from executive.view.tree.svg import NodeResult, draw_svg
 
 LOOPBACK = "127.0.0.1"
@@ -82,7 +74,7 @@ class LivePage:
                 # In a separate session the server gets no Ctrl-C, and can still show the result of the run.
                 start_new_session=True,
             )  # fmt: skip
-        self._queue: queue.SimpleQueue[tuple[str, int] | Message | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[tuple[str, int] | messages.Message | None] = queue.SimpleQueue()
         self._run: Run | None = None
         self._visuals: Visuals | None = None
         self._is_closed = False
@@ -91,7 +83,7 @@ class LivePage:
         self._pose_period = POSE_PERIOD
         self._was_paused = False
         self._last_frame: Frame | None = None
-        self._last_camera_image: CameraImage | None = None
+        self._last_camera_image: messages.CameraImage | None = None
         self.problem = ""
         """Description of the first error of the page, or ""."""
         # The token is sent through the pipe, because every user of the machine can read process arguments.
@@ -113,8 +105,8 @@ class LivePage:
         # The page writes the counts of a node into the empty line of its result.
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
-        self._enqueue(SceneChange(shapes=shapes))
-        self._enqueue(PageChange(tree=draw_svg(nodes, mission, empty_results)))
+        self._enqueue(messages.SceneChange(shapes=shapes))
+        self._enqueue(messages.PageChange(tree=draw_svg(nodes, mission, empty_results)))
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
@@ -126,7 +118,7 @@ class LivePage:
                 # The page does not show the depth image, which is the largest part of a frame.
                 self._last_frame = replace(event.frame, depth=None)
             elif isinstance(event, FrameSearched) and self._last_frame is not None:
-                self._last_camera_image = CameraImage(self._last_frame, event)
+                self._last_camera_image = messages.CameraImage(self._last_frame, event)
                 if self._browser_count and self._is_queue_short:
                     self._enqueue(self._last_camera_image)
             elif not isinstance(event, InputRead):
@@ -137,7 +129,7 @@ class LivePage:
 
     def show_message(self, message: str) -> None:
         """Show a message about the record of the run."""
-        self._enqueue(PageChange(note=message))
+        self._enqueue(messages.PageChange(note=message))
 
     def finish(self, result: Result | None = None, report: str = "") -> None:
         """Show the result of the run, and end the server; a second call does nothing."""
@@ -145,7 +137,9 @@ class LivePage:
             return
         if result is not None:
             message = result.message if result.diagnosis is None else result.diagnosis.verdict
-            self._enqueue(PageChange(result=RunOutcome(result.status, message, result.run, report)))
+            self._enqueue(
+                messages.PageChange(result=messages.RunOutcome(result.status, message, result.run, report))
+            )
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:
@@ -167,17 +161,17 @@ class LivePage:
         with self._catch_errors():
             if self._run.control.is_paused != self._was_paused:
                 self._was_paused = not self._was_paused
-                self._enqueue(PageChange(is_paused=self._was_paused))
+                self._enqueue(messages.PageChange(is_paused=self._was_paused))
             if self._browser_count and self._is_queue_short and self._visuals is not None:
-                self._enqueue(PageChange(clock=self._run.now))
-                self._enqueue(SceneChange(body_poses=encode_poses(self._visuals.poses())))
+                self._enqueue(messages.PageChange(clock=self._run.now))
+                self._enqueue(messages.SceneChange(body_poses=messages.encode_poses(self._visuals.poses())))
 
     @property
     def _is_queue_short(self) -> bool:
         """True if images and poses may be queued."""
         return self._queue.qsize() < MAX_QUEUED_MESSAGES
 
-    def _enqueue(self, message: Message) -> None:
+    def _enqueue(self, message: messages.Message) -> None:
         """Queue a message for the server, unless the server has ended."""
         if not self._is_closed:
             self._queue.put(message)
@@ -200,8 +194,8 @@ class LivePage:
                 while not self._queue.empty():
                     batch.append(self._queue.get())
                 is_last_batch = None in batch
-                messages = [message for message in batch if message is not None]
-                pickle.dump(messages, pipe, pickle.HIGHEST_PROTOCOL)
+                batch_messages = [message for message in batch if message is not None]
+                pickle.dump(batch_messages, pipe, pickle.HIGHEST_PROTOCOL)
                 pipe.flush()
                 if not is_last_batch:
                     time.sleep(BATCH_PERIOD)
@@ -218,10 +212,10 @@ class LivePage:
         assert self._server.stdout is not None
         for line in self._server.stdout:
             with self._catch_errors():
-                self._run_command(PageCommand(**json.loads(line)))
+                self._run_command(messages.PageCommand(**json.loads(line)))
         self._browser_count, self._is_closed = 0, True
 
-    def _run_command(self, command: PageCommand) -> None:
+    def _run_command(self, command: messages.PageCommand) -> None:
         """Run a command; most command names are the names of methods of `RunControl`."""
         control = None if self._run is None else self._run.control
         if command.name == "browsers":

@@ -52,11 +52,9 @@ class SceneProxy:
         async with await self.open_session() as session:
             response = await session.get(f"http://scene/{request.match_info['file']}")
             return web.Response(
-                status=response.status,
-                body=await response.read(),
-                content_type=response.content_type,
+                status=response.status, body=await response.read(), content_type=response.content_type,
                 headers={"Content-Security-Policy": CONTENT_POLICY},
-            )
+            )  # fmt: skip
 
     async def forward_messages(self, request: web.Request) -> web.WebSocketResponse:
         """Forward WebSocket messages between browser and scene server until one connection ends."""
