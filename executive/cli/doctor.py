@@ -105,13 +105,12 @@ def check_packages() -> Iterator[CheckResult]:
 
     from executive.run.versions import DISTRIBUTION, find_installer, find_version, list_requirements
 
-    required_packages = list_requirements()
-    missing_packages = [name for name in (DISTRIBUTION, *required_packages) if not find_version(name)]
+    requirements = list_requirements()
+    missing_packages = [name for name in (DISTRIBUTION, *requirements) if not find_version(name)]
     for name in missing_packages:
         yield CheckResult("problem", "packages", f"{name} is missing", "run `uv sync`")
     if not missing_packages:
-        version, count = find_version(DISTRIBUTION), len(required_packages)
-        message = f"{DISTRIBUTION} {version} and its {count} required packages"
+        message = f"{DISTRIBUTION} {find_version(DISTRIBUTION)} and its {len(requirements)} required packages"
         yield CheckResult("ok", "packages", message)
     if packages := sorted(set(packages_distributions().get("cv2", ()))):
         opencv = ", ".join(f"{name} {find_version(name)}" for name in packages)

@@ -69,8 +69,7 @@ def command(
             if list_only:
                 descriptions = dict(enumerate(map(str, campaign.faults), start=1))
                 output = [{"fault": number, "description": text} for number, text in descriptions.items()]
-                text = "\n".join(f"{number:4} {text}" for number, text in descriptions.items())
-                exit_code = 0
+                text, exit_code = "\n".join(f"{number:4} {text}" for number, text in descriptions.items()), 0
             elif fault_numbers is not None:
                 faults = campaign.select_faults(fault_numbers)
                 trial, path = record_trial(mission_under_test, campaign.nominal_run, faults, runs)

@@ -137,9 +137,8 @@ class LivePage:
             return
         if result is not None:
             message = result.message if result.diagnosis is None else result.diagnosis.verdict
-            self._enqueue(
-                messages.PageChange(result=messages.RunOutcome(result.status, message, result.run, report))
-            )
+            outcome = messages.RunOutcome(result.status, message, result.run, report)
+            self._enqueue(messages.PageChange(result=outcome))
         self._queue.put(None)
         try:
             if self._server.wait(SHUTDOWN_TIMEOUT) != 0:

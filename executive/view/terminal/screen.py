@@ -23,7 +23,8 @@ REDRAWS_PER_SECOND = 10
 """Frequency at which the view is drawn [1/s]."""
 
 _STATUS_MARKS = {
-    "RUNNING": ("▶", "bold yellow"), "SUCCESS": ("✓", "green"), "FAILURE": ("✗", "red"), "INVALID": ("·", "dim"),
+    "RUNNING": ("▶", "bold yellow"), "SUCCESS": ("✓", "green"), "FAILURE": ("✗", "red"),
+    "INVALID": ("·", "dim"),
 }  # fmt: skip
 """Character and style of the mark of a node, by the status of the node."""
 _STATE_STYLES = {"placed": "green", "rejected": "red", "lost": "red", "held": "yellow", "dropped": "yellow"}
