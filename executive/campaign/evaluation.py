@@ -54,9 +54,8 @@ class SceneSettings:
     Attributes:
         image_count: Number of images per cell.
         seed: Random seed.
-        is_varied: True for scenes that vary as in training; False for the initial scenes of runs, in which
-            the detector searches `view`.
-        view: Region of the frame that is searched: `table`, or `full` for the whole frame.
+        is_varied: True for scenes that vary as in training; False for the initial scenes of runs.
+        view: Region that is searched in initial scenes of runs: `table`, or `full` for the whole frame.
         workers: Number of rendering processes.
         scene: Scene file that changes the initial scenes of runs; None: no change.
     """
@@ -151,8 +150,7 @@ def measure_detector(
 ) -> Evaluation:
     """Evaluate a detector on a dataset, or on rendered scenes of its cell.
 
-    `threshold` is the minimum confidence of a detection; None: the threshold of the detector. The worst
-    mistakes are added to `worst_mistakes`.
+    `threshold` is the minimum confidence; None: the threshold of the detector. `worst_mistakes` is updated.
     """
     # Only images of scenes of runs have the camera, the table and the localization of the cell.
     run_cell = None if dataset is not None or scenes.is_varied else detector.cell
@@ -222,9 +220,7 @@ def _build_localizer(cell: CellConfig) -> Localizer | None:
 def store_evaluation(
     detector: DetectorUnderTest, evaluation: Evaluation, out: Path | None, *, command: str, duration: float
 ) -> Path:
-    """Write the measured errors of a detector to a file, and return the path of the file.
-
-    Measurements of other detectors in the file are not changed.
+    """Add or replace the measured errors of a detector in a file, and return the path of the file.
 
     Args:
         detector: The detector and its cell.

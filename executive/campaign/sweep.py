@@ -44,13 +44,8 @@ def run_sweep(
     """Execute all jobs and return the results in the order of the jobs.
 
     A run whose process dies has the status `FAULT`. After Ctrl-C or SIGTERM no further run starts, current
-    runs are halted, and only the results of the ended runs are returned.
-
-    Args:
-        jobs: The runs.
-        workers: Number of processes.
-        progress: Function that is called with the number of finished runs and the number of all runs.
-        on_halt: Function that is called after the first signal.
+    runs are halted, and only the results of the ended runs are returned. `workers`, `progress` and `on_halt`
+    have the same meaning as in `executive.campaign.pool.run_jobs`.
     """
     results = run_jobs(jobs, run_job, _make_fault_result, workers=workers, progress=progress, on_halt=on_halt)
     return [result for result in results if result is not None]

@@ -77,12 +77,7 @@ def follow(skill: Skill, cell: Cell, motion: Motion, until: Callable[[], bool] =
 def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) -> Steps:
     """Yield until the arm has moved `item` to `goal`; read the vacuum sensor in every control step.
 
-    Args:
-        skill: The skill that moves the item.
-        cell: The work cell.
-        item: Item in the tool.
-        goal: Goal of the motion.
-        goal_name: Name of the goal in error messages.
+    `goal_name` is the name of the goal in error messages.
 
     Raises:
         SkillFailed: No motion was found, or the arm collided; the reason is `unreachable` or `blocked`.

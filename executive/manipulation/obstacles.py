@@ -34,8 +34,7 @@ def is_detection_in_bin(cell: Cell, detection: Detection, frame: Frame) -> bool:
 def predict_object_count(cell: Cell, bin_name: str, excluded_item: Item | None = None) -> int:
     """Return the number of objects in a bin, including an item that the arm is moving into the bin.
 
-    A plan with this number remains valid after the release of the item. `excluded_item` is not counted while
-    the arm moves it.
+    A plan with this number remains valid after the release. A moving `excluded_item` is not counted.
     """
     held_item = cell.ledger.find_held_item()
     is_counted = held_item not in (None, excluded_item)

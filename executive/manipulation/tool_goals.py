@@ -50,8 +50,7 @@ def make_approach(
     Args:
         cell: The work cell.
         target: Target to touch.
-        overtravel: Distance that the motion continues below the expected surface [m]; at most half the
-            height of the object.
+        overtravel: Continuation below the expected surface [m], at most half the height of the object.
         spacing: Scale of the spiral of contact points [m].
     """
     object_class, failed_attempts = cell.classes[target.label], cell.ledger.count_attempts(target.item)

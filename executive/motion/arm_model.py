@@ -12,10 +12,9 @@ from executive.geometry import Array, Pose
 from executive.motion.limits import JointRange
 
 BranchKey = tuple[float, ...]
-"""Key of a branch of the inverse kinematics.
+"""Key of a branch of the inverse kinematics; the meaning of the numbers depends on the arm.
 
-A tool pose has at most one solution in each branch. Along a short path of the tool, the solutions in one
-branch are continuous. The meaning of the numbers depends on the arm.
+In each branch, a tool pose has at most one solution, and a short path of the tool has continuous solutions.
 """
 
 
@@ -23,8 +22,7 @@ class Solutions(NamedTuple):
     """Inverse-kinematics solutions of one tool pose in `N` branches.
 
     Attributes:
-        qs: Joint positions `(N, n)` [rad], even outside the joint range; NaN in the row of a branch without
-            a solution.
+        qs: Joint positions `(N, n)` [rad], even outside the joint range; NaN in rows without a solution.
         branches: Branch of each row.
     """
 
@@ -67,13 +65,9 @@ class Kinematics(Protocol):
     def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
         """Return the solutions of a tool pose in all branches.
 
-        A redundant arm has infinitely many branches; the function samples the redundancy angle evenly. Calls
-        with equal `q_seed` and `angle_step` return equal branches in equal order.
-
-        Args:
-            X_WT: Tool pose.
-            q_seed: Joint positions `(n,)` [rad] whose redundancy angle is one of the samples.
-            angle_step: Distance between the samples of the redundancy angle [rad], unused without redundancy.
+        A redundant arm has infinitely many branches; the function samples the redundancy angle at intervals
+        of `angle_step` [rad]. One sample is the redundancy angle of `q_seed` `(n,)` [rad]. Calls with equal
+        `q_seed` and `angle_step` return equal branches in equal order.
 
         Raises:
             Unreachable: The pose is too near to the arm or too far from the arm.

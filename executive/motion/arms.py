@@ -40,10 +40,7 @@ def find_arm_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 
 def build_kinematics(config: CellConfig, min_link_distance: float | None = None) -> Kinematics:
-    """Return the kinematics of the arm of a cell file.
-
-    `min_link_distance` is the minimum distance between links of the arm [m], or None for no minimum.
-    """
+    """Return the kinematics of the arm of a cell file, with a minimum distance [m] between its links."""
     _, factory = ARMS_BY_URDF[config.arm.urdf]
     joint_range = JointLimits.from_config(config.arm.limits).position
     return factory(config.tool.length, joint_range, min_link_distance)

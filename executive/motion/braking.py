@@ -42,13 +42,8 @@ def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits,
     """Return the path times `(N,)` [s] of the control steps after `start_time`, until the arm is at rest.
 
     The arm either brakes along the path or completes the motion. The result is the shortest candidate within
-    the stop limits of joint acceleration and jerk, or else the candidate that exceeds the limits least.
-
-    Args:
-        trajectory: Motion of the arm.
-        start_time: Path time at which the arm begins to brake [s].
-        limits: Joint limits.
-        period: Control period [s].
+    the stop limits of joint acceleration and jerk, or else the candidate that exceeds the limits least. The
+    arm begins to brake at the path time `start_time` [s]; `period` is the control period [s].
     """
     best_times, min_peak_fraction = np.array([start_time]), math.inf
     for profile in _list_profiles(trajectory, start_time, period):

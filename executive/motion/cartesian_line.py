@@ -33,8 +33,7 @@ _MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for
 class CartesianLine:
     """A straight motion of the tool; implements `executive.motion.state.MotionPiece`.
 
-    If the tool moves at an end of the line, its speed there is the maximum speed from which the tool can stop
-    within the line.
+    A tool that moves at an end of the line has the maximum speed there from which it can stop on the line.
 
     Args:
         waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line, `N` > 3.
@@ -46,7 +45,6 @@ class CartesianLine:
         ends_in_motion: True if the tool moves at the end; excludes `starts_in_motion`.
 
     Attributes:
-        duration: Duration [s].
         max_acceleration: Maximum acceleration of the tool [m/s²], also limited by the joints.
     """
 

@@ -1,7 +1,6 @@
 """Distance model of the cell for planning: obstacles as upright prisms, tool and load as discs.
 
-The model gives the distances between all states of a motion and all obstacles in a few array operations. The
-planner can check the planned motion in a more exact model.
+The model gives the distances between all states of a motion and all obstacles in a few array operations.
 
 The workspace counts as an obstacle, because undetected objects may lie in the workspace. Near the two ends of
 a motion, detectors have found all objects; only known obstacles count there.
@@ -71,8 +70,7 @@ class Prisms(NamedTuple):
     """`K` upright obstacles; each base is a rectangle or a point, enlarged by a radius.
 
     Attributes:
-        min_corners: Corners of the rectangles with the smallest coordinates `(K, 2)` [m].
-        max_corners: Corners of the rectangles with the largest coordinates `(K, 2)` [m].
+        min_corners, max_corners: Smallest and largest coordinates of the rectangles, `(K, 2)` each [m].
         radii: Enlargement of the bases `(K,)` [m].
         tops: Height of the upper sides above the world's origin `(K,)` [m].
         is_undetected: True for undetected objects, which do not count near the ends of a motion `(K,)`.
@@ -115,10 +113,7 @@ class ClearanceModel:
     def compute_slack(self, tcps: Array, axes: Array, discs: Discs) -> Array:
         """Return the smallest difference between distance and required distance in each state `(N,)` [m].
 
-        Args:
-            tcps: Tool centre points `(N, 3)` [m].
-            axes: Tool axes `(N, 3)`.
-            discs: Tool and load.
+        `tcps` `(N, 3)` [m] and `axes` `(N, 3)` are the tool centre points and the tool axes.
         """
         slack = self._compute_all_distances(tcps, axes, discs) - self._find_required_distances(tcps)[:, None]
         return np.minimum(slack.min(axis=(1, 2)), _compute_tilt_slack(axes, discs))
@@ -128,13 +123,9 @@ class ClearanceModel:
     ) -> Array:
         """Return the change of the slack of each state for each of `M` small displacements `(N, M)` [m].
 
-        For each state, only the pair of disc and prism with the smallest slack counts.
-
-        Args:
-            tcps: Tool centre points `(N, 3)` [m].
-            axes: Tool axes `(N, 3)`.
-            discs: Tool and load.
-            displaced: Tool centre points and axes of the displaced states, `(N, M, 3)` each.
+        For each state, only the pair of disc and prism with the smallest slack counts. The states have the
+        tool centre points `tcps` `(N, 3)` [m] and the tool axes `axes` `(N, 3)`; `displaced` contains the
+        tool centre points and axes of the displaced states, `(N, M, 3)` each.
         """
         required_distances = self._find_required_distances(tcps)
         slack = self._compute_all_distances(tcps, axes, discs) - required_distances[:, None]

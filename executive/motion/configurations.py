@@ -29,8 +29,7 @@ class ConfigurationPairs:
     """`N` pairs of joint configurations at the two ends of a vertical line of the tool.
 
     Attributes:
-        upper_qs: Joint positions at the upper end `(N, n)` [rad].
-        lower_qs: Joint positions at the lower end `(N, n)` [rad].
+        upper_qs, lower_qs: Joint positions at the upper and the lower end, `(N, n)` each [rad].
         branches: Branch of the inverse kinematics of each pair.
     """
 
@@ -84,8 +83,7 @@ def solve_vertical_waypoints(
 ) -> Array:
     """Return evenly spaced waypoints `(count, n)` [rad] on a vertical line of the tool in one branch.
 
-    The line leads from the tool at `q` `(n,)` [rad] upwards, and is `length` [m] long. The function checks
-    neither the tool axis nor the joint range.
+    The line of `length` [m] leads upwards from `q` `(n,)` [rad]; tool axis and joint range are not checked.
 
     Raises:
         Unreachable: A point of the line is too far from the arm or too near to the arm.

@@ -63,11 +63,8 @@ class Iiwa14:
 
     Args:
         tool_length: Distance from the flange to the tool centre point [m].
-        joint_range: Range of the joint positions according to the data sheet, `n` = 7.
+        joint_range: Range according to the data sheet, `n` = 7; the attribute also has the limit of joint 6.
         min_link_distance: Minimum distance between links 5 and 7 [m], which limits joint 6, or None.
-
-    Attributes:
-        joint_range: Range of the joint positions with the limit of joint 6.
     """
 
     def __init__(
@@ -139,8 +136,7 @@ class Iiwa14:
     def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
         """Return the solutions of a tool pose for all flips and evenly spaced redundancy angles.
 
-        The first redundancy angle is the angle of the joint positions `q_seed` `(7,)` [rad]. The function
-        raises Unreachable if there is no solution.
+        The first redundancy angle is that of `q_seed` `(7,)` [rad]. Without a solution, raise Unreachable.
         """
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
         angles = self.compute_redundancy_angle(q_seed) + offsets

@@ -14,12 +14,7 @@ from executive.geometry import Array
 
 
 class JointRange(NamedTuple):
-    """Range of the joint positions.
-
-    Attributes:
-        lower: Smallest joint positions `(n,)` [rad].
-        upper: Largest joint positions `(n,)` [rad].
-    """
+    """Range of the joint positions: smallest and largest positions, `(n,)` each [rad]."""
 
     lower: Array
     upper: Array

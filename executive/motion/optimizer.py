@@ -47,8 +47,7 @@ class OptimizationProblem:
     """The optimization problem between two states.
 
     Attributes:
-        start: State at the start of the motion.
-        end: State at the end of the motion.
+        start, end: States at the start and at the end of the motion.
         connector: Planner of motions between two states within the joint limits.
         kinematics: Kinematics of the arm.
         clearance: Distances from the obstacles.

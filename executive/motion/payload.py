@@ -32,10 +32,6 @@ class PayloadLimit:
 
     The force on the seal is `m |a + g|`, with the mass `m` of the load, the acceleration `a` of its centre,
     and `g` = 9.81 m/s² upwards.
-
-    Args:
-        load: Object in the tool.
-        kinematics: Kinematics of the arm.
     """
 
     def __init__(self, load: Load, kinematics: Kinematics) -> None:

@@ -37,12 +37,7 @@ MAX_CHECK_SPACING = math.radians(1.0)
 
 
 class Planner:
-    """Plans motions of the arm of a cell file.
-
-    Args:
-        config: Content of the cell file.
-        kinematics: Kinematics of the arm.
-        check_collision: Additional collision check of each motion, or None.
+    """Plans motions of the arm of a cell file, optionally with an additional collision check.
 
     Attributes:
         kinematics: Kinematics of the arm.

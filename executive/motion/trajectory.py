@@ -27,8 +27,7 @@ class Trajectory:
 
     Attributes:
         duration: Time from the start to the final rest [s].
-        start: Joint positions at the start `(n,)` [rad].
-        end: Joint positions at the end `(n,)` [rad].
+        start, end: Joint positions at the start and at the end, `(n,)` each [rad].
         guarded_start_time: Time from which the tool may touch the target [s]; infinite if it must not.
     """
 
@@ -107,12 +106,7 @@ def compute_peak_fractions(states: JointState, limits: JointLimits) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _SlowPiece:
-    """A piece with lower velocities on the path of another piece; implements `MotionPiece`.
-
-    Attributes:
-        piece: The piece with the original velocities.
-        speed_factor: Factor on the velocities, 0 to 1.
-    """
+    """A piece with `speed_factor` (0 to 1) times the velocities of `piece`; implements `MotionPiece`."""
 
     piece: MotionPiece
     speed_factor: float

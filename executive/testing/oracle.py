@@ -39,8 +39,7 @@ class TrueFrame(Frame):
     """A frame with the true detections of its objects.
 
     Attributes:
-        true_detections: Bounding boxes of the loose objects in front of the camera; objects whose centre is
-            occluded by another object are omitted.
+        true_detections: Boxes of loose objects in front of the camera whose centre no other object occludes.
     """
 
     true_detections: tuple[Detection, ...]
@@ -151,9 +150,7 @@ class Oracle:
 def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> Callable[..., SimCell]:
     """Return a function for `RunOptions.kind` that makes simulated cells with oracles as detectors.
 
-    Args:
-        box_std: Standard deviation of the noise of each box coordinate [pixel].
-        renders_images: True to render the images of the camera; otherwise they are black.
+    `box_std` [pixel] has the same meaning as in `Oracle`, and `renders_images` as in `TruthCamera`.
     """
     camera = partial(TruthCamera, renders_images=renders_images)
     return partial(SimCell, build_camera=camera, build_detectors=partial(_build_oracles, box_std=box_std))

@@ -38,8 +38,7 @@ class SkillResult:
         outputs: Values of the output ports by name, on success.
         ticks: Number of control steps from the start to the end.
         commands: Commands to the cell, in order; `log_commands` defines the texts.
-        braking_steps: Number of control steps from a halt until the arm was at rest; None if the arm was not
-            at rest after `MAX_BRAKING_TIME`.
+        braking_steps: Number of control steps from a halt to rest; None: no rest within `MAX_BRAKING_TIME`.
     """
 
     status: str

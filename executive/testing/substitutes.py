@@ -23,9 +23,7 @@ RunMethod = Callable[[Skill, Cell], Steps | None]
 def make_failing(
     skill: type[Skill], reason: str, *, start_count: int | None = None, message: str = "injected failure"
 ) -> type[Skill]:
-    """Return a skill whose first `start_count` runs fail; later runs execute the original skill.
-
-    All runs fail if `start_count` is None.
+    """Return a skill whose first `start_count` runs fail (None: all); later runs execute the original skill.
 
     Raises:
         InputError: The skill does not declare this reason.

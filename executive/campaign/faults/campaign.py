@@ -37,7 +37,6 @@ class Campaign:
         on_halt: Function that is called when the first signal (Ctrl-C, SIGTERM) halts the campaign.
 
     Attributes:
-        mission: The mission and its cell.
         nominal_run: Results of the run without a fault.
         faults: All single faults; the number of a fault is its position in this list, from 1.
 
@@ -90,8 +89,7 @@ class Campaign:
     def run_fault_pairs(self, count: int) -> FaultCampaignResults:
         """Execute a run for each of `count` random pairs of faults and return the results.
 
-        The seed of the mission determines the pairs. Bugs, faults that require another fault, and faults that
-        replace another fault are excluded.
+        The seed of the mission determines the pairs; bugs, conditional and replacing faults are excluded.
         """
         numbers = [
             number

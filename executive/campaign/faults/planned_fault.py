@@ -86,12 +86,7 @@ class PlannedFault:
 def make_substitutes(
     skill_faults: Iterable[SkillFault], skills: Mapping[str, type[Skill]]
 ) -> dict[str, type[Skill]]:
-    """Return the substitutes of the faulty skills, by path of the node.
-
-    Args:
-        skill_faults: Injected faults of skills.
-        skills: Skills of all nodes, by path of the node.
-    """
+    """Return substitutes of the faulty skills; the result and `skills` map the path of a node to a skill."""
     substitutes: dict[str, type[Skill]] = {}
     for fault in skill_faults:
         skill = substitutes.get(fault.node, skills[fault.node])

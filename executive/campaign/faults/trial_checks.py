@@ -26,12 +26,7 @@ MIN_BORDER_DISTANCE = 30.0
 
 
 class UnobservedCounts(NamedTuple):
-    """Numbers of objects that no image shows at their present positions.
-
-    Attributes:
-        outside_bins: Number of these objects on the table or the ground.
-        inside_bins: Number of these objects in bins.
-    """
+    """Numbers of objects, outside and inside of bins, that no image shows at their present positions."""
 
     outside_bins: int = 0
     inside_bins: int = 0

@@ -181,14 +181,10 @@ def _find_name_in_scene(refers: str, scene: SkillScene) -> str | None:
 
 
 def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
-    """Return a new scene for a skill.
+    """Return a new scene for a skill; if `is_holding` is True, the tool holds an item of the ledger.
 
     The suction cup touches the first target if the skill cannot move there: it has a target as input, and
     uses the tool without the arm.
-
-    Args:
-        skill: The skill.
-        is_holding: True: the tool holds an item of the ledger. False: the tool is empty.
     """
     fake = FakeCell(options=CellOptions(SilentOperator(list(SHIPPED_ROUTES)), base=Path()))
     table, labels = load_empty_cell().table, list(fake.cell.classes)

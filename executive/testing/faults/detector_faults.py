@@ -65,28 +65,18 @@ def detector_dead() -> Effect:
 def detector_hangs(hang_end: float = math.inf) -> Effect:
     """Return an effect: requests are answered when the fault ends, but not later than at `hang_end`.
 
-    A fault that lasts until the end of the waiting node prevents the answer.
-
-    Args:
-        hang_end: Time on the run's clock until which the detector hangs at most [s].
+    `hang_end` [s] is on the run's clock. A fault that outlasts the waiting node prevents the answer.
     """
     return make_detector_effect("detector_hangs", hang_end=hang_end)
 
 
 def detector_times_out(delay: float) -> Effect:
-    """Return an effect: requests fail after a delay, and `Detect` fails with `unavailable`.
-
-    Args:
-        delay: Time from the answer of the detector without the fault to the failure [s].
-    """
+    """Return an effect: requests fail `delay` [s] after the answer, and `Detect` fails with `unavailable`."""
     return make_detector_effect("detector_hangs", _raise_unavailable, delay=delay)
 
 
 def detector_slow(delay: float) -> Effect:
-    """Return an effect: requests are answered late.
-
-    Args:
-        delay: Delay of each answer [s].
+    """Return an effect: requests are answered late, after a delay of `delay` [s].
 
     Raises:
         InputError: The delay is negative.

@@ -41,7 +41,6 @@ class FaultContext:
 
     Attributes:
         cell: The cell without faults, as skills see it.
-        emit: Emits events of the run.
         motion: Last motion of the arm and its start time [s]; None before a motion and after a stop.
     """
 

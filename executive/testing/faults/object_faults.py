@@ -73,11 +73,7 @@ def object_bumped(
 
 
 def object_unsealable(number: int) -> Effect:
-    """Return an effect: the suction cup cannot seal on one object.
-
-    Args:
-        number: Number of the object, from 1.
-    """
+    """Return an effect: the suction cup cannot seal on the object with this number, from 1."""
     return Effect("seal_fails", interceptors={"close": _prevent_seal}, arguments=(number,))
 
 

@@ -58,11 +58,7 @@ def arm_collides(obstacle: str = "something", fraction: float = 0.5) -> Effect:
 
 
 def no_path(*, is_blocked: bool = False) -> Effect:
-    """Return an effect: the planner finds no motion, and the skill fails with `unreachable` or `blocked`.
-
-    Args:
-        is_blocked: True if an obstacle blocks the goal; False if the goal is out of reach.
-    """
+    """Return an effect: planning fails; the reason is `blocked` if `is_blocked`, otherwise `unreachable`."""
     return Effect("no_path", interceptors={"plan": _fail_planning}, arguments=(is_blocked,))
 
 
