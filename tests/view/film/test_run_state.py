@@ -47,7 +47,7 @@ def test_what_happens_in_a_step_is_seen_in_it_and_not_before(state: FilmRunState
     state.advance_to(3, 3 / 240)
     assert statuses(state)["tree/Grasp"] == "RUNNING"
     assert state.action_text == "Grasp cube-1"
-    assert state.timeline.find_current_activation("tree/Grasp").note == "cube-1"
+    assert state.timeline.find_current_activation("tree/Grasp").reason_or_item == "cube-1"
     assert state.picture_file == Path("frames/000003_cube-1.jpg")
 
 
@@ -83,7 +83,7 @@ def test_of_a_tree_that_ended_what_ended_last_stays_open(state: FilmRunState) ->
     state.advance_to(960, 4.0)
     assert state.active_paths == {"tree", "tree/Transit"}
     assert statuses(state)["tree"] == "FAILURE"
-    assert state.timeline.find_current_activation("tree/Transit").note == "blocked"
+    assert state.timeline.find_current_activation("tree/Transit").reason_or_item == "blocked"
     # It was about no item: the tree says it, and nothing else has to.
     assert state.failure_text == ""
 
