@@ -28,7 +28,7 @@ def times_of(
     course: list[Activation], nodes: Sequence[OutlineNode], decisions: list[tuple[float, str]], end: float
 ) -> ActivityTimes:
     """Return the times of activations and selections up to a time."""
-    return compute_activity_times(Timeline(activations=course, selections=decisions, clock=end), nodes)
+    return compute_activity_times(Timeline(activations=course, selection_times=decisions, clock=end), nodes)
 
 
 def near(row: dict[str, float]) -> object:
