@@ -170,9 +170,11 @@ class AuditedCell(SimCell):
         routes: Routes,
         emit: Emit,
         options: CellOptions,
-        detectors: DetectorMaker,
+        build_detectors: DetectorMaker,
     ) -> None:
-        super().__init__(config, seed=seed, routes=routes, emit=emit, options=options, detectors=detectors)
+        super().__init__(
+            config, seed=seed, routes=routes, emit=emit, options=options, build_detectors=build_detectors
+        )
         self.objects: tuple[FoundObject, ...] = ()
         self._labels = dict(self._world.labels)
         self._carried: dict[int, str] = {}

@@ -220,7 +220,7 @@ class _RunWithHalts:
 
     def _keep_command(self) -> None:
         if isinstance(self._arm, SimArm):
-            self._commands.append(self._arm._command)
+            self._commands.append(self._arm._commanded_q)
 
     def _fork_and_halt_if_due(self) -> None:
         """Fork if a halt is due: the child requests a stop and goes on; the parent keeps the result."""
