@@ -239,7 +239,7 @@ class AuditedCellMaker:
     ) -> AuditedCell:
         """Return a cell made from a cell file."""
         self.made = AuditedCell(
-            config, seed=seed, routes=routes, emit=emit, options=options, detectors=self._detectors
+            config, seed=seed, routes=routes, emit=emit, options=options, build_detectors=self._detectors
         )
         return self.made
 
