@@ -22,10 +22,7 @@ NEAR_PLANE, FAR_PLANE = 0.02, 5.0
 def compute_camera_matrix(width: int, height: int, fov_deg: float) -> Array:
     """Return the camera matrix `(3, 3)` [pixel] of a camera with square pixels and a centred principal point.
 
-    Args:
-        width: Image width [pixel].
-        height: Image height [pixel].
-        fov_deg: Vertical field of view [degree].
+    `width` and `height` are the size of the image [pixel], `fov_deg` is the vertical field of view [degree].
     """
     focal_length = height / 2 / math.tan(math.radians(fov_deg) / 2)
     return np.array([[focal_length, 0.0, width / 2], [0.0, focal_length, height / 2], [0.0, 0.0, 1.0]])

@@ -26,11 +26,8 @@ def compute_occlusion_mask(
 ) -> NDArray[np.bool_]:
     """Return the mask `(H, W)` of the pixels that the arm may occlude: the images of all its spheres.
 
-    Args:
-        parts: The links, the tool and the held object.
-        matrix: Camera matrix `(3, 3)` [pixel].
-        X_WC: Camera pose in the world.
-        size: Width and height of the image [pixel].
+    `parts` are the links, the tool and the held object. `matrix` is the camera matrix `(3, 3)` [pixel], and
+    `size` is the width and height of the image [pixel].
     """
     mask = np.zeros((size[1], size[0]), dtype=np.uint8)
     for points, radius in parts:

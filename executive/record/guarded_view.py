@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 class GuardedView:
     """Forwards all calls to a view until its first error, and then closes the view; implements `View`.
 
-    Args:
-        view: The wrapped view.
-
     Attributes:
         problem: Message about the first error of the view, or "".
     """

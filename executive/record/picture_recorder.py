@@ -163,10 +163,7 @@ def _group_items(timeline: Timeline) -> dict[str, list[str]]:
 def find_picture(folder: Path, item: str, reason: str) -> Path | None:
     """Return the file of the last picture of a failure or a selection, or None without such a picture.
 
-    Args:
-        folder: Folder of the pictures.
-        item: Item of the failed attempt; "" for a failure without an item.
-        reason: Reason of the failure; "" for the last selection of the item.
+    `item` is "" for a failure without an item; `reason` is "" for the last selection of the item.
     """
     name_after_tick = "_".join(filter(None, (item, reason)))
     pictures = [file for file in folder.glob("*.jpg") if file.stem.partition("_")[2] == name_after_tick]

@@ -35,8 +35,7 @@ class ReplayResult:
     Attributes:
         decisions: Number of equal decisions.
         ticks: Number of control steps of the replay.
-        recorded: First recorded decision that the replay did not repeat, or None; without its message.
-        replayed: First decision of the replay that differs from the record, or None; without its message.
+        recorded, replayed: First differing decision of record and replay, without message, or None.
         edited: True if the replayed mission differs from the recorded mission.
         unanswered: Message about the input without a recorded value that ended the replay, or "".
         is_complete: True if the replay repeated all recorded control steps.

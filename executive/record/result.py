@@ -161,12 +161,9 @@ def make_audit(items: Mapping[str, int], audit: Mapping[str, int], is_table_empt
 
 
 def is_confirmed_by_audit(items: Mapping[str, int], audit: Mapping[str, int], is_table_empty: bool) -> bool:
-    """Return True if the true places of the objects confirm the counts of the ledger.
+    """Return True if the true counts `audit` confirm the counts `items` of the ledger.
 
-    Args:
-        items: Number of items by final state.
-        audit: Number of objects by true place.
-        is_table_empty: True if the run reported an empty table; then no object may be unseen.
+    If the run reported an empty table (`is_table_empty`), no object may be unseen.
     """
     unsorted_count = items["rejected"] + items["skipped"]
     return bool(

@@ -64,9 +64,7 @@ def replace_invalid_xml_characters(text: str) -> str:
 def render_template(template: str, **values: object) -> str:
     """Return a rendered template; escape texts, and replace characters that XML does not allow.
 
-    Args:
-        template: Path of the template file, relative to `executive/view`.
-        values: Values of the variables in the template.
+    `template` is the path of the template file, relative to `executive/view`.
     """
     environment = Environment(
         loader=PackageLoader("executive.view", "."), autoescape=True, undefined=StrictUndefined,

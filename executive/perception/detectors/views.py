@@ -92,10 +92,7 @@ def merge_detections(detections: Sequence[RegionDetection], size: tuple[int, int
     """Return one detection per object, most confident first.
 
     For an object with boxes in several regions, an untruncated box is preferred to a more confident box.
-
-    Args:
-        detections: Detections in all regions.
-        size: Width and height of the image [pixel].
+    `size` is the width and height of the image [pixel].
     """
     candidates = sorted(detections, key=lambda item: (_is_truncated(item, size), -item.detection.confidence))
     is_same_object = _compare_objects([candidate.detection.box for candidate in candidates])

@@ -20,12 +20,7 @@ def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Finger
 
     The fingerprint contains weights and settings of the detector, the localization method, the classes and
     their sizes, and pose, intrinsics, image size, `table_view` and depth settings of the camera. It does not
-    contain bins, the number of objects, light and colours.
-
-    Args:
-        config: The cell file.
-        detector: Name of the detector in the cell file.
-        base: Folder to which paths in the cell file are relative.
+    contain bins, the number of objects, light and colours. Paths in the cell file are relative to `base`.
     """
     section = config.detectors[detector]
     options = {key: value for key, value in section.options.items() if key != "threads"}

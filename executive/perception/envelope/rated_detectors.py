@@ -98,12 +98,8 @@ def build_rated_detectors(
 def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> dict[str, DetectorEnvelope]:
     """Return the envelope of each measurable detector of a cell, by name.
 
-    A measurement in another cell also applies if it has the same fingerprint as the detector.
-
-    Args:
-        config: The cell file.
-        base: Folder to which paths in the cell file are relative.
-        folders: Folders with measurement files `CELL.measured.json`.
+    A measurement in another cell also applies if it has the same fingerprint as the detector. Paths in the
+    cell file are relative to `base`; `folders` contain measurement files `CELL.measured.json`.
     """
     names = list(find_measurable_detectors(config))
     measurements, problems = _read_all_measurements(folders) if names else ([], [])

@@ -24,10 +24,7 @@ REMEDY_BY_REASON: Mapping[str, str] = {
 def list_advice(run: FailedRun, arm_state: str, readings: Sequence[Reading]) -> Iterator[str]:
     """Yield sentences with advice, the most urgent first.
 
-    Args:
-        run: The failed run.
-        arm_state: `at rest`, or a text about the state of the arm.
-        readings: Inputs that the failed skill read from the cell.
+    `arm_state` is `at rest` or a text about the arm; `readings` are the inputs that the failed skill read.
     """
     if arm_state != "at rest":
         yield f"keep away from the arm until you have seen it stand still: {arm_state}"

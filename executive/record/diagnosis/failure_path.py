@@ -56,11 +56,7 @@ def find_failure_path(
 ) -> tuple[FailurePathNode, ...]:
     """Return the nodes through which a failure propagated, from the root to the origin.
 
-    Args:
-        tree: Root node of the mission.
-        timeline: Timeline of the run.
-        origin: Path of the node in which the failure began.
-        failure: Name of the failure: `Grasp.missed`.
+    `origin` is the path of the node in which the failure with the name `failure` (`Grasp.missed`) began.
     """
     nodes = find_nodes_on_path(tree, origin)
     skill_or_label, _, reason = failure.rpartition(".")

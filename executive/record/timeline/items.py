@@ -33,9 +33,7 @@ class Sighting:
     """Look in which an item was detected.
 
     Attributes:
-        frame: Number of the frame.
-        camera, detector: Names of the camera and of the detector.
-        clock: Time of the look [s].
+        frame, camera, detector, clock: Attributes of the look, as in `Look`.
         item: Name of the item.
         attempts: Number of failed attempts to pick the item.
         looks: Number of looks in which the item was detected until now.

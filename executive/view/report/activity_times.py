@@ -44,11 +44,7 @@ def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> 
     """Return the time by item and activity, from the start of a run to the last event of its timeline.
 
     If several skills run, the time belongs to the skill that started first and works on an item. Time without
-    such a skill belongs to the item that is selected next.
-
-    Args:
-        timeline: Timeline of the run, with its history.
-        nodes: Nodes of the tree.
+    such a skill belongs to the item that is selected next. `timeline` must have a history.
     """
     skills = {node.path: node for node in nodes if node.kind == "skill"}
     activations = [activation for activation in timeline.activations if activation.node in skills]

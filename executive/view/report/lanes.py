@@ -105,9 +105,7 @@ def _group_by_bar(
 ) -> dict[str, list[list[Activation]]]:
     """Return the activations of each bar by path, in at most `MAX_BAR_COUNT` bars plus one per lane.
 
-    Args:
-        activations_by_path: Activations of each node.
-        scale: Scale of the drawing [pixel/s]; if there are too many bars, a smaller scale is tried.
+    If there are too many bars at the scale `scale` of the drawing [pixel/s], a smaller scale is tried.
     """
     while True:
         groups_by_path = {

@@ -36,10 +36,7 @@ def collect_pictures(folder: Path, items: Collection[str]) -> list[Picture]:
     """Return the pictures of a run: the last decision for each object, then all failures by time.
 
     If the pictures are too large for one page, the first pictures are embedded and the others linked.
-
-    Args:
-        folder: Folder `frames` of the run.
-        items: Names of the items of the run.
+    `folder` is the folder `frames` of the run; `items` are the names of all items of the run.
     """
     pictures = sorted(
         (_link_picture(file, items) for file in folder.glob("*.jpg")), key=attrgetter("tick", "file")

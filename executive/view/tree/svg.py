@@ -50,10 +50,7 @@ NO_RESULTS: Mapping[str, NodeResult] = MappingProxyType({})
 def draw_svg(nodes: Sequence[OutlineNode], name: str, results: Mapping[str, NodeResult] = NO_RESULTS) -> str:
     """Return the drawing of a tree as an SVG document.
 
-    Args:
-        nodes: Nodes of the tree.
-        name: Name of the mission, for the title.
-        results: Results of nodes, by path of the node.
+    `name` is the name of the mission, for the title; `results` contains results of nodes, by path.
     """
     child_indices = list_child_indices(nodes)
     parents = {child: parent for parent, children in enumerate(child_indices) for child in children}

@@ -43,12 +43,7 @@ class NodeSize:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Rectangle in the picture [pixel].
-
-    Attributes:
-        x, y: Left top corner; y points down.
-        width, height: Size.
-    """
+    """Rectangle in the picture [pixel]; `x`, `y` is its left top corner, and y points down."""
 
     x: float
     y: float

@@ -56,9 +56,7 @@ def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> st
 def describe_delay(retry_causes: Sequence[int | None], options: RoboflowOptions) -> str:
     """Return the message about a missed deadline.
 
-    Args:
-        retry_causes: HTTP statuses that caused retries before the deadline; None for no connection.
-        options: Options of the detector.
+    `retry_causes` are the HTTP statuses that caused retries before the deadline; None for no connection.
     """
     message = f"no answer within {options.deadline} s from {options.host}"
     if not retry_causes:
