@@ -10,6 +10,7 @@ import click
 
 from executive.cli.options import json_option, overrides_option
 from executive.cli.streams import keep_stdout_clean, print_json
+from executive.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from executive.mission.findings import Finding
@@ -56,7 +57,7 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
         print_json(reports)
     else:
         click.echo("\n".join(texts))
-    ctx.exit(0 if all(report["ok"] for report in reports) else 2)
+    ctx.exit(ExitCode.SUCCESS if all(report["ok"] for report in reports) else ExitCode.INVALID_INPUT)
 
 
 def _describe_mission(mission: str, warnings: Sequence[Finding], failures: Sequence[UnhandledFailure]) -> str:

@@ -21,6 +21,7 @@ import click
 from executive.cli.options import json_option
 from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import InputError
+from executive.exit_codes import ExitCode
 from executive.processes import build_command
 
 MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
@@ -72,7 +73,7 @@ def command(ctx: click.Context, as_json: bool) -> None:
         for status, subject, message, fix in results:
             click.echo(f"{status:7}  {subject:{width}}  {'; '.join(filter(None, (message, fix)))}")
         click.echo(f"{problem_count or 'no'} problem{'' if problem_count == 1 else 's'}")
-    ctx.exit(int(problem_count > 0))
+    ctx.exit(ExitCode.FAILURE if problem_count else ExitCode.SUCCESS)
 
 
 def run_checks() -> Iterator[CheckResult]:

@@ -8,6 +8,7 @@ import click
 
 from executive.cli.options import FILE, json_option, runs_option
 from executive.cli.streams import keep_stdout_clean, print_json
+from executive.exit_codes import ExitCode
 
 
 @click.command(name="replay")
@@ -38,4 +39,4 @@ def command(ctx: click.Context, run: str, mission_file: Path | None, runs: Path,
         click.echo(f"{result.decisions} decisions{comparison} ({path})", err=True)
     if as_json:
         print_json({"run": str(path), "same": result.is_equal, **result.as_json()})
-    ctx.exit(0 if result.is_equal else 1)
+    ctx.exit(ExitCode.SUCCESS if result.is_equal else ExitCode.FAILURE)

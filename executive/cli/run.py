@@ -146,7 +146,7 @@ def _resume(
     """Resume an interrupted run; return its result and the event of its start."""
     from executive.plugins import load_skills
     from executive.record.journal import find_run_start, read_journal
-    from executive.record.resumed_run import resume_run
+    from executive.record.resume import resume_run
     from executive.record.run_directory import find_run
 
     path = find_run(name, runs)

@@ -14,6 +14,7 @@ import click
 
 from executive.cli.options import json_option
 from executive.cli.streams import keep_stdout_clean, print_json
+from executive.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from executive.skill import Param, Port, Skill
@@ -48,7 +49,7 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
         if name is not None:
             skills = {name: skills[name]}
     if conform:
-        ctx.exit(0 if _check_conformance(skills, as_json) else 1)
+        ctx.exit(ExitCode.SUCCESS if _check_conformance(skills, as_json) else ExitCode.FAILURE)
     declarations = [collect_declarations(key, skill) for key, skill in skills.items()]
     if as_json:
         print_json(declarations if name is None else declarations[0])

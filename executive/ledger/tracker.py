@@ -24,8 +24,8 @@ from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.records import ItemRecords
-from executive.ledger.recovery import Recovery
 from executive.ledger.staleness import Staleness
+from executive.ledger.untracked_items import Recovery
 
 
 class Tracker:

@@ -10,6 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from executive.errors import InputError, shorten_quotations
+from executive.mission.renamed_keys import NEW_KEY_BY_FORMER_KEY
 from executive.mission.source import Span
 
 _MAX_EXCERPT_LENGTH = 140
@@ -29,18 +30,6 @@ MEANING_BY_CODE: Mapping[str, str] = dict(
     line.split(": ", 1) for line in _CODES_FILE.read_text(encoding="utf-8").splitlines()
 )
 """Meaning of each code of a finding, and the action to take."""
-NEW_KEY_BY_FORMER_KEY = {
-    "aim": "max_position_std",
-    "confused": "confusion_rate",
-    "invented": "false_detections",
-    "least_force": "min_force",
-    "misjudged": "max_class_error",
-    "misses": "miss_rate",
-    "most": "max",
-    "overlooked": "max_miss_probability",
-    "planning": "planning_time",
-}
-"""Renamed keys of mission and cell files."""
 _VALUE_CODES = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",

@@ -24,7 +24,7 @@ from executive.record.recorded_mission import read_mission_of_run
 from executive.record.timeline.activation import get_skill_name
 from executive.replay.input_log import InputLog
 from executive.run.assembly import assemble_replay
-from executive.run.resume import ResumedRun
+from executive.run.resumed_run import ResumedRun
 from executive.skill import Skill
 
 

@@ -17,7 +17,7 @@ from executive.replay.input_log import InputLog, Interruption
 from executive.replay.replayed_cell import ReplayedCell
 from executive.run.lookahead_planner import LookaheadPlanner
 from executive.run.operator import ScriptedOperator, TerminalOperator
-from executive.run.resume import ResumedRun
+from executive.run.resumed_run import ResumedRun
 from executive.run.run import Run
 from executive.run.run_context import RunContext
 from executive.run.run_control import RunControl

@@ -26,7 +26,7 @@ from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import replay_and_compare, replay_run
 from executive.record.result import Result, describe_disagreement
-from executive.record.resumed_run import resume_run
+from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions

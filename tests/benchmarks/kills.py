@@ -29,7 +29,7 @@ from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
 from executive.record.replayed_run import replay_and_compare
 from executive.record.result import Result, describe_disagreement
-from executive.record.resumed_run import resume_run
+from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, find_run
 from executive.replay.input_log import InputLog
 from executive.run.assembly import RunOptions

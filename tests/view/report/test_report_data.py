@@ -17,7 +17,7 @@ from executive.mission.text.file_search import get_shipped_folder
 from executive.plugins import load_skills
 from executive.record.journal_format import encode_event
 from executive.record.recorded_run import RecordOptions
-from executive.record.resumed_run import resume_run
+from executive.record.resume import resume_run
 from executive.run.assembly import RunOptions
 from executive.view.report.report_data import INTERRUPTED, ReportData
 

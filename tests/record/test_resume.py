@@ -31,7 +31,7 @@ from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import replay_run
 from executive.record.result import Result
-from executive.record.resumed_run import resume_run
+from executive.record.resume import resume_run
 from executive.record.run_directory import find_run
 from executive.run.assembly import RunOptions
 from executive.testing.faults.world_access import WorldAccess
