@@ -35,7 +35,7 @@ class Codec(NamedTuple):
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """Planned motion without its trajectory: a replay needs only its duration [s]."""
+    """Planned motion without its trajectory; a replay needs only the duration of the motion [s]."""
 
     duration: float
 

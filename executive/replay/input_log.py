@@ -22,7 +22,7 @@ from executive.events import (
 UNKNOWN_ACTION = "unknown"
 """Value of `Interruption.last_action` if the journal may lack commands to arm or tool."""
 _COMMAND_EVENTS = (ToolCommanded, MotionPlanned)
-"""Kinds of events of which one precedes each command to arm or tool."""
+"""Kinds of events; an event of one of these kinds precedes each command to arm or tool."""
 
 
 class RecordedInput(NamedTuple):
@@ -50,7 +50,7 @@ class Interruption:
 
 
 class Halt(NamedTuple):
-    """Halt of a run in control step `tick`, after the tree was ticked in this step if `is_tree_ticked`."""
+    """Halt of a run in control step `tick`; `is_tree_ticked` if the tree was already ticked in this step."""
 
     tick: int
     is_tree_ticked: bool
@@ -149,7 +149,7 @@ class InputLog:
         """Return True if the log may lack the last command to arm or tool.
 
         Events are written in order, so that only commands in and after the last logged step may be missing.
-        `is_truncated` is True if this step is incomplete and the cell executed later steps.
+        `is_truncated` is True if the last logged step is incomplete and the cell executed later steps.
         """
         if last_command_tick != self.last_tick:
             return last_command_tick > self.last_tick

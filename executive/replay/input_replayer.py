@@ -52,7 +52,7 @@ class InputReplayer:
         """
         self._read_counts[name] += 1
         inputs = self._inputs.get(name, deque())
-        # Values that the recorded run read before or in this read are due, in the order of their reads.
+        # Process all recorded values up to and including this read, in the order of their reads.
         this_read = (self._tick, self._read_counts[name])
         while inputs and (inputs[0].tick, inputs[0].reading.read_number) <= this_read:
             reading = inputs.popleft().reading
@@ -67,7 +67,7 @@ class InputReplayer:
 
 
 def _make_exception(reading: InputRead) -> BaseException:
-    """Return an exception with the recorded message, of the recorded class or of a new class of this name."""
+    """Return an exception with the recorded class name and message; an unknown class is created."""
     exception_class = getattr(errors, reading.exception, None) or type(reading.exception, (Exception,), {})
     error = exception_class(reading.value)
     assert isinstance(error, BaseException)

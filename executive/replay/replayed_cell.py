@@ -76,7 +76,7 @@ class ReplayedCell(CellWrapper):
     def resume(self) -> None:
         """Continue after the pending interruption; after the last interruption, continue on the inner cell.
 
-        If the inner cell has executed fewer control steps than the log contains, it first executes them.
+        If the inner cell has executed fewer control steps than the log contains, it executes the rest first.
         """
         interruption, self.pending_interruption = self.pending_interruption, None
         assert interruption is not None, "only an interrupted run can be resumed"
@@ -112,15 +112,15 @@ class ReplayedCell(CellWrapper):
         self._begin_step(self._steps + 1)
         self.pending_interruption = self._find_interruption(self._steps)
 
-    def _begin_step(self, steps: int) -> None:
-        self._steps = steps
-        self._replayer.begin_step(steps)
+    def _begin_step(self, step_count: int) -> None:
+        self._steps = step_count
+        self._replayer.begin_step(step_count)
 
-    def _find_interruption(self, steps: int) -> Interruption | None:
-        """Return the interruption after `steps` control steps, or None."""
-        if self.last_interruption is not None and steps == self.last_interruption.complete_step_count:
+    def _find_interruption(self, step_count: int) -> Interruption | None:
+        """Return the interruption after `step_count` control steps, or None."""
+        if self.last_interruption is not None and step_count == self.last_interruption.complete_step_count:
             return self.last_interruption
-        return self.log.interruptions.get(steps)
+        return self.log.interruptions.get(step_count)
 
     def _read_clock(self) -> float:
         """Return the time on the clock of the cell [s]."""
