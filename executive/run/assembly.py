@@ -37,7 +37,7 @@ class RunOptions:
         has_keyboard: True if a person can type at the terminal.
         gui: True to show the simulated world in a window.
         is_realtime: True to execute the run at the speed of the wall clock.
-        kind: Function that makes the work cell, or None to use the kind that the cell file names.
+        kind: Factory of the work cell, or None to use the kind that the cell file names.
         substitutes: Skill that replaces the skills of nodes, by a pattern for the node paths (`*/Grasp`).
         scene: Scene file, which changes the world of a simulated cell, or None.
     """
@@ -64,13 +64,13 @@ def assemble(
         loaded: The mission and its cell.
         skills: Installed skills by name.
         options: Options of the run.
-        observers: Observers of the events; each event is passed to them in this order.
+        observers: Observers of the events; each event is passed to the observers in this order.
 
     Raises:
         InputError: The kind of the cell is not installed, or a request names no class of the mission.
     """
     builder = _RunBuilder(loaded, skills, options, observers)
-    workcell = builder.build_cell()
+    workcell = builder.build_workcell()
     builder.context.connect(workcell, LookaheadPlanner(workcell.cell))
     start = RunStarted(
         mission=loaded.mission.name,
@@ -108,7 +108,7 @@ def assemble_resumed(
         log: The recorded inputs.
         world_log: File from which a simulated cell reconstructs its world.
         is_complete: True if the log contains all events of its last control step.
-        has_ended: True if the recorded run had ended, so that it is only replayed.
+        has_ended: True if the recorded run has ended and is therefore only replayed.
 
     Raises:
         InputError: The kind of the cell is not installed, or its world cannot be reconstructed.
@@ -116,7 +116,7 @@ def assemble_resumed(
     builder = _RunBuilder(loaded, skills, options)
     frame_count, pose_count = map(log.count_readings, ("camera.frame", "camera.next_pose"))
     resume_point = ResumePoint(world_log, frame_count, pose_count)
-    workcell = builder.build_cell(resume_point, log.count_events(RequestGiven))
+    workcell = builder.build_workcell(resume_point, log.count_events(RequestGiven))
     interruption = log.find_interruption(workcell.steps, workcell.last_command, is_complete=is_complete)
     return builder.build_resumed_run(workcell, log, None if has_ended else interruption)
 
@@ -131,11 +131,11 @@ def assemble_replay(
     """Return a run that replays a recorded run without hardware or simulation."""
     options = RunOptions(seed, requests=(), kind=CellWithoutHardware)
     builder = _RunBuilder(loaded, skills, options, observers)
-    return builder.build_resumed_run(builder.build_cell(), log)
+    return builder.build_resumed_run(builder.build_workcell(), log)
 
 
 class _RunBuilder:
-    """Builder of the parts of a run; its arguments are those of `assemble`.
+    """Builder of the work cell, the tree and the run of a mission; the arguments are those of `assemble`.
 
     Attributes:
         context: Cell and events of the run; its method `connect` must be called before `build_tree`.
@@ -153,7 +153,7 @@ class _RunBuilder:
         self.context = RunContext(observers)
         self.control = RunControl()
 
-    def build_cell(self, resume_point: ResumePoint | None = None, request_count: int = 0) -> Workcell:
+    def build_workcell(self, resume_point: ResumePoint | None = None, request_count: int = 0) -> Workcell:
         """Return the work cell of the run.
 
         Args:
@@ -175,7 +175,7 @@ class _RunBuilder:
         )
 
     def build_tree(self) -> TreeNode:
-        """Return the behaviour tree of the mission on the cell of `context`."""
+        """Return the behaviour tree of the mission for the cell of `context`."""
         cell, emit = self.context.cell, self.context.emit
         return build_tree(self._loaded, self._skills, cell, Blackboard(), emit, self._options.substitutes)
 

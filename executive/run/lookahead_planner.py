@@ -29,14 +29,14 @@ class LookaheadPlanner:
         self._may_plan_transit = False
         """True from the command to grip until the transit is planned."""
         self._may_plan_approach = False
-        """True if a look or a motion may have changed the next approach since it was planned."""
+        """True if new detections or a new motion may have made the planned approach obsolete."""
 
     def on_event(self, timed: TimedEvent) -> None:
         """Update the expected motions from an event of the run."""
         event = timed.event
         if isinstance(event, TargetSelected):
             item, bin = event.item, event.bin
-            # A skill may select an item or a bin that does not exist; the planner ignores it.
+            # The selection of an item or a bin that does not exist is ignored.
             items = {target.item for target in self._cell.ledger.find_targets()}
             self._item_and_bin = (item, bin) if bin in self._cell.bins and item in items else None
         elif isinstance(event, ToolCommanded):
@@ -45,7 +45,7 @@ class LookaheadPlanner:
             self._may_plan_approach = True
 
     def plan_next_motion(self) -> None:
-        """Plan the next motion if it became known in the last tick; called after each tick."""
+        """Plan the next motion if the last tick made it predictable; called after each tick."""
         cell, held_item = self._cell, self._cell.ledger.find_held_item()
         if self._may_plan_transit and self._item_and_bin and held_item is None and cell.tool.holding:
             self._may_plan_transit = False

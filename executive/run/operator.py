@@ -57,7 +57,7 @@ class TerminalOperator:
         self._emit, self._control, self._has_keyboard = emit, control, has_keyboard
 
     def ask(self, choices: Sequence[str]) -> str | None:
-        """Return the requested class, `rescan`, or None for `q` or the end of the input.
+        """Ask for a request; return a class, `rescan`, or None for `q` or the end of the input.
 
         Raises:
             Stopped: The run was stopped before a request.
@@ -79,7 +79,7 @@ class TerminalOperator:
             sys.stderr.write(f'cannot pick "{line.strip()}"\n')
 
     def _read_line(self) -> str:
-        """Return the next request as text; "" if the input of the terminal has ended."""
+        """Wait for the next request, and return its text; "" if the input of the terminal has ended."""
         while not self._control.is_stopped:
             if (text := self._control.take_request()) is not None:
                 sys.stderr.write("\n" if self._has_keyboard else "")

@@ -51,7 +51,7 @@ def catch_problems(action: Callable[[], None]) -> list[str]:
 
 
 def check_items(accounts: Accounts) -> LoopEnd:
-    """Return the end of a run whose tree succeeded.
+    """Return the end of a run whose tree succeeded, from the states of its items.
 
     The status is FAILURE if items were lost, else INCOMPLETE if items were rejected, else SUCCESS.
     """

@@ -31,7 +31,7 @@ class ResumedRun(Run):
     the events on the real cell.
 
     Args:
-        is_realtime: True to execute the part on the real cell at the speed of the wall clock.
+        is_realtime: True to execute the run on the real cell at the speed of the wall clock.
 
     Attributes:
         replayed_cell: Work cell of `context`, which replays the recorded run.
@@ -62,7 +62,7 @@ class ResumedRun(Run):
         self._recorders.append(recorder)
 
     def _execute_tree(self) -> RunEnded:
-        """Execute the tree, again after a recorded resumption of an INCOMPLETE run; return the last end."""
+        """Execute the tree, also after each recorded resumption of an INCOMPLETE run; return the last end."""
         run_end = super()._execute_tree()
         while run_end.status == "INCOMPLETE" and self.replayed_cell.is_tree_restarted:
             self._context.advance()
@@ -112,7 +112,7 @@ class ResumedRun(Run):
             self._recover_scene()
 
     def _recover_scene(self) -> None:
-        """Observe the scene; the scene stays unknown if an interruption or a stop ends the recovery early."""
+        """Observe the scene; an interruption or a stop ends the recovery, and the scene stays unknown."""
         cell = self.replayed_cell
         for _ in recover_scene(self._context.cell):
             self._context.advance()

@@ -50,7 +50,7 @@ class Run:
         self._is_realtime = is_realtime
         self._wall_start = 0.0
         """Wall time at time 0 of the run's clock [s]."""
-        # State of tool and table after the run; they keep their initial values if a sensor fails.
+        # State of tool and table after the run; the initial values remain if a sensor fails.
         self._held_item = ""
         self._is_table_empty = False
 
@@ -159,7 +159,7 @@ class Run:
             self._held_item = cell.ledger.find_held_item() or "something"
 
     def _store_table_state(self) -> None:
-        """Store True if the ledger contains no object to sort, and no look showed an undeclared label."""
+        """Store whether the ledger contains neither an object to sort nor an undeclared label."""
         ledger = self._context.cell.ledger
         self._is_table_empty = ledger.is_table_empty() and not ledger.unknown_labels
 

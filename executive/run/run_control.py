@@ -51,13 +51,13 @@ class RunControl:
 
     def step(self, tick_count: int = 1) -> None:
         """Let the run tick `tick_count` times, and then pause the run."""
-        # Outside a pause, no ticks remain: `resume` sets their number to 0.
+        # If the run is not paused, no ticks remain, because `resume` sets their number to 0.
         self._remaining_ticks += tick_count
         self._is_paused = True
         self._wake_up.set()
 
     def add_request(self, text: str) -> None:
-        """Store a request for `TerminalOperator`, which discards requests from before its question."""
+        """Store a request for `TerminalOperator`; its next question discards all earlier requests."""
         self._requests.append(text)
 
     def take_request(self) -> str | None:

@@ -25,7 +25,7 @@ def list_versions() -> Mapping[str, str]:
 
 
 def list_requirements(extra: str = "") -> tuple[str, ...]:
-    """Return the required packages of this project, or of its `extra`; empty if it is not installed."""
+    """Return the packages that this project or its `extra` requires; () if the project is not installed."""
     try:
         requirements = [Requirement(line) for line in metadata.requires(DISTRIBUTION) or ()]
     except metadata.PackageNotFoundError:
