@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class GuardedView:
-    """Forwards all calls to a view until its first error, and then closes the view; implements `View`.
+    """View that forwards all calls to another view, and closes that view after its first error.
 
     Attributes:
         problem: Message about the first error of the view, or "".
@@ -47,8 +47,8 @@ class GuardedView:
         try:
             call()
         except Exception as error:
-            name = type(self._view).__name__
-            self.problem = f"the view {name} failed during the run: {type(error).__name__}: {error}"
+            view_name = type(self._view).__name__
+            self.problem = f"the view {view_name} failed during the run: {type(error).__name__}: {error}"
             # A view that stays open would block the screen and the keyboard.
             with contextlib.suppress(Exception):
                 self._view.close()

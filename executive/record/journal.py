@@ -20,7 +20,7 @@ LOCK_LIST = Path("/proc/locks")
 
 
 class Journal:
-    """Observer that appends the recorded events to a file, which it locks for other processes.
+    """Observer that appends the recorded events to a file, and locks the file against other processes.
 
     The journal syncs each command to the tool, each placement of an item, and the end of the run to the disk.
     After a power cut, it therefore shows which item the tool may hold, and which items are in a bin.
@@ -78,7 +78,7 @@ class Journal:
                     os.ftruncate(self._fd, self._file_size)
             raise RecordLost(
                 f'the journal "{self._path}" cannot be written: {describe_os_error(error)}; '
-                "the run stops, because without a journal it could not be explained"
+                "the run stops, because nobody could explain a run without a journal"
             ) from error
 
     def close(self) -> None:
@@ -130,7 +130,7 @@ class Journal:
 def read_journal(path: Path) -> list[TimedEvent]:
     """Return the events of a journal, one for each line.
 
-    An incomplete line and zeros at the end of the file are ignored, because a power cut may leave them.
+    An incomplete line and zero bytes at the end of the file are ignored; a power cut may leave them.
 
     Raises:
         InputError: The file cannot be read, has another format, or has a line without an event.
@@ -155,14 +155,14 @@ def find_run_start(events: Sequence[TimedEvent], path: Path, advice: str) -> Run
 def find_run_end(events: Sequence[TimedEvent]) -> RunEnded | None:
     """Return the last event if it is the end of the run; None if the run was interrupted or is running.
 
-    An end before a resumption of the run is not the last event.
+    If the run was resumed after an end, that end is not returned.
     """
     last_event = events[-1].event if events else None
     return last_event if isinstance(last_event, RunEnded) else None
 
 
 def _measure_valid_length(content: bytes) -> int:
-    """Return the length of a journal up to its last complete line [bytes], which may lack a line feed."""
+    """Return the length [bytes] of a journal up to its last complete line, with or without a line feed."""
     content = content.rstrip(b"\0")
     last_line_start = content.rfind(b"\n") + 1
     try:

@@ -60,7 +60,7 @@ def make_journal_schema() -> dict[str, JsonValue]:
 
 
 def encode_event(timed: TimedEvent) -> bytes:
-    """Return the line of an event in a journal, in UTF-8 with a line feed.
+    """Return the line of a journal that contains an event, in UTF-8 with a line feed.
 
     Raises:
         Fault: JSON cannot represent a value of the event.
@@ -98,8 +98,8 @@ def decode_event(line: bytes) -> TimedEvent:
     try:
         event = _ADAPTER_BY_KIND[kind].validate_json(line)
     except ValidationError as error:
-        details = error.errors(include_url=False)[0]
-        field, message = ".".join(map(str, details["loc"])), details["msg"]
+        first_error = error.errors(include_url=False)[0]
+        field, message = ".".join(map(str, first_error["loc"])), first_error["msg"]
         raise ValueError(f'"{field}" of {kind}: {message[:1].lower()}{message[1:]}') from error
     return TimedEvent(tick, float(clock), event)
 
@@ -112,7 +112,7 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
     """
     events: list[TimedEvent] = []
     control_period = clock_offset = 0.0
-    for number, line in enumerate(lines, start=1):
+    for line_number, line in enumerate(lines, start=1):
         try:
             timed = decode_event(line)
             event = timed.event
@@ -126,11 +126,11 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
             elif isinstance(event, InputRead) and not event.exception:
                 check_input(event.name, event.value)
         except ValueError as error:
-            if number == 1 and (message := _describe_old_format(line)):
+            if line_number == 1 and (message := _describe_old_format(line)):
                 raise InputError(f"{file_name}: {message}") from error
             raise InputError(
-                f"{file_name}:{number}: this line is no event ({error}); the file was changed or damaged "
-                "after the run, because a run only appends to its journal; restore a copy of the file"
+                f"{file_name}:{line_number}: this line is no event ({error}); the file was changed or "
+                "damaged after the run, because a run only appends to its journal; restore a copy of the file"
             ) from error
         events.append(timed)
     return events

@@ -17,7 +17,7 @@ from executive.record.timeline.activation import get_skill_name
 from executive.record.timeline.timeline import Timeline
 
 MAX_STORED_LOOKS = 24
-"""Maximum number of stored looks, of 1.2 MB each at 640 x 480; a look is an image with its detections."""
+"""Maximum number of stored looks; a look is an image (1.2 MB at 640 x 480 pixels) with its detections."""
 
 MAX_PICTURES = 200
 """Maximum number of pictures of a run, so that a long run does not fill the disk."""
@@ -29,9 +29,9 @@ _LISTED_STATES = ("held", "dropped", "rejected", "skipped", "lost")
 class PictureRecorder:
     """Observer that saves a picture of each selected target and of each failed attempt.
 
-    `<tick>_<item>.jpg` shows the image from which an item was selected. `<tick>_<item>_<reason>.jpg` shows
-    this image after the attempt to pick the item failed. `<tick>_<reason>.jpg` shows the last look after the
-    failure of a skill without an item, unless another picture shows this look.
+    `<tick>_<item>.jpg` shows the image in which an item was selected. `<tick>_<item>_<reason>.jpg` shows the
+    image of the last selection after a failed attempt to pick the item. `<tick>_<reason>.jpg` shows the last
+    image after the failure of a skill without an item; if another picture shows that image, it is omitted.
 
     Args:
         folder: Folder of the pictures.
@@ -44,7 +44,7 @@ class PictureRecorder:
         self._look_by_frame_id: dict[int, tuple[Frame, FrameSearched]] = {}
         self._selected_frame_id: int | None = None
         self._undrawn_frame_id: int | None = None
-        """Frame of the last look; None if a picture shows this look."""
+        """Number of the frame of the last look; None if a picture shows this frame."""
         self._picture_count = 0
         self._missing_picture_counts: Counter[str] = Counter()
 
@@ -81,12 +81,12 @@ class PictureRecorder:
         self._look_by_frame_id[look.frame] = self._last_frame, look
         self._undrawn_frame_id = look.frame
         if len(self._look_by_frame_id) > MAX_STORED_LOOKS:
-            # The look of the last selection is kept, because it is drawn again if the item is missed.
+            # The look of the last selection is kept for the picture of a failed attempt to pick the item.
             other_ids = (id for id in self._look_by_frame_id if id != self._selected_frame_id)
             del self._look_by_frame_id[next(other_ids)]
 
     def _draw_failure(self, timed: TimedEvent, failure: NodeEnded) -> None:
-        """Draw the selection of the item of a failed skill, or else the last look if it was not yet drawn."""
+        """Draw the last selection of the failed skill's item; without a selection, draw an undrawn look."""
         selection = self._timeline.selections.get(failure.item)
         if selection is not None:
             self._draw(timed, selection.frame, selection, failure)
@@ -96,7 +96,7 @@ class PictureRecorder:
     def _draw(
         self, timed: TimedEvent, frame_id: int, selection: TargetSelected | None, failure: NodeEnded | None
     ) -> None:
-        """Queue the picture of a frame with the target that was selected in it, and with a failure."""
+        """Queue the picture of a frame; the picture shows `selection` and `failure` if they are not None."""
         if frame_id == self._undrawn_frame_id:
             self._undrawn_frame_id = None
         look = self._look_by_frame_id.get(frame_id)
@@ -118,8 +118,8 @@ class PictureRecorder:
         selection: TargetSelected | None,
         failure: NodeEnded | None,
     ) -> PictureContent:
-        """Return the content of the picture of a look, from the state of the run."""
-        frame, search = look
+        """Return the content of the picture of `look` in the current state of the run."""
+        frame, look_event = look
         timeline = self._timeline
         item = selection.item if selection else ""
         history = timeline.items.by_name.get(item)
@@ -127,12 +127,12 @@ class PictureRecorder:
         return PictureContent(
             image=frame.image,
             visible=frame.visible,
-            detections=[_to_detection(each) for each in search.confident],
-            selected=_find_selected_index(selection, search.confident, position),
+            detections=[_to_detection(each) for each in look_event.confident],
+            selected=_find_selected_index(selection, look_event.confident, position),
             mission=timeline.started.mission if timeline.started else "",
             clock=timed.clock,
             camera=frame.camera,
-            detector=search.detector,
+            detector=look_event.detector,
             age=timed.clock - frame.stamp,
             phase=" + ".join(
                 get_skill_name(last.node) for last in timeline.find_running_activations() if last.skill
@@ -148,7 +148,7 @@ class PictureRecorder:
 
 
 def _group_items(timeline: Timeline) -> dict[str, list[str]]:
-    """Return the placed items by bin, then other items by state, in the order of their last state changes."""
+    """Return the names of placed items by bin, then of other items by state, in the order of changes."""
     placed: dict[str, list[str]] = defaultdict(list)
     unplaced: dict[str, list[str]] = defaultdict(list)
     for item in sorted(timeline.items.by_name.values(), key=lambda item: item.last_change_number):
@@ -179,10 +179,10 @@ def _make_file_name(timed: TimedEvent, selection: TargetSelected | None, failure
 def _find_selected_index(
     selection: TargetSelected | None, objects: Sequence[DetectedObject], position: Sequence[float] | None
 ) -> int | None:
-    """Return the index of the object nearest to `position` of the selected item; None if it is unknown."""
+    """Return the index in `objects` of the selected item, last seen at `position`; None if unknown."""
     if selection is None:
         return None
-    # The label is not compared: the ledger derives the class of an item from all looks.
+    # The labels are not compared, because the ledger derives the class of an item from all looks.
     if position is not None and objects:
         return min(range(len(objects)), key=lambda index: math.dist(objects[index].position, position))
     indices = [index for index, each in enumerate(objects) if each.label == selection.label]

@@ -31,7 +31,7 @@ def read_mission_of_run(
 
     Args:
         path: The run directory.
-        start: Start of the run.
+        start: Event of the start of the run.
         skills: Installed skills by name.
         mission: Mission file that replaces the recorded mission, or None.
 
@@ -48,7 +48,7 @@ def read_mission_of_run(
 
 
 def read_cell(path: Path) -> CellConfig:
-    """Return the cell file in a run directory.
+    """Return the content of the cell file in the run directory `path`.
 
     Raises:
         InputError: The cell file cannot be read.
@@ -60,7 +60,7 @@ def read_cell(path: Path) -> CellConfig:
 
 
 def format_tree(nodes: Sequence[OutlineNode]) -> str:
-    """Return the text of `tree.json`; values that JSON cannot represent become strings."""
+    """Return an outline as the text of `tree.json`; values that JSON cannot represent become strings."""
     return to_json(list(nodes), inf_nan_mode="strings", fallback=str, indent=1).decode() + "\n"
 
 

@@ -137,7 +137,7 @@ class RecordedRun:
         directory: The run directory.
         recorder: Recorder of the run.
         views: Views of the run.
-        earlier_events: Events of the run before its resumption, which the observers receive first.
+        earlier_events: Events from before the resumption of the run; the observers receive them first.
         start_message: Message that the views show at the start of the run, or "".
     """
 
@@ -154,7 +154,7 @@ class RecordedRun:
         self._timeline = Timeline(has_history=False)
 
     def execute(self, seed: int, start_time: float) -> Result:
-        """Execute the run, write its result, and return it; `start_time` is from `time.perf_counter()` [s].
+        """Execute the run, write and return its result; `start_time` is from `time.perf_counter()` [s].
 
         Raises:
             ExecutiveError: The result cannot be written.
@@ -167,7 +167,7 @@ class RecordedRun:
         except ExecutiveError as error:
             problems.append(str(error))
             if result.status != "FAULT":
-                # The output of `--json`, which then is the only result, must report the problem.
+                # Without a result file, the output of `--json` must report the problem.
                 result = replace(result, status="FAULT", reason="fault", message=str(error), node="")
         if any(problems):
             for view in self.views:
@@ -177,7 +177,7 @@ class RecordedRun:
     def _make_result(
         self, seed: int, run_end: RunEnded, audit: Mapping[str, int] | None, wall_time: float
     ) -> Result:
-        """Return the result from the end of the run, the true object counts, and the wall time [s]."""
+        """Return the result of the run from its end, its true object counts `audit`, and `wall_time` [s]."""
         workcell, path, timeline = self.run.workcell, self.directory.path, self._timeline
         accounts = workcell.accounts
         item_counts = accounts.count_states()
@@ -207,7 +207,7 @@ class RecordedRun:
         )
 
     def _execute_with_observers(self) -> tuple[RunEnded, Mapping[str, int] | None]:
-        """Execute the run with all observers, and close them; return its end and the audit."""
+        """Execute the run with all observers, close the observers, and return end and audit of the run."""
         run, has_completed = self.run, False
         observers: list[Observer] = [self._timeline, *self.views]
         try:
@@ -224,9 +224,9 @@ class RecordedRun:
             end_and_audit = run.execute(), run.count_ground_truth()
             has_completed = True
         finally:
-            with contextlib.ExitStack() as closing:
+            with contextlib.ExitStack() as exit_stack:
                 # An exception is reported at once, without waiting for the pictures.
-                closing.callback(self.recorder.close, wait=has_completed)
+                exit_stack.callback(self.recorder.close, wait=has_completed)
                 for view in self.views:
-                    closing.callback(view.close)
+                    exit_stack.callback(view.close)
         return end_and_audit

@@ -31,7 +31,7 @@ class Recorder:
         self._problem = ""
 
     def __call__(self, timed: TimedEvent) -> None:
-        """Record an event; first in the trace, which must be complete if the journal raises an exception."""
+        """Record an event, first in the trace: an exception of the journal must not affect the trace."""
         self._trace(timed)
         self._journal(timed)
         if self._pictures is not None:

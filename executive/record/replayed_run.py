@@ -37,7 +37,7 @@ class ReplayResult:
         ticks: Number of control steps of the replay.
         recorded, replayed: First differing decision of record and replay, without message, or None.
         edited: True if the replayed mission differs from the recorded mission.
-        unanswered: Message about the input without a recorded value that ended the replay, or "".
+        unanswered: Message about the input whose missing value ended the replay, or "".
         is_complete: True if the replay repeated all recorded control steps.
     """
 
@@ -81,8 +81,8 @@ def replay_run(
         path: The run directory.
         events: Events of the journal.
         skills: Installed skills by name.
-        mission: Mission file that replaces the recorded mission, or None. If the file differs, only the
-            decisions of skills and the states of items are compared.
+        mission: Mission file that replaces the recorded mission, or None. If the missions differ, only
+            the decisions of skills and the states of items are compared.
 
     Raises:
         InputError: The directory contains no run that can be replayed.
@@ -124,7 +124,7 @@ class _Comparison:
     Attributes:
         equal_count: Number of equal decisions.
         difference: First recorded and first replayed decision that differ; None for a missing decision.
-        missing_input_message: Message about an input without a recorded value at the difference, or "".
+        missing_input_message: Message about the input whose missing value caused the difference, or "".
         is_complete: True if the replay repeated all recorded control steps.
         run: Run of the replay; the comparison stops it at the first difference.
     """
@@ -135,7 +135,7 @@ class _Comparison:
         self._log = log
         self._edited = edited
         self._recorded_decisions = list(filter(None, (_to_decision(timed, edited) for timed in log.events)))
-        # Without a recorded end, the last control step may be incomplete, and is then not compared.
+        # If the journal lacks the end of the run, its last control step may be incomplete and is ignored.
         self._has_recorded_end = any(isinstance(timed.event, RunEnded) for timed in log.events)
         self._has_found_difference = False
         self.equal_count = 0

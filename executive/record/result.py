@@ -60,7 +60,7 @@ class Audit:
         agrees: True if the true places confirm the counts of the ledger.
         right, wrong_bin, left, elsewhere: Number of objects in permitted bins, in other bins, on the table,
             and at other places.
-        fell_in_wrong_bin, unseen: Number of objects that fell into a wrong bin, and that no look detected.
+        fell_in_wrong_bin, unseen: Number of objects that fell into a wrong bin; number of undetected objects.
     """
 
     agrees: bool = True
@@ -130,7 +130,7 @@ def write_result(path: Path, result: Result) -> None:
 
 
 def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result | None:
-    """Return the result of a run; None if the file is missing, damaged, or older than a resumption."""
+    """Return the result of a run; None if the file is missing, damaged, or older than the last resumption."""
     try:
         result = TypeAdapter(Result).validate_json(directory.result.read_bytes())
     except (OSError, ValueError):
@@ -138,7 +138,7 @@ def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result
     end = find_run_end(events)
     if end is not None:
         return result if (result.status, result.ticks) == (end.status, end.ticks) else None
-    # A full disk may prevent the event of the end; the result is then valid without this event.
+    # If a full disk prevented the event of the end, the result is valid without this event.
     is_resumed = any(isinstance(timed.event, RunResumed) for timed in events)
     return result if result.status in ExitCode.__members__ and not is_resumed else None
 
@@ -191,7 +191,7 @@ def describe_disagreement(result: Result) -> str:
 
 
 def find_exit_code(result: Result) -> ExitCode:
-    """Return the exit code of a run; if the audit disagrees, FAILURE replaces SUCCESS and INCOMPLETE."""
+    """Return the exit code of a run; FAILURE replaces SUCCESS or INCOMPLETE if audit and ledger disagree."""
     code = ExitCode[result.status]
     is_failure = code in (ExitCode.SUCCESS, ExitCode.INCOMPLETE) and describe_disagreement(result) != ""
     return ExitCode.FAILURE if is_failure else code

@@ -35,11 +35,11 @@ def resume_run(
     """Resume the run in a directory, and return its result.
 
     The replay of the journal up to the interruption restores the tree, the variables and the ledger. A
-    simulated world is rebuilt from its log, with the arm braking. The sensor of the tool then determines
+    simulated world is rebuilt from its log, and the arm brakes. The sensor of the tool then determines
     whether the tool holds its item, all positions of items are invalid until the next look, and each
     interrupted skill is restarted.
 
-    If the run ended as INCOMPLETE, the tree is restarted, and rejected and skipped items are searched again;
+    If the run ended as INCOMPLETE, the tree is restarted, and rejected and skipped items may be picked again;
     placed items stay placed. If the run ended as SUCCESS or FAILURE without a result file, the result is
     written. If the journal lacks commands to arm or tool, the scene is observed before the run continues.
 
@@ -65,7 +65,7 @@ def resume_run(
         log, start = InputLog.from_events(events), find_run_start(events, path, "run the mission again")
         lacks_only_result = _check_end(directory, events)
         loaded = read_mission_of_run(path, start, skills)
-        # The step of a halt or fault is not compared, so that a corrected skill can execute it differently.
+        # The control step of a halt or fault is not compared, because a corrected skill may act differently.
         compared_log = log if log.halt is None else log.select_before(log.halt.tick)
         replay = replay_and_compare(loaded, skills, compared_log, start.seed)
         if not replay.is_equal:

@@ -20,7 +20,7 @@ LATEST_LINK = "latest"
 SCENE_FILE = "scene.yaml"
 """Name of the copy of the scene file."""
 NO_SPACE_ERRORS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
-"""Values of `errno` for a full disk, an exceeded quota and a too large file."""
+"""Values of `errno` for a full disk, an exceeded quota and a file that is too large."""
 _OTHER_FOLDER_ADVICE = "name another folder with --runs DIR"
 """Advice if the folder of the runs cannot be used."""
 
@@ -57,7 +57,7 @@ class RunDirectory:
     def create(runs: Path, *, mission: str, seed: int, start_time: datetime) -> RunDirectory:
         """Make and return a directory below the folder `runs`, named after start time, mission and seed.
 
-        If the name exists already, it gets the suffix `-2`, `-3`, ....
+        If this name exists already, the new directory gets the suffix `-2`, `-3`, ....
 
         Raises:
             InputError: The directory cannot be made.
@@ -86,14 +86,14 @@ class RunDirectory:
             params: Values of the params, which YAML can represent exactly.
             cell: Content of the cell file, which YAML can represent exactly.
             tree: Text of `tree.json`, or "" to write no file.
-            libraries: Text of each library by its path relative to the mission.
+            libraries: Text of each library, by the path of the library relative to the mission.
             scene: Text of the scene file, or "" to write no file.
 
         Raises:
             InputError: A file cannot be written; each existing file is complete.
         """
         with convert_os_errors(f'write to the run directory "{self.path}"'):
-            # Mission and cell are written later, so that no library replaces them.
+            # Mission and cell are written after the libraries, so that no library replaces them.
             for relative_path, text in (libraries or {}).items():
                 path = self.path / relative_path
                 if path not in (self.journal, self.result) and self.pictures not in path.parents:
@@ -167,8 +167,8 @@ def _make_unique_folder(day: Path, name: str) -> Path:
 
 def _update_latest_link(runs: Path, path: Path) -> None:
     """Replace the link `runs/latest` atomically by a link to `path`."""
-    link = runs / f".latest-{os.getpid()}"
+    temporary_link = runs / f".latest-{os.getpid()}"
     # An error is ignored: a run needs no link, and some file systems do not support links.
     with contextlib.suppress(OSError):
-        link.symlink_to(path.relative_to(runs), target_is_directory=True)
-        link.replace(runs / LATEST_LINK)
+        temporary_link.symlink_to(path.relative_to(runs), target_is_directory=True)
+        temporary_link.replace(runs / LATEST_LINK)

@@ -18,7 +18,7 @@ from executive.tree.node_registry import load_control_nodes
 REMEDY_BY_REASON: Mapping[str, str] = {
     "camera_moved": "mount camera and bins as the cell file says, or measure the pose again"
 }
-"""Advice by reason of a failure that no change of the mission prevents."""
+"""Advice about failures that no change of the mission prevents, by reason of the failure."""
 
 
 def list_advice(run: FailedRun, arm_state: str, readings: Sequence[Reading]) -> Iterator[str]:
@@ -82,7 +82,7 @@ def _list_changes(run: FailedRun) -> Iterator[str]:
     for entry, advice in changes:
         if (entry, advice) not in handler_changes:
             yield _format_advice(run, entry, advice)
-            # The author changes the innermost node with attempts before the ancestors of this node.
+            # Changes of ancestors are omitted: the innermost node with attempts should be changed first.
             if entry.attempt:
                 return
 

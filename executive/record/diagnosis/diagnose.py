@@ -33,7 +33,7 @@ DECIDING_INPUTS: Mapping[str, tuple[str, ...]] = {
 """Inputs that decide whether a skill succeeds, by the part of the cell that the skill `uses`."""
 
 _TRACEBACK_LINE = re.compile(r'File "(?P<file>[^"]+)", line (?P<line>\d+), in (?P<function>\S+)')
-"""Place of a function call in a Python traceback."""
+"""Pattern of the source location of a function call in a Python traceback."""
 
 _SKILL_MODULE = "executive/skill.py"
 """End of the path of the module that defines `Skill`."""
@@ -58,7 +58,7 @@ def diagnose(
         loaded: Mission of the run.
         skills: Installed skills by name.
         run_folder: Run directory with all pictures of the run.
-        is_at_rest: Function that returns True if the arm is at rest, which is uncertain only after a fault.
+        is_at_rest: Function that returns True if the arm is at rest; called only after a fault.
     """
     if end.status in ("SUCCESS", "INCOMPLETE"):
         return None
@@ -78,7 +78,7 @@ def diagnose(
         node=_make_deciding_node(run),
         item=run.item,
         passed_nodes=[
-            PassedNode(entry.node.path, entry.name, _format_place(entry.node), entry.explanation)
+            PassedNode(entry.node.path, entry.name, _format_source_location(entry.node), entry.explanation)
             for entry in run.failure_path
             if entry.explanation or entry is run.failure_path[-1]
         ],
@@ -89,7 +89,7 @@ def diagnose(
         unsorted_items=[name for name, label in labels.items() if label in loaded.routes],
         arm_state=arm_state,
         held_item=end.held_item,
-        raised_at=_find_exception_place(timeline.traceback),
+        raised_at=_find_exception_location(timeline.traceback),
         is_recorded=not run.is_record_lost,
         can_resume=end.status not in FINAL_STATUSES and (not run.is_record_lost or has_journal),
         picture=_find_picture_file(run, run_folder),
@@ -100,14 +100,14 @@ def diagnose(
 def _list_deciding_readings(run: FailedRun, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
     """Yield the inputs that explain the failure of a skill, the latest first.
 
-    The exceptions of the cell in the last control step explain the failure better than `DECIDING_INPUTS`.
+    If the cell raised exceptions in the last control step of the skill, they replace `DECIDING_INPUTS`.
     """
-    node, skill_end = run.deciding_node, run.deciding_activation
-    if skill_end is None or not isinstance(node, SkillNode):
+    node, activation = run.deciding_node, run.deciding_activation
+    if activation is None or not isinstance(node, SkillNode):
         return
-    exceptions = [each for each in skill_end.readings if each.raised and each.tick == skill_end.end_tick]
+    exceptions = [each for each in activation.readings if each.raised and each.tick == activation.end_tick]
     names = [name for part in skills[node.skill].uses for name in DECIDING_INPUTS.get(part, ())]
-    values = [each for each in skill_end.readings if each.name in names and not each.raised]
+    values = [each for each in activation.readings if each.name in names and not each.raised]
     yield from reversed(exceptions or values)
 
 
@@ -116,16 +116,16 @@ def _make_deciding_node(run: FailedRun) -> DecidingNode | None:
     if node is None:
         return None
     name = run.format_skill_name(node.path) if isinstance(node, SkillNode) else get_path_name(node)
-    return DecidingNode(node.path, name, _format_place(node))
+    return DecidingNode(node.path, name, _format_source_location(node))
 
 
-def _format_place(node: Node) -> str:
+def _format_source_location(node: Node) -> str:
     """Return file and line of a node: `missions/sort.yaml:12`."""
     return f"{node.span.source.path}:{node.span.line}"
 
 
 def _find_last_look(run: FailedRun) -> Sighting | Look | None:
-    """Return the last look in which the item of the run was detected, or else the last look."""
+    """Return the last look in which `run.item` was detected; without such a look, the last look."""
     item = run.timeline.items.by_name.get(run.item)
     if item is None or item.sighting is None:
         return run.timeline.items.look
@@ -141,7 +141,7 @@ def _make_lost_item(name: str, item: ItemHistory) -> LostItem:
 
 
 def _find_picture_file(run: FailedRun, run_folder: Path) -> str:
-    """Return the picture of the failure, or of the last selection of the item, or "" without a picture."""
+    """Return the path of the picture of the failure, else of the last selection of the item, else ""."""
     reason = run.end.reason.rpartition(".")[2] if run.end.status == "FAILURE" else ""
     item = run.timeline.items.by_name.get(run.item)
     if run.lost_items and item is not None and item.failure is not None:
@@ -161,13 +161,13 @@ def _describe_arm(is_at_rest: Callable[[], bool]) -> str:
         return f"the state of the arm cannot be read ({type(error).__name__}: {error})"
 
 
-def _find_exception_place(traceback: str) -> str:
-    """Return the place where the first exception was raised: `skills/grasp.py:45, in run`; "" if unknown."""
+def _find_exception_location(traceback: str) -> str:
+    """Return the source location of the first exception: `skills/grasp.py:45, in run`; "" if unknown."""
     cause = traceback.rpartition(_CAUSE_SEPARATOR)[0] or traceback
-    places = [place.group("file", "line", "function") for place in _TRACEBACK_LINE.finditer(cause)]
-    if len(places) > 1 and places[-1][0].endswith(_SKILL_MODULE) and places[-1][2] == Skill.failure.__name__:
-        places.pop()  # The caller of `Skill.failure` is more informative.
-    if not places:
+    calls = [match.group("file", "line", "function") for match in _TRACEBACK_LINE.finditer(cause)]
+    if len(calls) > 1 and calls[-1][0].endswith(_SKILL_MODULE) and calls[-1][2] == Skill.failure.__name__:
+        calls.pop()  # The caller of `Skill.failure` is more informative.
+    if not calls:
         return ""
-    file, line, function = places[-1]
+    file, line, function = calls[-1]
     return f"{'/'.join(PurePath(file).parts[-2:])}:{line}, in {function}"

@@ -29,7 +29,7 @@ class PassedNode:
     """Control node that did not handle a failure, or node in which the failure began (origin).
 
     Attributes:
-        path, name, place: Path in the tree; name with item or subtree; file and line.
+        path, name, place: Path of the node in the tree; its name with item or subtree; its file and line.
         explanation: Reason why the node did not handle the failure; "" for the origin.
     """
 
@@ -60,7 +60,7 @@ class LostItem:
 
     Attributes:
         item: Name of the item.
-        look: Last look (search of an image) in which the item was detected, or None.
+        look: Last look (image with its detections) in which the item was detected, or None.
         later_looks: Number of looks after `look`.
         held_at, dropped_at: Times of the last pick and the last drop of the item [s], or None.
         last_failure: Last failure of a skill that worked on the item, or None.
@@ -83,12 +83,12 @@ class Diagnosis:
         reason: Name of the failure.
         clock: Time of the end of the run [s].
         mission: Path of the mission file.
-        verdict: Sentence with the cause.
+        verdict: Sentence with the cause of the end of the run.
         node: Node that determined the status, or None.
-        item: Item on which the skill in `node` worked, or "".
+        item: Name of the item on which `node` or a halted skill worked, or of a lost item, or "".
         passed_nodes: Nodes that did not handle the failure, from the root down, and the origin.
         readings: Inputs that the failed skill read from the cell, the latest first.
-        last_look: Last look in which the item was detected, or else the last look; None without a look.
+        last_look: Last look in which `item` was detected, or else the last look; None without a look.
         lost_items: Items whose loss made the run fail.
         halted_skills: Names of the halted skills with their items: `Grasp of cube-1`.
         unsorted_items: Names of the items that have a route and were not sorted.

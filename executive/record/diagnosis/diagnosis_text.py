@@ -93,8 +93,8 @@ def _format_failure_path(diagnosis: Diagnosis) -> list[str]:
     width = max(len(name) for name, _, _ in rows)
     lines = [f"why no node in {diagnosis.mission} handled it, from the root down{omitted}:"]
     for name, explanation, place in rows:
-        line = f"line {place.removeprefix(mission_prefix)}" if place.startswith(mission_prefix) else place
-        lines += wrap_lines(f"{explanation} ({line})", f"  {name:{width}}  ", " " * (width + 4))
+        location = f"line {place.removeprefix(mission_prefix)}" if place.startswith(mission_prefix) else place
+        lines += wrap_lines(f"{explanation} ({location})", f"  {name:{width}}  ", " " * (width + 4))
     return lines
 
 

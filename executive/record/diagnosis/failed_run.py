@@ -22,12 +22,12 @@ class FailedRun:
     """Mission, timeline and end of a run that did not succeed.
 
     Attributes:
-        failure_path: Nodes through which the failure propagated, from the root to the origin; else empty.
+        failure_path: Nodes from the root to the origin of the failure; empty if no node of the tree failed.
         lost_items: History of the items whose loss made the run fail, by name of the item.
         deciding_activation: Last activation of the node that determined the status, or None.
         deciding_node: Node of the mission that determined the status, or None.
         halted_skills: Paths of the skills that the end of the run or `deciding_node` halted.
-        item: Item that `deciding_node` worked on, or "".
+        item: Name of the item on which `deciding_node` or a halted skill worked, or of a lost item, or "".
         is_record_lost: True if the run ended because the journal could not be written.
     """
 
@@ -58,7 +58,7 @@ class FailedRun:
         return get_skill_name(path) + (f" of {last.item}" if last is not None and last.item else "")
 
     def format_place(self, node: Node) -> str:
-        """Return the line of a node in its file, with the file name if it is not the mission file."""
+        """Return the source line of a node, with the file name if the file is not the mission file."""
         return node.span.describe_place(self.loaded.tree.span.source)
 
 

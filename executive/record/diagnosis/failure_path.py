@@ -25,7 +25,7 @@ class FailurePathNode:
     Attributes:
         node: Node of the mission.
         subtree: Name of the subtree that contains the node, or "".
-        control_node: Control node that explains its decision; None for other nodes.
+        control_node: Instance that explains the decision of a control node; None for other nodes.
         failure: Failure that the node received from its child.
     """
 
@@ -66,7 +66,7 @@ def find_failure_path(
     for index in reversed(range(len(nodes))):
         node = nodes[index]
         child = nodes[index + 1] if index + 1 < len(nodes) else None
-        subtree = next((use.name for use in reversed(nodes[:index]) if isinstance(use, UseNode)), "")
+        subtree = next((each.name for each in reversed(nodes[:index]) if isinstance(each, UseNode)), "")
         control_node = make_inspection_instance(node) if isinstance(node, InnerNode) else None
         reasons = frozenset(Reason(source, reason) for source in sources)
         propagated = _make_propagated_failure(timeline, node.path, control_node, child, reasons)
@@ -78,9 +78,9 @@ def find_failure_path(
 def _make_propagated_failure(
     timeline: Timeline, path: str, control: ControlNode | None, child: Node | None, reasons: frozenset[Reason]
 ) -> PropagatedFailure:
-    """Return the failure that the node at `path` received from `child`, which is None at the origin."""
+    """Return the failure that the node at `path` received from `child`; at the origin, `child` is None."""
     activation = timeline.activation_by_path.get(path) or _NO_ACTIVATION
-    children = [child for key in control.keys for child in control.list_children(key)] if control else []
+    children = [each for key in control.keys for each in control.list_children(key)] if control else []
 
     def has_failed(child: Child) -> bool:
         last = timeline.activation_by_path.get(get_mission_node(child).path)

@@ -21,7 +21,7 @@ SHADING_FRACTION = 0.4
 CLOSE_UP_SCALE = 2.0
 """Side of the square region in the close-up, as a multiple of the longer side of the selected box."""
 
-BOX_WIDTH, SELECTED_BOX_WIDTH, OUTLINE_WIDTH = 2, 3, 1
+LINE_WIDTH, SELECTED_LINE_WIDTH, OUTLINE_WIDTH = 2, 3, 1
 """Line widths of a box, of the selected box, and of the outline around the selected box [pixel]."""
 
 TEXT_SCALE, TEXT_PADDING = 0.36, 2
@@ -71,12 +71,12 @@ def _draw_close_up(image: NDArray[np.uint8], box: Box, colour: str) -> NDArray[n
     size, border = (STATUS_BAR_HEIGHT, STATUS_BAR_HEIGHT), to_bgr(BACKGROUND)
     close_up = cv2.warpAffine(image, matrix, size, flags=cv2.INTER_CUBIC, borderValue=border)
     edge = STATUS_BAR_HEIGHT - 2
-    cv2.rectangle(close_up, (1, 1), (edge, edge), to_bgr(colour), SELECTED_BOX_WIDTH)
+    cv2.rectangle(close_up, (1, 1), (edge, edge), to_bgr(colour), SELECTED_LINE_WIDTH)
     return close_up.astype(np.uint8)
 
 
 def _draw_boxes(image: NDArray[np.uint8], content: PictureContent, scale: float) -> NDArray[np.uint8]:
-    """Return `image`, a camera image scaled by `scale`, with all boxes; the selected box is drawn last."""
+    """Return `image`, which is already scaled by `scale`, with all boxes; the selected box is drawn last."""
     import supervision as sv
 
     if not content.detections:
@@ -89,10 +89,10 @@ def _draw_boxes(image: NDArray[np.uint8], content: PictureContent, scale: float)
     detections = sv.Detections(boxes, class_id=indices)
     unselected = cast("sv.Detections", detections[indices != content.selected])
     selected = cast("sv.Detections", detections[indices == content.selected])
-    outline_colour = sv.Color.from_hex(OUTLINE)
+    outline = sv.Color.from_hex(OUTLINE)
     for layer, colour, line_width in (
-        (unselected, colours, BOX_WIDTH), (selected, outline_colour, SELECTED_BOX_WIDTH + 2 * OUTLINE_WIDTH),
-        (selected, colours, SELECTED_BOX_WIDTH),
+        (unselected, colours, LINE_WIDTH), (selected, outline, SELECTED_LINE_WIDTH + 2 * OUTLINE_WIDTH),
+        (selected, colours, SELECTED_LINE_WIDTH),
     ):  # fmt: skip
         image = sv.BoxAnnotator(colour, line_width).annotate(image, layer)
     return sv.LabelAnnotator(
@@ -109,4 +109,4 @@ def make_captions(content: PictureContent) -> list[str]:
     names = [detection.label for detection in content.detections]
     if content.selected is not None:
         names[content.selected] = content.item or names[content.selected]
-    return [f"{name} {box.confidence:.2f}" for name, box in zip(names, content.detections, strict=True)]
+    return [f"{name} {each.confidence:.2f}" for name, each in zip(names, content.detections, strict=True)]

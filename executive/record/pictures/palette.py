@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 PALETTE = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00")
-"""Colours of classes, which colour-blind people can distinguish and on which black text is legible.
+"""Colours of classes; colour-blind people can distinguish these colours, and black text on them is legible.
 
 Source: Okabe and Ito, "Color Universal Design", 2008, without black.
 """
@@ -18,7 +18,7 @@ OUTLINE = "#000000"
 
 
 def choose_class_colour(label: str, classes: Sequence[str]) -> str:
-    """Return the colour at the index of the class `label` in `classes`; `TEXT` for an unknown class."""
+    """Return the colour of the class `label` from its index in `classes`; `TEXT` for an unknown class."""
     return PALETTE[classes.index(label) % len(PALETTE)] if label in classes else TEXT
 
 

@@ -23,8 +23,8 @@ ROW_COUNT = (STATUS_BAR_HEIGHT - 2 * MARGIN) // LINE_HEIGHT
 _TITLE_SCALE, _TEXT_SCALE = 0.52, 0.4
 """Font scales of the title and of other text in OpenCV."""
 
-_OUTCOME_WIDTH = 88
-"""Width of the column with the names of bins and states [pixel]."""
+_OUTCOME_NAME_WIDTH = 88
+"""Width of the column with the name of the bin or state of each outcome [pixel]."""
 
 _OUTCOME_START_FRACTION = 0.55
 """Left edge of the column of outcomes, as a fraction of the width of the status bar."""
@@ -86,11 +86,11 @@ def draw_status_bar(content: PictureContent, width: int, text_start: int = 0) ->
         _write(bar, truncate(note, is_fitting), x, row, SECONDARY_TEXT)
     if not text.outcomes:
         _write(bar, "no item sorted", outcome_x, 0, SECONDARY_TEXT)
-    is_fitting_name = _make_width_check(_OUTCOME_WIDTH - MARGIN)
-    is_fitting_list = _make_width_check(width - outcome_x - _OUTCOME_WIDTH - MARGIN)
+    is_fitting_name = _make_width_check(_OUTCOME_NAME_WIDTH - MARGIN)
+    is_fitting_list = _make_width_check(width - outcome_x - _OUTCOME_NAME_WIDTH - MARGIN)
     for row, (outcome, items) in enumerate(_limit_outcomes(text.outcomes)):
         _write(bar, truncate(outcome, is_fitting_name), outcome_x, row, SECONDARY_TEXT)
-        _write(bar, join_last_names(items, is_fitting_list), outcome_x + _OUTCOME_WIDTH, row, TEXT)
+        _write(bar, join_last_names(items, is_fitting_list), outcome_x + _OUTCOME_NAME_WIDTH, row, TEXT)
     return bar
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 _STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted", "RUNNING": "running"}
-"""Text for each status, in the order of the texts in `format_status_counts`."""
 """Text for each status, in the order of the texts in `format_counts`."""
 
 
@@ -39,12 +38,12 @@ class Activation:
         skill: Name of the skill; "" for a control node.
         item: Item that the skill works on, or "".
         status: `RUNNING`, `SUCCESS`, `FAILURE` or `INVALID`.
-        start_tick, end_tick: Control steps of start and end; a running node has the end of its start.
-        start, end: Times of start and end [s]; a running node has the end of its start.
+        start_tick, end_tick: Control steps of start and end; equal while the node is running.
+        start, end: Times of start and end [s]; equal while the node is running.
         reason, message: Reason and message of the failure or fault, or "".
         choice: Last decision of a control node as text (`attempt 2 of 3`), or "".
         handled_counts: Number of failures that a control node handled, by name (`Grasp.missed`).
-        message_by_reason: Message of the last handled failure, by name of the failure.
+        message_by_reason: Last message of each handled failure, by name of the failure.
         last_handled_reason: Name of the last handled failure, or "".
         halted_skills: Paths of the skills that the control node halted before its end.
         readings: Last reading of each input before the failure of a skill, sorted by time.

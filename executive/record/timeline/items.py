@@ -12,7 +12,7 @@ from executive.record.timeline.activation import Activation
 
 @dataclass(frozen=True)
 class Look:
-    """Look: search of a detector in a camera image.
+    """Look: camera image with the detections of one detector.
 
     Attributes:
         frame: Number of the frame.
@@ -33,12 +33,12 @@ class Sighting:
     """Look in which an item was detected.
 
     Attributes:
-        frame, camera, detector, clock: Attributes of the look, as in `Look`.
+        frame, camera, detector, clock: Number of the frame, names of camera and detector, time [s].
         item: Name of the item.
         attempts: Number of failed attempts to pick the item.
-        looks: Number of looks in which the item was detected until now.
-        label, confidence: Class and confidence of the detection nearest to the item, or None.
-        position: Position of the nearest detection `(3,)` [m]; None if no detection is confident.
+        looks: Number of looks in which the item was detected, up to this look.
+        label, confidence: Class and confidence of the detection nearest to the item.
+        position: Position of that detection `(3,)` [m]; all three are None without confident detections.
     """
 
     frame: int
@@ -114,9 +114,9 @@ class ItemsTimeline:
             item.state_at_tree_end = event.state
 
     def add_look(self, event: FrameSearched, clock: float) -> None:
-        """Add a look at the time `clock` [s]; the changes of the detected items must have been added."""
+        """Add a look at the time `clock` [s], after `add_change` added the changes of all detected items."""
         self.look = Look(event.frame, event.camera, event.detector, clock, len(event.confident))
-        # Sorted classes have the same colours in most runs of a mission.
+        # Sorting gives the classes the same colours in most runs of a mission.
         self.classes |= dict.fromkeys(sorted(detection.label for detection in event.confident))
         for item in self.by_name.values():
             item.unseen_look_count += 1
