@@ -16,7 +16,7 @@ _CONTROL_CHARACTER = re.compile(
 """Control characters except tab and line feed, invisible Unicode format characters, Unicode line separators,
 and lone surrogates."""
 _QUOTATION_OR_WORD = re.compile(r'"[^"\n]*"|\S+')
-"""A quotation in double quotes within one line, or a word: the pieces of a message that may be too long."""
+"""A quotation in double quotes within one line, or a word; `shorten_quotations` shortens the matches."""
 
 
 class ExecutiveError(Exception):
@@ -52,7 +52,7 @@ class Fault(ExecutiveError):
 
 
 class RecordLost(Fault):
-    """The record of the run cannot be written or was deleted. The run ends: nobody could explain it later."""
+    """The record of the run cannot be written or was deleted; nobody could explain a run without record."""
 
 
 class Unreachable(ExecutiveError):
@@ -108,7 +108,7 @@ def explain_os_errors(error_class: type[ExecutiveError], problem: str, advice: s
 
 
 def escape_control_characters(text: str) -> str:
-    r"""Return `text` with the JSON escape sequence of each control character, for instance `\u001b`."""
+    r"""Return `text` with a JSON escape sequence, such as `\u001b`, in place of each control character."""
     return _CONTROL_CHARACTER.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 

@@ -6,10 +6,10 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """Exit code of a command; a run with the status FAILURE, for instance, ends with the code FAILURE."""
+    """Exit code of a command; a command that executes a run returns the code of the status of the run."""
 
     SUCCESS = 0
-    FAILURE = 1  # also used if the audit of the simulator disagrees with the ledger
+    FAILURE = 1  # also if the ledger differs from the true state of the simulator
     INVALID_INPUT = 2
     FAULT = 3
     INCOMPLETE = 4

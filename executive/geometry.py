@@ -37,7 +37,7 @@ class Pose:
 
     @staticmethod
     def of(position: ArrayLike, quaternion: ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Pose:
-        """Return the pose with a position `(3,)` [m] and a quaternion `(x, y, z, w)` of any length."""
+        """Return the pose with a position `(3,)` [m] and a quaternion `(x, y, z, w)` of any norm."""
         return Pose(rotation_from_quaternion(quaternion), np.asarray(position, dtype=float))
 
     def __matmul__(self, other: Pose) -> Pose:
@@ -48,7 +48,7 @@ class Pose:
         return Pose(self.rotation.T, -self.rotation.T @ self.position)
 
     def apply(self, points: ArrayLike) -> Array:
-        """Transform points `(3,)` or `(N, 3)` [m]; `X_WC` transforms them from frame C to frame W."""
+        """Return transformed points `(3,)` or `(N, 3)` [m]: `X_WC` maps coordinates in frame C to frame W."""
         return np.asarray(points, dtype=float) @ self.rotation.T + self.position
 
     @property
@@ -70,7 +70,7 @@ class Pose:
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Return the rotation matrix `(3, 3)` of a quaternion `(x, y, z, w)` of any length."""
+    """Return the rotation matrix `(3, 3)` of a quaternion `(x, y, z, w)` of any norm."""
     x, y, z, w = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
     return np.array(
         [
@@ -109,7 +109,7 @@ def rotate_about_z(angle: float) -> Array:
 
 
 def make_tool_down_pose(position: ArrayLike, yaw: float = 0.0) -> Pose:
-    """Return the tool pose `X_WT` at `position` `(3,)` [m] whose z axis points vertically down.
+    """Return the tool pose `X_WT` at `position` `(3,)` [m] with the z axis vertically down.
 
     At `yaw` 0 [rad], the y axes of tool and world are parallel, and their x axes are opposite. An iiwa with
     its elbow up has this orientation if the angle of joint 7 is near zero.

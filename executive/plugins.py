@@ -108,7 +108,7 @@ def list_entries(group: str, kind: str) -> dict[str, PluginEntry]:
         InputError: Two packages register the same name, or the pyproject.toml of the project is invalid.
     """
     project = find_project()
-    entries = (*_list_installed_entries(group, kind, project), *_list_project_entries(group, kind, project))
+    entries = (*_list_installed_entries(group, kind, project), *_enable_project_entries(group, kind, project))
     entry_by_name: dict[str, PluginEntry] = {}
     for entry in sorted(entries, key=lambda entry: (entry.name, entry.value)):
         first_entry = entry_by_name.setdefault(entry.name, entry)
@@ -128,8 +128,8 @@ def _list_installed_entries(group: str, kind: str, project: Project | None) -> I
             yield PluginEntry(entry.name, entry.value, kind, f"uninstall the package {package}")
 
 
-def _list_project_entries(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
-    """Yield the entries of the project, and append its folder to `sys.path`."""
+def _enable_project_entries(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
+    """Append the folder of the project to `sys.path`, and yield the entries of the project."""
     if project is None or not (entries := project.read_entries(group)):
         return
     folder = str(project.file.parent)
@@ -146,7 +146,7 @@ def _normalize(package: str) -> str:
 
 
 def _locate_error(error: Exception) -> str:
-    """Return the clause `, in FILE:LINE` about the plugin code that raised an error, or "" if unknown."""
+    """Return the clause `, in FILE:LINE` about the plugin code that raised an error, or "" if not found."""
     if isinstance(error, SyntaxError):
         return ""  # The message of a syntax error already names file and line.
     ignored_folders = Path(__file__).parent, Path(traceback.__file__).parent
@@ -176,7 +176,7 @@ class Project:
         """Return the table `[project.entry-points."<group>"]`: import paths of classes by name.
 
         Raises:
-            InputError: The value is not a table of strings `module:Class`.
+            InputError: The content of the pyproject.toml is not a table of strings `module:Class`.
         """
         groups = self.project_table.get("entry-points", {})
         entries = groups.get(group, {}) if isinstance(groups, dict) else groups
@@ -193,7 +193,7 @@ class Project:
 
 
 def find_project() -> Project | None:
-    """Return the project with the nearest pyproject.toml in the working directory or above it; None without.
+    """Return the project with the nearest pyproject.toml in the working directory or above, or None.
 
     The user is assumed to trust the code in the working directory. A pyproject.toml in a folder in which all
     users may write, such as /tmp, is ignored.
@@ -214,7 +214,7 @@ def find_project() -> Project | None:
 
 
 def _is_shared(folder: Path) -> bool:
-    """Return True if all users may write in a folder: others may write, and the sticky bit is set."""
+    """Return True if all users may write in a folder, as in /tmp: it is world-writable and sticky."""
     mode = folder.stat().st_mode
     return bool(mode & stat.S_ISVTX and mode & stat.S_IWOTH)
 

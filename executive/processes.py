@@ -20,7 +20,7 @@ class WorkerPool(ProcessPoolExecutor):
     """A pool of spawned processes that ends with its parent process.
 
     A terminal sends Ctrl-C to all processes. The processes of the pool ignore Ctrl-C, so that the parent
-    process decides when they stop. An exception in the `with` block kills the processes.
+    process decides when they end. An exception in the `with` block kills the processes.
 
     Args:
         max_workers: Maximum number of processes.

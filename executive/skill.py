@@ -1,8 +1,8 @@
 """Base class of skills: typed ports and params, declared reasons of failure, and a generator `run`.
 
 The generator `run` yields once per control step (status RUNNING), returns for SUCCESS, and raises
-`self.failure(reason, message)` for FAILURE. The `finally` clauses of `run` are also executed after a halt. If
-`run` never waits, it may be a function without `yield`. The mission checker, the JSON Schema, the
+`self.failure(reason, message)` for FAILURE. The `finally` clauses of `run` are also executed after a halt. A
+`run` that never waits may be a function without `yield`. The mission checker, the JSON Schema, the
 documentation and the tree use the declarations in the class body.
 """
 
@@ -63,7 +63,7 @@ class Param:
         ge: Minimum value, or None.
         le: Maximum value, or None.
         choices: Allowed values, or None for any value.
-        refers: Kind of name (`bin`, `detector`, `pose`, `class`) if the value is a name in the cell; else "".
+        refers: Kind of the name (`bin`, `detector`, `pose`, `class`) if the value is a name; otherwise "".
         doc: Description of the param.
     """
 
@@ -88,11 +88,11 @@ class Port:
     """A typed input or output of a skill.
 
     Attributes:
-        name: Attribute of the skill; by default, the variable of the port has this name.
+        name: Name of the attribute of the skill, and by default also of the variable.
         type: Python type of the value.
         direction: IN or OUT.
-        default: Value of an input without a variable; `...` if the input needs a variable with a value.
-        refers: Kind of name (`item`, `bin`, `class`) if the value is a name; else "".
+        default: Value of an input whose variable is unwritten; `...` if the variable must be written.
+        refers: Kind of the name (`item`, `bin`, `class`) if the value is a name; otherwise "".
         doc: Description of the port.
     """
 
@@ -143,13 +143,13 @@ class Skill:
     Attributes:
         params: Declared params by name.
         ports: Declared ports by name.
-        reasons: Possible reasons of failure.
-        uses: Devices that no skill in a parallel branch may use: `arm`, `tool`, `camera`.
+        reasons: Reasons with which the skill may fail.
+        uses: Devices that no concurrent branch may use, too: `arm`, `tool`, `camera`.
         senses: True if the skill gets new information: an image, or a request of the operator.
         moves: True if the skill moves the arm.
-        tool_state: State of the tool that the skill requires (ANY: none), and after success (ANY: unchanged).
-        tool_left: State of the tool after a failure (key: reason) or a halt (key: `halt`); ANY if unknown. A
-            reason without a key leaves the state unchanged.
+        tool_state: Required state of the tool (ANY: no requirement); state after success (ANY: unchanged).
+        tool_left: State of the tool after a failure, by reason, and after a halt, by the key `halt`; ANY if
+            unknown. Ends without a key leave the state unchanged.
         waits: Name of the param that contains the minimum time until success [s], or "".
     """
 

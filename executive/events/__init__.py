@@ -1,7 +1,7 @@
 """Events of a run: one frozen dataclass per kind of event.
 
 The parts of a run emit events; observers (journal, trace, pictures, views) receive each event with its time.
-The journal has one JSON object per event, whose keys are the fields of these classes.
+The journal contains one JSON object per event; the keys of the object are the fields of the event class.
 """
 
 from executive.events.cell_events import FaultInjected, InputRead, MotionPlanned, ToolCommanded

@@ -19,7 +19,7 @@ class Event:
 
     is_recorded: ClassVar[bool] = True
 
-    # Pydantic refuses a journal with a value of another type, instead of converting the value.
+    # Pydantic rejects a journal in which a field has another type, instead of converting the value.
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True)
 
 
@@ -28,7 +28,7 @@ class TimedEvent:
     """An event and its time.
 
     Attributes:
-        tick: Control step in which the event happened.
+        tick: Number of the control step in which the event happened.
         clock: Time on the clock of the run [s].
         event: The event.
     """
@@ -46,4 +46,4 @@ Observer = Callable[[TimedEvent], None]
 
 
 def discard_event(event: Event) -> None:
-    """Ignore an event; serves as the `Emit` function of a part without observers."""
+    """Ignore an event; the `Emit` function of a tree or device whose events nobody observes."""

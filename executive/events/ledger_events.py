@@ -1,4 +1,4 @@
-"""Events of the ledger: searched frames, changed items and selected targets."""
+"""Events of the ledger: frames with detections, changed items and selected targets."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class DetectedObject:
 
 @dataclass(frozen=True)
 class FrameSearched(Event):
-    """A detector searched a frame, and the ledger received its detections.
+    """A detector processed a frame, and the ledger received the detections.
 
     Attributes:
         frame: Number of the frame.
         camera: Name of the camera.
         detector: Name of the detector.
-        view: Searched part of the frame: `table` for the workspace, `full` for the whole image.
+        view: Processed part of the frame: `table` for the workspace, `full` for the whole image.
         confident: Detections with high confidence and without a contradiction.
         doubtful: Detections with low confidence or a contradiction.
         unknown_labels: Labels of the detections whose class the cell file does not declare.

@@ -62,7 +62,7 @@ class RequestGiven(Event):
     """The operator made a request.
 
     Attributes:
-        request: The requested class; `rescan` for a new look; None to quit.
+        request: The requested class; `rescan` for a new scan of the table; None to quit.
     """
 
     request: str | None

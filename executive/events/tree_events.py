@@ -38,8 +38,8 @@ class NodeEnded(Event):
         status: Final status.
         skill: Name of the skill; "" for a control node.
         item: Item on which the skill worked, or "".
-        reason: Reason of a failure: `missed` for a skill, `Grasp.missed` for a control node. `fault` for a
-            fault of a skill; "" for all other ends.
+        reason: Reason of a failure (`missed` for a skill, `Grasp.missed` for a control node); `fault` after
+            a fault of a skill; "" for all other ends.
         message: Message of the failure or fault, or "".
         origin: Path of the node that caused the failure of a control node, or "".
         outputs: Values of the outputs of a successful skill by name; None for other nodes and ends.

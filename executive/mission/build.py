@@ -30,7 +30,7 @@ def build_tree(
     emit: Emit,
     substitutes: Mapping[str, type[Skill]] | None = None,
 ) -> TreeNode:
-    """Return the root of a new tree of py_trees behaviours; every node has a unique, readable `path`.
+    """Return the root of a new behaviour tree; every node of the tree has a unique, readable `path`.
 
     `substitutes` maps patterns of node paths to skills that run in place of the mission's skills; `*` in a
     pattern matches any characters, including `/`. The first matching pattern applies.
@@ -49,7 +49,7 @@ def build_tree(
 
 @dataclass(frozen=True)
 class TreeBuilder:
-    """Builder of one tree.
+    """Builder of the behaviour tree of one mission.
 
     Attributes:
         substitutes: Skills that run in place of the mission's skills, by pattern of node paths.
@@ -74,7 +74,7 @@ class TreeBuilder:
                 return make_instance(node, context, self.build_node)
             case UseNode(body=Node() as subtree_root):
                 body = self.build_node(subtree_root)
-                # The root of the subtree has its own label, so a sequence gets the label of the `use`.
+                # A node has one label, so the label of the `use` belongs to a sequence around the subtree.
                 root = self.node_classes[SEQUENCE_KEYWORD](context, do=(body,)) if node.label else body
                 root.subtree_names = (node.name, *root.subtree_names)
                 return root

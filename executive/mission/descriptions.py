@@ -26,7 +26,7 @@ _TYPE_PHRASES = {
 }
 """Description of the expected type, by the type of pydantic's error."""
 _BOOLEAN_BY_WORD = {"yes": "true", "on": "true", "no": "false", "off": "false"}
-"""Boolean of YAML 1.2, by the word with the same meaning in YAML 1.1."""
+"""Boolean value in YAML 1.2 for each word that is a boolean value in YAML 1.1 only."""
 _NUMBER_WITH_UNIT = re.compile(r"[-+]?[0-9.]+ *[A-Za-z]+")
 _BOUND_PHRASES = {
     "greater_than": ("more than", "gt"),
@@ -34,7 +34,7 @@ _BOUND_PHRASES = {
     "less_than": ("less than", "lt"),
     "less_than_equal": ("at most", "le"),
 }
-"""Comparison in words, and key of the bound in `ctx`, by the type of pydantic's error."""
+"""Comparison in words, and key of the bound in `ErrorDetails.ctx`, by the type of pydantic's error."""
 
 
 def describe_value(value: object) -> str:
@@ -77,7 +77,7 @@ def describe_validation_error(error: ErrorDetails) -> str:
 
 
 def _suggest_correction(error_type: str, value: object) -> str:
-    """Return a suggestion for a value of the wrong type, in brackets, or ""."""
+    """Return a correction, in brackets, of a value of the wrong type, or ""."""
     text = value if isinstance(value, str) else ""
     if error_type == "bool_type" and text.lower() in _BOOLEAN_BY_WORD:
         return f" (write {_BOOLEAN_BY_WORD[text.lower()]})"

@@ -1,4 +1,4 @@
-"""Findings: errors and warnings about positions in files, and the exception that lists them."""
+"""Findings: errors and warnings about positions in files, and the exception that lists findings."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_EXCERPT_LENGTH = 140
 _MAX_ALTERNATIVES = 24
 """Maximum number of allowed words in a hint."""
 MAX_PRINTED_FINDINGS = 50
-"""Maximum number of findings in a message, which states the number of omitted findings."""
+"""Maximum number of findings in a message; the message also states the number of omitted findings."""
 MAX_LISTED_FINDINGS = 1000
 """Maximum number of findings in the output of `--json`."""
 _SECRET_PATTERN = re.compile(
@@ -34,7 +34,7 @@ _VALUE_CODES = frozenset({
     "wrong-type", "wrong-value", "out-of-range", "port-type", "unwritten",
     "unknown-bin", "unknown-class", "unknown-detector", "unknown-pose", "unseen-class",
 })  # fmt: skip
-"""Codes of findings about a value; `sort_findings` keeps one finding with these codes per position."""
+"""Codes of findings about a value; `sort_findings` keeps one finding per position and code."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Finding:
         severity: `error` or `warning`.
         code: Code of the finding, a key of `MEANING_BY_CODE`.
         message: The problem, one sentence.
-        length: Number of characters that carets underline.
+        length: Number of characters that are underlined with carets (`^`).
         hint: Allowed values and remedy, or "".
         excerpt: The whole source line, with secrets replaced by `***`.
     """
@@ -90,7 +90,7 @@ class Finding:
 
 
 class MissionError(InputError):
-    """A mission or cell cannot be run; the message lists the findings.
+    """A mission or cell has errors; the message lists the findings.
 
     Attributes:
         findings: All findings, also those that the message omits.
@@ -138,7 +138,7 @@ def _mask_secrets(line: str) -> str:
 def sort_findings(findings: Iterable[Finding], first_path: str) -> tuple[Finding, ...]:
     """Return the findings sorted by file (`first_path` first), line and column, without duplicates.
 
-    Findings at one position are duplicates if they have one text, or one code of `_VALUE_CODES`.
+    Findings at one position are duplicates if they have the same text, or the same code in `_VALUE_CODES`.
     """
     unique: dict[tuple[bool, str, int, int, str], Finding] = {}
     for finding in findings:
@@ -156,7 +156,7 @@ def find_similar_word(word: str, known_words: Iterable[str]) -> str | None:
 
 
 def suggest_word(value: object, allowed_words: Iterable[str]) -> str:
-    """Return a question with the allowed word that is most similar to `value`, in brackets, or ""."""
+    """Return ` (did you mean "WORD"?)` with the allowed word most similar to `value`, or ""."""
     similar = find_similar_word(value, allowed_words) if isinstance(value, str) else None
     return f' (did you mean "{similar}"?)' if similar else ""
 

@@ -83,7 +83,7 @@ def load_mission(
         path: A mission file, or the name of a shipped mission.
         skills: Installed skills by name.
         overrides: Values as text, by name of a param or by `cell.<key>.<key>` for a key of the cell.
-        find_cell_kind: Returns the kind of the cell, which checks the cell; None omits these checks.
+        find_cell_kind: Function that returns the kind of a cell; None to skip the checks by the cell kind.
         recorded_cell: Cell that replaces the cell file, or None.
 
     Raises:
@@ -94,7 +94,7 @@ def load_mission(
     files = read_mission(mission_path, overrides or {}, skills, node_classes, recorded_cell)
     mission, config = files.mission, files.cell.config if files.cell else None
     findings = list(files.findings)
-    cell_kind = _find_cell_kind(files, find_cell_kind, findings)
+    cell_kind = _resolve_cell_kind(files, find_cell_kind, findings)
     classes_by_detector, min_times = {}, None
     if cell_kind is not None and files.cell is not None and files.cell_path is not None:
         folder = files.cell_path.parent
@@ -130,10 +130,10 @@ def _warn_about_unmeasured_detectors(cell: CellFile, folder: Path) -> Iterator[F
         yield make_warning(span, "not-measured", message)
 
 
-def _find_cell_kind(
+def _resolve_cell_kind(
     files: MissionFiles, find_cell_kind: CellKindFinder | None, findings: list[Finding]
 ) -> CellKind | None:
-    """Return the kind of the mission's cell, or None after an error or without `find_cell_kind`."""
+    """Return the kind of the cell, or None; add a finding if the kind is not installed."""
     if files.cell is None or files.cell.config is None or find_cell_kind is None:
         return None
     try:

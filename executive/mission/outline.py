@@ -38,7 +38,7 @@ class OutlineNode:
 
     Attributes:
         path: Unique path from the root.
-        name: Name below its parent, with the key of the parent if there is one: `Grasp`, `recover: look`.
+        name: Name of the node, after the key of the parent if the path contains one: `recover: look`.
         depth: Number of ancestors.
         detail: Summary of the node's settings in the mission.
         kind: `skill`, or the keyword of a control node.
@@ -47,13 +47,13 @@ class OutlineNode:
         slot: Key of the parent under which the node is written: `do`, `recover`, `catch 1`; "" in a list.
         when: Failures that activate a catch: `on Grasp.missed`; "" for other nodes.
         subtrees: Names of the subtrees with this node as root, the outermost first.
-        skill: Name of the skill; "" for a control node, for which all fields below are empty, too.
+        skill: Name of the skill; "" for a control node, whose attributes from `doc` to `uses` are empty, too.
         doc: Description of the skill, one sentence.
         params: Values of the skill's params.
         reads, writes: Connections of the skill's inputs and outputs.
         reasons: Reasons for which the skill may fail.
-        senses: True if the skill senses the scene.
-        uses: Parts of the cell that the skill uses exclusively.
+        senses: True if the skill gets new information, such as an image.
+        uses: Devices of which the skill has exclusive use.
     """
 
     path: str
@@ -115,7 +115,7 @@ def _iterate_outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) 
     if isinstance(node, SkillLeaf):
         yield _describe_skill(outline_node, node)
     else:
-        # Other py_trees behaviours are drawn in the default style.
+        # A py_trees behaviour that is no node of a mission is drawn in the default style.
         style = node if isinstance(node, ControlNode) else ControlNode
         yield replace(outline_node, symbol=style.symbol, shape=style.shape)
     for child in node.children:
@@ -148,8 +148,8 @@ def _find_slot(
 ) -> str:
     """Return the key of the parent under which a node is written, or "".
 
-    The key is the relative path without the names of the node and of its subtrees. Some keys are missing in
-    paths; a missing key is found by the children that the parent has under the key.
+    The key is the relative path without the names of the node and of its subtrees. Paths omit some keys; an
+    omitted key is the key under which the parent has the node as a child.
     """
     parts = [_INDEX_PATTERN.sub("", part) for part in relative_path.split("/")]
     if parts[-1] == title:

@@ -1,4 +1,4 @@
-"""Source texts, and the spans of characters in a source text that findings underline."""
+"""Source texts, and spans: the characters of a source text that a finding underlines."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from executive.tree.node_registry import ControlNodes
 
 
 class VariableRead(NamedTuple):
-    """A node that reads a variable.
+    """A read of a variable by a node.
 
     Attributes:
         node: The node.
@@ -99,7 +99,7 @@ class CheckContext:
 
     @cached_property
     def library_uses_by_path(self) -> Mapping[str, UseNode]:
-        """The `use` in the mission file that includes a node of a library, by the path of the node."""
+        """For each node of a library, by path, the `use` in the mission file that includes the node."""
         uses: dict[str, UseNode] = {}
 
         def add_uses_below(node: Node, use: UseNode | None) -> None:

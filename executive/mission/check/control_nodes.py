@@ -71,7 +71,7 @@ def run_node_checks(context: CheckContext) -> Iterator[Finding]:
 
 
 def _find_halted_nodes(context: CheckContext) -> Iterator[Node]:
-    """Yield every node that is halted when a concurrent branch of a `parallel` ends."""
+    """Yield every node that may be halted because another branch of a `parallel` has ended."""
     for node in context.iterate_control_nodes():
         for child in make_inspection_instance(node).children_halted_by_sibling:
             yield from get_mission_node(child).walk()

@@ -30,11 +30,11 @@ def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
     skill = context.skills.get(node.skill)
     if skill is None or context.min_times is None:
         return 0.0
-    declared: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
+    declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
     values = {name: param.default for name, param in skill.params.items() if not param.is_required}
     for name, literal in find_literals(node):
         try:
-            values[name] = convert_value(literal.value, declared[name].type)
+            values[name] = convert_value(literal.value, declarations[name].type)
         except (KeyError, WrongType):
             # `check_settings` reports an unknown name or a wrong type.
             return 0.0

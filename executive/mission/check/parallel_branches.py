@@ -29,7 +29,7 @@ def find_shared_resources(context: CheckContext) -> Iterator[Finding]:
     for branches in _list_concurrent_branches(context):
         users_by_branch = [_find_resource_users(context, branch) for branch in branches]
         for users, later_users in combinations(users_by_branch, 2):
-            # Two skills that share both arm and tool are reported once.
+            # One error reports all parts of the cell that the same two skills share.
             shared_resources = [resource for resource in later_users if resource in users]
             conflicts = {(users[name].span, later_users[name].span): name for name in shared_resources}
             for resource in conflicts.values():
@@ -114,7 +114,7 @@ def _find_reads(context: CheckContext, branch: Node) -> Iterator[VariableRead]:
 
 
 def _find_resource_users(context: CheckContext, branch: Node) -> dict[str, SkillNode]:
-    """Return the first skill below `branch` that uses each part of the cell, by the name in `Skill.uses`."""
+    """Return the first user of each part of the cell below `branch`, by the name of the part."""
     users: dict[str, SkillNode] = {}
     cameras = context.cell.cameras.values() if context.cell else ()
     is_camera_on_wrist = any(camera.mount == "wrist" for camera in cameras)

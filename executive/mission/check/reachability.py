@@ -17,7 +17,7 @@ from executive.tree.node import ControlNode
 
 
 def find_unreachable(context: CheckContext) -> Iterator[Finding]:
-    """Yield a warning for the first child of every node that can never run."""
+    """Yield a warning for the first of the children of each node that can never run."""
     yield from _find_unreachable_below(context.tree, context.flow_analysis)
 
 
@@ -40,7 +40,7 @@ def _explain_unreachable(instance: ControlNode, child: Node) -> str:
 
 
 def check_tool_states(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every skill that needs an empty or full tool, but may start with the opposite."""
+    """Yield an error for every skill that may start with the opposite of the required tool state."""
     flow = context.flow_analysis
     for path, entry_state in flow.entry_states.items():
         node = flow.nodes[path]

@@ -48,16 +48,16 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
 
 
 def _check_value(
-    context: CheckContext, node: SkillNode, declared: Param | Port, value: Literal
+    context: CheckContext, node: SkillNode, declaration: Param | Port, value: Literal
 ) -> Iterator[Finding]:
     """Yield an error if a constant does not fit the param or port to which the mission assigns it."""
-    name, code, hint = f"{node.skill}.{declared.name}", "wrong-type", ""
-    if isinstance(declared, Param):
-        code, problem = find_param_problem(declared, value.value)
-    elif declared.direction is Direction.IN:
-        problem, hint = find_input_problem(value.value, declared), context.make_variable_hint(value.value)
+    name, code, hint = f"{node.skill}.{declaration.name}", "wrong-type", ""
+    if isinstance(declaration, Param):
+        code, problem = find_param_problem(declaration, value.value)
+    elif declaration.direction is Direction.IN:
+        problem, hint = find_input_problem(value.value, declaration), context.make_variable_hint(value.value)
     else:
-        message = f"{name} is an output: give it a variable, for example ${declared.name}"
+        message = f"{name} is an output: give it a variable, for example ${declaration.name}"
         if value.origin:
             message = f"{name} is an output and cannot write to the constant {value.origin.split()[0]}"
         yield make_error(value.reference_span or value.span, code, message)
@@ -67,21 +67,21 @@ def _check_value(
 
 
 def _find_unknown_names(
-    context: CheckContext, node: SkillNode, declared: Param | Port, value: Literal
+    context: CheckContext, node: SkillNode, declaration: Param | Port, value: Literal
 ) -> Iterator[Finding]:
     """Yield an error for each constant that names a bin, class, pose or detector that the cell lacks."""
-    if declared.refers not in context.cell_names_by_kind or value.value == declared.default:
+    if declaration.refers not in context.cell_names_by_kind or value.value == declaration.default:
         return
-    choices = declared.choices if isinstance(declared, Param) else None
-    allowed_names = [*context.cell_names_by_kind[declared.refers], *(choices or ())]
+    choices = declaration.choices if isinstance(declaration, Param) else None
+    allowed_names = [*context.cell_names_by_kind[declaration.refers], *(choices or ())]
     is_list = isinstance(value.value, list)
     for index, name in enumerate(value.value if isinstance(value.value, list) else [value.value]):
         if isinstance(name, str) and name not in allowed_names:
-            message = f'the cell has no {declared.refers} "{name}" for {node.skill}.{declared.name}'
+            message = f'the cell has no {declaration.refers} "{name}" for {node.skill}.{declaration.name}'
             choices_hint = suggest_choice(name, allowed_names, "Allowed names")
             hint = context.make_variable_hint(name) or choices_hint
             span = value.get_element_span(index) if is_list else value.span
-            yield make_error(span, f"unknown-{declared.refers}", message, hint)
+            yield make_error(span, f"unknown-{declaration.refers}", message, hint)
 
 
 def find_param_problem(param: Param, value: object) -> tuple[str, str]:
@@ -142,6 +142,6 @@ def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
     yield from ((route.label, route.label_span) for route in context.mission.routes)
     for node, skill in context.iterate_installed_skills():
         for name, value in find_literals(node):
-            declared = skill.params.get(name) or skill.ports.get(name)
-            if declared is not None and declared.refers == "class" and isinstance(value.value, str):
+            declaration = skill.params.get(name) or skill.ports.get(name)
+            if declaration is not None and declaration.refers == "class" and isinstance(value.value, str):
                 yield value.value, value.span

@@ -87,7 +87,7 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
 
 
 def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every loop variable that another node writes; each loop deletes its variable."""
+    """Yield an error for every loop variable that another node writes; a loop deletes its variable."""
     wires = [wire for node in context.tree.walk() for wire in context.find_wires(node, Direction.OUT)]
     skill_writes = {wire.variable: (str(wire), wire.span) for wire in wires}
 
@@ -132,7 +132,7 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
 
 
 def _iterate_reads(context: CheckContext, include_implicit: bool = False) -> Iterator[VariableRead]:
-    """Yield the reads of the tree; `include_implicit`: also of optional inputs without a setting."""
+    """Yield the reads of the tree; `include_implicit` adds those of optional inputs without a setting."""
     for node in context.tree.walk():
         for reference in find_control_node_inputs(node):
             yield VariableRead(node, get_type_name(node), reference.name, reference.span)
@@ -158,7 +158,7 @@ def _list_writers(context: CheckContext, variable: str, span: Span) -> list[str]
 
 
 def _suggest_writers(context: CheckContext, variable: str, span: Span) -> str:
-    """Return the skills that write a variable in the file of `span`, otherwise the installed skills."""
+    """Return the skills that write a variable in the file of `span`, otherwise all skills that can."""
     all_writers = _list_writers(context, variable, span)
     writers_in_file = [writer for writer in all_writers if " in line " in writer]
     skills = [name for name, skill in context.skills.items() if _has_output(skill, variable)]

@@ -38,7 +38,7 @@ class ExpandedMission:
     """A mission after expansion.
 
     Attributes:
-        tree: Expanded tree, or None if it could not be expanded.
+        tree: Expanded tree, or None if the expansion failed.
         unused_subtrees: Expanded bodies of the unused subtrees that require no arguments.
         findings: Errors and warnings about subtrees, params and arguments.
     """
@@ -94,7 +94,7 @@ class _Expander:
         self._use_counts: Counter[str] = Counter()
 
     def expand_tree(self, tree: Node, values: ValuesByName) -> Node | None:
-        """Return the expanded tree, or None if it is too large."""
+        """Return the expanded tree, or None if the expanded tree is too large."""
         try:
             return self._expand_node(tree, values, (), 0)
         except _TooLargeError:
@@ -162,7 +162,7 @@ class _Expander:
         self._used_values.add((callers[-1] if is_argument else "", name or ""))
         if value is None or isinstance(value, Reference):
             return value or reference
-        # A finding about the value is located at the value, so its message must contain the reference.
+        # A finding about the value is located at the value, so the message must contain the reference.
         origin = f"${reference.name} in {reference.span.describe_place(value.span.source)}"
         return replace(value, origin=origin, reference_span=reference.span)
 

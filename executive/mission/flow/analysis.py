@@ -36,9 +36,9 @@ class FlowAnalysis:
 
     Attributes:
         nodes: Every node by its path.
-        entry_states: State that joins all possible starts of a node, by path; without unreachable nodes.
-        flows: Possible ends of a node, and the states after them, for the last analysed entry, by path.
-        body_end_states: State that joins all successes of the body of a `use`, by path of the `use`.
+        entry_states: Join of the states in which a node may start, by path; without unreachable nodes.
+        flows: Possible ends of a node, with their states, for the last analysed entry state, by path.
+        body_end_states: Join of the states after success of the body of a `use`, by path of the `use`.
         root_flow: Possible ends of the whole tree.
     """
 
@@ -54,8 +54,8 @@ class FlowAnalysis:
 
     def find_skill(self, name: str) -> type[Skill] | None:
         """Return the skill with a name, otherwise the skill with the most similar name, or None."""
-        similar = name if name in self._skills else find_similar_word(name, self._skills)
-        return self._skills[similar] if similar else None
+        known_name = name if name in self._skills else find_similar_word(name, self._skills)
+        return self._skills[known_name] if known_name else None
 
     def _analyse(self, node: Node, state: FlowState) -> Flow:
         """Return the possible ends of a node that starts in a state, from the cache if possible."""

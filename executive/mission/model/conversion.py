@@ -34,13 +34,13 @@ class WrongType(Exception):
         self.code = code
 
 
-def is_plain_type(declared: object) -> bool:
+def is_plain_type(declared_type: object) -> bool:
     """Return True if values of this type can be written in a mission file."""
-    origin = get_origin(declared)
-    if declared in _SIMPLE_TYPES or declared in _CONTAINER_TYPES or origin is typing.Literal:
+    origin = get_origin(declared_type)
+    if declared_type in _SIMPLE_TYPES or declared_type in _CONTAINER_TYPES or origin is typing.Literal:
         return True
     is_compound = origin in (Union, types.UnionType, *_CONTAINER_TYPES)
-    return is_compound and all(is_plain_type(part) for part in get_args(declared))
+    return is_compound and all(is_plain_type(part) for part in get_args(declared_type))
 
 
 def find_input_problem(value: object, port: Port) -> str:
@@ -57,15 +57,15 @@ def find_input_problem(value: object, port: Port) -> str:
     return ""
 
 
-def convert_value(value: object, declared: object) -> object:
+def convert_value(value: object, declared_type: object) -> object:
     """Return a plain value converted to the declared type, for example a list to a tuple.
 
     Raises:
         WrongType: The value cannot be converted.
     """
-    if not is_plain_type(declared):
+    if not is_plain_type(declared_type):
         raise WrongType(f"must be a variable, not {describe_value(value)}")
-    return _validate(_get_adapter(declared), value)
+    return _validate(_get_adapter(declared_type), value)
 
 
 def convert_constant(key: Key, value: object, max_value: int | None = None) -> object:
@@ -84,7 +84,7 @@ def _validate(adapter: TypeAdapter[object], value: object) -> object:
     try:
         return adapter.validate_json(json.dumps(value), strict=True)
     except ValidationError as error:
-        # A union has one error per type. A violated bound helps most; its type is `less_than` or similar.
+        # A union has one error per type. The most useful error is a violated bound, such as `less_than`.
         errors = sorted(error.errors(include_url=False), key=lambda details: "than" not in details["type"])
         code = "out-of-range" if "than" in errors[0]["type"] else "wrong-type"
         is_integer_allowed = {details["type"] for details in errors[1:]} == {"int_type"}
@@ -93,5 +93,5 @@ def _validate(adapter: TypeAdapter[object], value: object) -> object:
 
 
 @functools.lru_cache(maxsize=256)
-def _get_adapter(declared: object) -> TypeAdapter[object]:
-    return TypeAdapter(cast("type[object]", declared))
+def _get_adapter(declared_type: object) -> TypeAdapter[object]:
+    return TypeAdapter(cast("type[object]", declared_type))

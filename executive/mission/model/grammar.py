@@ -12,7 +12,7 @@ class GrammarKey:
 
     Attributes:
         kind: Kind of the value: `node`, `number`, `text`, `word` (an identifier), `label`, `list`, `value`
-            (any plain value), or a list or mapping of them: `words`, `values`, `variables`, `paths`,
+            (any plain value), or a list or mapping of such values: `words`, `values`, `variables`, `paths`,
             `params`, `routes`, `trees`, `args`.
         doc: Meaning of the key, one sentence.
         is_required: True if the key is mandatory.
@@ -37,7 +37,7 @@ USE_KEYWORD = "use"
 
 USE_SIBLINGS: Mapping[str, GrammarKey] = {
     "with": GrammarKey("values", "Values of the subtree's arguments."),
-    "returns": GrammarKey("variables", "Variables of the caller for returned variables: `returned: $mine`."),
+    "returns": GrammarKey("variables", "Variables of the caller for the returned values: `returned: $mine`."),
 }
 """Keys at the level of `use`."""
 
@@ -53,11 +53,11 @@ MISSION_KEYS: Mapping[str, GrammarKey] = {
     "mission": GrammarKey("word", "Name of the mission.", is_required=True),
     "description": GrammarKey("text", "Purpose of the mission, one sentence."),
     "cell": GrammarKey(
-        "text", "The cell file, below this file's folder, or a shipped one.", is_required=True
+        "text", "Path of the cell file, below this file's folder or shipped.", is_required=True
     ),
-    "library": GrammarKey("paths", "Files with subtrees, below this file's folder, or shipped ones."),
-    "params": GrammarKey("params", "Constants, written `$name`; `--set name=value` gives another value."),
-    "routes": GrammarKey("routes", "For every class the bin it goes to, or a list of bins."),
+    "library": GrammarKey("paths", "Paths of library files, below this file's folder or shipped."),
+    "params": GrammarKey("params", "Constants, read as `$name`; `--set name=value` replaces a value."),
+    "routes": GrammarKey("routes", "Bin, or list of permitted bins, for each class of objects."),
     "tree": GrammarKey("node", "Root node of the tree.", is_required=True),
     "trees": GrammarKey("trees", "Subtrees by name."),
 }
@@ -83,8 +83,8 @@ PARAM_KEYS: Mapping[str, GrammarKey] = {
     "type": GrammarKey(
         "word", "text, integer, number, boolean or list; by default the type of the default value."
     ),
-    "min": GrammarKey("number", "Smallest value."),
-    "max": GrammarKey("number", "Largest value."),
+    "min": GrammarKey("number", "Minimum value."),
+    "max": GrammarKey("number", "Maximum value."),
     "choices": GrammarKey("list", "Allowed values."),
     "doc": GrammarKey("text", "Meaning of the param, one sentence."),
 }

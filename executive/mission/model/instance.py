@@ -19,11 +19,11 @@ from executive.tree.keys import Child, Key, KeyKind, VariableName
 from executive.tree.node import ControlNode, NodeContext
 
 BuildChild = Callable[[Node], Child]
-"""Function from a mission node to the child of a control node."""
+"""Function that returns the child of a control node for a mission node."""
 
 
 class ChildPlaceholder(Behaviour):
-    """Child of an inspection instance: a behaviour that represents a mission node and is never executed.
+    """Behaviour that represents a mission node in a control node made for inspection; never executed.
 
     Attributes:
         node: The mission node.
@@ -39,7 +39,7 @@ class ChildPlaceholder(Behaviour):
 
 
 def get_mission_node(child: Child) -> Node:
-    """Return the mission node that a child of an inspection instance represents."""
+    """Return the mission node that a placeholder represents."""
     assert isinstance(child, ChildPlaceholder)
     return child.node
 
@@ -71,7 +71,7 @@ def has_valid_constants(node: InnerNode) -> bool:
 
 
 def find_upper_bound(owner: InnerNode | SectionNode, key: Key) -> int | None:
-    """Return the upper bound of a constant, which is the number of nodes under `key.max_key`, or None."""
+    """Return the maximum of a constant: the number of nodes under `key.max_key`; None for no maximum."""
     return len(list_nodes(owner.values[key.max_key])) if key.max_key in owner.values else None
 
 
@@ -86,7 +86,7 @@ def _make_attributes(owner: InnerNode | SectionNode, build_child: BuildChild) ->
 def _make_attribute(
     owner: InnerNode | SectionNode, key: Key, value: KeyValue | None, build_child: BuildChild
 ) -> object:
-    """Return the value of an attribute; `value` is None if the mission lacks the required key."""
+    """Return the attribute for `key`; `value` is None if the mission lacks the required key."""
     if isinstance(value, Node):
         return build_child(value)
     if isinstance(value, SectionNode):

@@ -47,8 +47,8 @@ def get_type_name(node: Node) -> str:
 def _assign_path(node: Node, parent_path: str, slot: str, name: str | None = None) -> Node:
     """Return the node with its path and the paths of its descendants.
 
-    `slot` is the key of the parent that contains the node, or "". `name` is the last part of the path; by
-    default `get_path_name(node)`, and no name for a list.
+    `slot` is the key of the parent that contains the node, or "". `name` is the last part of the path;
+    the default is `get_path_name(node)`, and for a list no name.
     """
     path = _join(parent_path, slot)
     if name is not None or not _is_list(node):
@@ -66,13 +66,13 @@ def _assign_path(node: Node, parent_path: str, slot: str, name: str | None = Non
 def _assign_value_paths(
     owner: InnerNode | SectionNode, path: str, section_slot: str = ""
 ) -> dict[str, KeyValue]:
-    """Return the values of the keys, in which all nodes have paths; `path` is the path of the control node.
+    """Return the values by key, with paths for the nodes in the values; `path` is that of the control node.
 
     If `owner` is a section, `section_slot` is the key of the control node that contains the section.
     """
     values: dict[str, KeyValue] = {}
     for key, value in iterate_keys(owner):
-        # The key `do` of a section adds nothing to the path of its child.
+        # In the path of a child below `do` of a section, the key `do` is omitted.
         slot = section_slot if section_slot and key.name == "do" else _join(section_slot, key.name)
         if isinstance(value, Node):
             value = _assign_path(value, path, slot if key.is_in_path or _is_list(value) else "")

@@ -18,7 +18,7 @@ class Node:
     """Base class of the nodes.
 
     Attributes:
-        span: Position of the skill, keyword or name of the subtree; for a list without keyword, of the list.
+        span: Position of the skill, keyword, or name of the subtree; or position of a list without keyword.
         label: Value of `as:`, or "".
         label_span: Position of the label, or None.
         path: Unique path from the root of the expanded tree; "" before expansion.
@@ -75,7 +75,7 @@ class SectionNode:
     Attributes:
         declaring_class: Class that declares the keys.
         span: Position of the mapping.
-        values: Values of the given keys.
+        values: Values that the mission sets, by key.
     """
 
     declaring_class: type[KeyOwner]
@@ -89,7 +89,7 @@ class InnerNode(Node):
 
     Attributes:
         declaring_class: Class of the control node, which declares the keys.
-        values: Values of the given keys.
+        values: Values that the mission sets, by key.
         is_list: True for a sequence that is written as a list, without keyword.
     """
 

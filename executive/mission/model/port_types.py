@@ -32,35 +32,35 @@ def is_assignable(source: object, target: object) -> bool:
     return all(is_assignable(*pair) for pair in arguments if ... not in pair)
 
 
-def find_element_type(declared: object) -> object:
+def find_element_type(declared_type: object) -> object:
     """Return the type of the elements of a list or tuple type, or None for other types."""
-    if declared is Any:
+    if declared_type is Any:
         return Any
-    if declared is str or not issubclass(_get_class(declared), Sequence):
+    if declared_type is str or not issubclass(_get_class(declared_type), Sequence):
         return None
-    arguments = [argument for argument in get_args(declared) if argument is not ...]
+    arguments = [argument for argument in get_args(declared_type) if argument is not ...]
     return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - the number of types varies
 
 
-def describe_type(declared: object) -> str:
+def describe_type(declared_type: object) -> str:
     """Return a description of the values of a type, for a sentence: `a list of Target`."""
-    if declared in _DESCRIPTIONS:
-        return _DESCRIPTIONS[declared]
-    if _is_union(declared):
-        return " or ".join(describe_type(part) for part in get_args(declared))
-    element_type = find_element_type(declared)
-    if element_type is not None and declared is not object:
+    if declared_type in _DESCRIPTIONS:
+        return _DESCRIPTIONS[declared_type]
+    if _is_union(declared_type):
+        return " or ".join(describe_type(part) for part in get_args(declared_type))
+    element_type = find_element_type(declared_type)
+    if element_type is not None and declared_type is not object:
         if element_type is Any:
             return "a list"
         return f"a list of {describe_type(element_type).removeprefix('a ')}"
-    return getattr(declared, "__name__", str(declared))
+    return getattr(declared_type, "__name__", str(declared_type))
 
 
-def _is_union(declared: object) -> bool:
-    return get_origin(declared) in (Union, types.UnionType)
+def _is_union(declared_type: object) -> bool:
+    return get_origin(declared_type) in (Union, types.UnionType)
 
 
-def _get_class(declared: object) -> type:
-    """Return the class of a type without its arguments; `object` for a type that is no class."""
-    origin = get_origin(declared) or declared
+def _get_class(declared_type: object) -> type:
+    """Return the class of a type without type arguments; `object` for a type that is no class."""
+    origin = get_origin(declared_type) or declared_type
     return origin if isinstance(origin, type) else object

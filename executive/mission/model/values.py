@@ -18,7 +18,7 @@ class Literal:
         value: Plain value: None, boolean, number, string, list or mapping.
         span: Position of the value.
         origin: Reference that expansion replaced by the value: `$attempts in line 12`; "" for no reference.
-        reference_span: Position of this reference, or None.
+        reference_span: Position of the replaced reference, or None.
         element_spans: Positions of the elements, if the value is a list.
     """
 

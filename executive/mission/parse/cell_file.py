@@ -92,7 +92,7 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
     overlap_errors = (file.make_error(keys, "layout", message) for keys, message in find_overlaps(config))
     resolved_config, outside_errors = _resolve_model_files(file, config, reader.folders)
     findings = (*findings, *_find_unknown_poses(file, config), *outside_errors, *overlap_errors)
-    # After an error, `config` is None, so that no caller opens a model file outside the folder.
+    # After an error, the file has no `config`, so that no caller opens a model file outside the folder.
     return CellFile(None if outside_errors else resolved_config, source, root, findings)
 
 
@@ -151,7 +151,7 @@ class _CellFileReader:
 def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:
     """Return an entry of a file; the value of `detectors` becomes the detectors of the file and of the base.
 
-    A detector without value removes the detector of the base. The detectors of the file come first.
+    A detector without value removes the base's detector of this name. The detectors of the file come first.
     """
     detectors, base_detectors = entry.value, base.get(DETECTORS_KEY)
     if not (isinstance(detectors, YamlMapping) and isinstance(base_detectors, YamlMapping)):
@@ -168,7 +168,7 @@ def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:
 
 
 def _merge_detector(detector: YamlNode, base_detector: YamlNode | None) -> YamlNode:
-    """Return a detector of a file; if the kinds are equal, it inherits missing keys from the base."""
+    """Return a detector with the missing keys of the base's detector, if both have the same kind."""
     if not isinstance(detector, YamlMapping) or not isinstance(base_detector, YamlMapping):
         return detector
     kind, base_kind = detector.get("kind"), base_detector.get("kind")
@@ -208,7 +208,7 @@ def _find_unknown_poses(file: CellFile, config: CellConfig) -> Iterator[Finding]
 def _resolve_model_files(
     file: CellFile, config: CellConfig, folders: Mapping[Source, Path]
 ) -> tuple[CellConfig, list[Finding]]:
-    """Return the cell with absolute paths of existing model files, and errors about outside model files.
+    """Return the cell with absolute paths of existing model files, and errors about files outside the folder.
 
     A path is relative to the folder of the cell file or base that contains the path.
     """

@@ -1,4 +1,4 @@
-"""Checks that no bin of a cell file overlaps another bin, the workspace or the safe place."""
+"""Checks that the bins of a cell file overlap neither each other, nor the workspace, nor the safe place."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_OVERLAP = 0.0005
 
 
 def find_overlaps(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield keys and message for each overlap in plan view of a bin with a bin, the workspace or safe place.
+    """Yield keys and message for each bin that is too close to another bin, the workspace or the safe place.
 
     The centre of an object may be anywhere in the workspace and at the safe place, so each bin must be at
     least the radius of the largest object away from the workspace and the safe place.
@@ -40,7 +40,7 @@ def find_overlaps(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _compute_outline(bin: BinConfig) -> Array:
-    """Return the minimum and the maximum x and y of a bin with its walls, `(2, 2)` [m]."""
+    """Return the rows minimum x, y and maximum x, y of a bin with its walls, `(2, 2)` [m]."""
     centre, half_size = np.array(bin.position[:2]), np.array(bin.size[:2]) / 2 + BIN_THICKNESS
     return np.array([centre - half_size, centre + half_size])
 

@@ -1,4 +1,4 @@
-"""Parser of control nodes by the keys that their classes declare."""
+"""Parser of control nodes: the class of a control node declares its keys."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class _KeyReader:
     """Reader of the keys of one control node.
 
     Attributes:
-        is_mapping_valid: False if the node or a section has another value where a mapping is required.
+        is_mapping_valid: False if the body of the node or of a section must be a mapping, but is not.
     """
 
     def __init__(self, parser: NodeParser) -> None:
@@ -99,7 +99,7 @@ class _KeyReader:
         values: dict[str, KeyValue] = {}
         shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
         is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
-        # A mapping is read as inner keys, although it could also be a node as the value of the shorthand key.
+        # The keys of a mapping are always inner keys; a node below the shorthand key could be a mapping, too.
         is_wrong_list = is_list_required and isinstance(value, YamlScalar)
         has_inner_keys = isinstance(value, YamlMapping) or is_wrong_list
         if shorthand_key is not None and not (has_inner_keys and inner_keys):
@@ -121,7 +121,7 @@ class _KeyReader:
     def read_key(
         self, reader: MappingReader, key: Key, node: YamlNode, span: Span, values: dict[str, KeyValue]
     ) -> None:
-        """Add the value of a key to `values` if it is valid; `span` is the position for a missing node."""
+        """Add a valid value of a key to `values`; `span` is the position of an error about a missing node."""
         value = self._read_value(reader, key, node, span)
         if value is not None:
             values[key.name] = value

@@ -22,18 +22,18 @@ from executive.mission.text.yaml_text import (
 )
 
 NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-"""Names of params, arguments, variables and subtrees."""
+"""Matches the names of params, arguments, variables and subtrees."""
 _REFERENCE_START = re.compile(r"^\$|\$(?=[A-Za-z_])")
-"""A `$` at the start of a text, or before a letter."""
+"""Matches `$` at the start of a text, or before a letter."""
 _FAILURE_PATTERN = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\.([A-Za-z_][A-Za-z0-9_]*)")
-"""`Skill.reason` or `label.reason`."""
+"""Matches `Skill.reason` and `label.reason`."""
 
 
 class MappingReader:
     """Reader of one mapping; reports unknown keys at construction.
 
     Attributes:
-        owner: Name of the owner of the mapping in messages.
+        owner: Name, in messages, of the node, key or file to which the mapping belongs.
         span: Position of the owner, for findings about missing keys.
         findings: List to which the reader adds its findings.
         is_mapping: True if the YAML node is a mapping.
@@ -76,7 +76,7 @@ class MappingReader:
         return node
 
     def read_text(self, key: str) -> str:
-        """Return the text of `key`, or "" without a text; add an error for a list, mapping or null."""
+        """Return the text below `key`, or ""; add an error for a list, a mapping or null."""
         node = self.get(key)
         if node is None:
             return ""
@@ -111,7 +111,7 @@ class MappingReader:
         return () if node is None else (node,)
 
     def read_entries(self, key: str, read_entry: Callable[[str, Span, YamlNode], None]) -> None:
-        """Call `read_entry` with name, position of the name, and value of each entry of the mapping `key`."""
+        """Call `read_entry` with name, position of the name, and value of each entry below `key`."""
         node = self.get(key)
         if isinstance(node, YamlMapping):
             for entry in node.entries:
@@ -137,7 +137,7 @@ def is_empty(node: YamlNode) -> bool:
 def read_settings(
     node: YamlNode, owner: str, findings: list[Finding], example_key: str = "name"
 ) -> dict[str, Setting]:
-    """Return the values of the mapping of a skill or key `owner`; a hint suggests `example_key`."""
+    """Return the settings below `owner`, a skill or a key; the hint of an error shows `example_key`."""
     if is_empty(node):
         return {}
     if not isinstance(node, YamlMapping):
@@ -168,7 +168,7 @@ def make_literal(node: YamlNode) -> Literal:
 
 
 def _find_misplaced_dollars(node: YamlNode) -> Iterator[Finding]:
-    """Yield an error for each text that contains a single `$` in another place than in a reference."""
+    """Yield an error for each text with a `$` that is neither a reference nor escaped as `$$`."""
     for scalar in iterate_scalars(node):
         if isinstance(scalar.value, str) and _REFERENCE_START.search(scalar.value.replace("$$", "")):
             message = f'"{scalar.text}" is no reference: a reference is a whole value, as in key: $name'

@@ -17,7 +17,7 @@ from executive.mission.source import Span
 from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, describe_node
 
 _MISSION_NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
-"""Names of missions, which are also parts of the names of run directories."""
+"""Matches the names of missions; the names of run directories contain the name of the mission."""
 
 
 def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodeParser) -> Mission:

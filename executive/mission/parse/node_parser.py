@@ -32,7 +32,7 @@ from executive.tree.node_registry import ControlNodes
 Skills = Mapping[str, type[Skill]]
 """Installed skills by name."""
 _SKILL_PATTERN = re.compile(r"[A-Z][A-Za-z0-9]*")
-"""Names of skills, also of skills that are not installed."""
+"""Matches the names of skills, also of skills that are not installed."""
 
 
 class NodeParser:
@@ -47,7 +47,7 @@ class NodeParser:
         return NodeParser([], self._skills, self._node_classes)
 
     def read_node(self, node: YamlNode | None, span: Span) -> Node:
-        """Return the node of the tree; for a missing or empty YAML node, an unknown node at `span`."""
+        """Return the mission node for a YAML node; for a missing or empty node, an unknown node at `span`."""
         if node is None:
             return make_unknown_node(span)
         if is_empty(node):
@@ -111,7 +111,7 @@ class NodeParser:
             message = f'"{name}" and "{entry.key.text}" are two nodes in one mapping'
             self.add_error(entry.key.span, "two-nodes", message, "Write a list to run one after the other.")
         if surplus_entries:
-            # The errors of surplus nodes may be misleading until the author has corrected the mapping.
+            # Errors in surplus nodes are discarded, because the author must correct the mapping first.
             parts = [self.make_silent_parser()._read_entry(node, entry, "") for entry in surplus_entries]
             return UnknownNode(span, label, (self._read_entry(node, node_entry, ""), *parts))
         node_class = self._node_classes.get(name)

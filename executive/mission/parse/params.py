@@ -71,7 +71,7 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
         None if choices is None else tuple(to_python_value(item) for item in reader.list_items("choices")),
         reader.read_text("doc"),
     )
-    # After an error, the param has a valid value, so that references to the param cause no errors.
+    # After an error, the param has a valid value, so that references to the param cause no other errors.
     fallback = replace(param, value=Literal(_choose_valid_value(param), reader.span))
     if contradiction := _find_contradiction(param):
         code, key = ("empty-list", "choices") if param.choices == () else ("out-of-range", "min")

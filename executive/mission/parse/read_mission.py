@@ -28,8 +28,8 @@ class MissionFiles:
         source: Text of the mission file.
         mission: Content of the mission file and the subtrees of its libraries.
         libraries: Text of each library file by its path as written in the mission.
-        cell: Content of the cell file, or None if it cannot be read.
-        cell_path: Path of the cell file, or None if it cannot be read.
+        cell: Content of the cell file, or None if the file cannot be read.
+        cell_path: Path of the cell file, or None if the file cannot be read.
         findings: Errors of the parsers.
     """
 
@@ -111,7 +111,7 @@ def _add_library(
         first_subtree = subtrees.setdefault(name, subtree)
         if first_subtree is subtree:
             continue
-        # The error is in the mission file: at the subtree with the name, or at the path of the library.
+        # The position is in the mission file: the subtree of this name, or the path of the library.
         if first_subtree.library:
             span, other_span = reference.span, first_subtree.span
             hint = "Delete one of the libraries from the list."

@@ -57,7 +57,7 @@ def validate(root: YamlNode, model: type[ModelT]) -> tuple[ModelT | None, list[F
 def find_span(root: YamlNode, path: KeyPath, at_key: bool = False) -> Span:
     """Return the position of the value at `path`, or at the longest existing part of `path`.
 
-    For a list or mapping, and if `at_key` is True, the position is that of the key.
+    If `at_key` is True, or the value is a list or mapping, return the position of the key.
     """
     node, span = root, root.span
     for key in path:
@@ -95,26 +95,26 @@ def _make_finding(root: YamlNode, model: type[BaseModel], error: ErrorDetails) -
     if key == "[key]":
         span = find_span(root, parent, at_key=True)
         return make_error(span, "bad-name", f"{owner} {describe_validation_error(error)}")
-    # The types of violated bounds are `less_than`, `greater_than_equal` and similar words.
+    # The error of a violated bound has a type such as `less_than` or `greater_than_equal`.
     code = "out-of-range" if "than" in error_type else _CODES_BY_ERROR_TYPE.get(error_type, "wrong-type")
     name = join_keys(path) or "the file"
     return make_error(find_span(root, path), code, f"{name} {describe_validation_error(error)}")
 
 
 def _find_type(model: object, path: KeyPath) -> object:
-    """Return the declared type of the value at `path`, or None if it is unknown."""
-    declared: object = model
+    """Return the declared type of the value at `path`, or None if the type is unknown."""
+    declared_type: object = model
     for key in path:
-        if isinstance(declared, type) and issubclass(declared, BaseModel):
-            field = declared.model_fields.get(str(key))
-            declared = _remove_none(field.annotation) if field else None
-        elif get_origin(declared) is dict:
-            declared = get_args(declared)[1]
-        elif get_origin(declared) in (tuple, list):
-            declared = get_args(declared)[0]
+        if isinstance(declared_type, type) and issubclass(declared_type, BaseModel):
+            field = declared_type.model_fields.get(str(key))
+            declared_type = _remove_none(field.annotation) if field else None
+        elif get_origin(declared_type) is dict:
+            declared_type = get_args(declared_type)[1]
+        elif get_origin(declared_type) in (tuple, list):
+            declared_type = get_args(declared_type)[0]
         else:
             return None
-    return declared
+    return declared_type
 
 
 def _remove_none(annotation: object) -> object:
@@ -125,16 +125,16 @@ def _remove_none(annotation: object) -> object:
 
 def _list_keys(model: type[BaseModel], path: KeyPath) -> list[str]:
     """Return the keys of the section at `path`; none if the value at `path` is no section."""
-    declared = _find_type(model, path)
-    if isinstance(declared, type) and issubclass(declared, BaseModel):
-        return list(declared.model_fields)
+    declared_type = _find_type(model, path)
+    if isinstance(declared_type, type) and issubclass(declared_type, BaseModel):
+        return list(declared_type.model_fields)
     return []
 
 
 def _find_tuple_length(model: type[BaseModel], path: KeyPath) -> int:
     """Return the number of values of the tuple at `path`; 0 if the value at `path` is no tuple."""
-    declared = _find_type(model, path)
-    return len(get_args(declared)) if get_origin(declared) is tuple else 0
+    declared_type = _find_type(model, path)
+    return len(get_args(declared_type)) if get_origin(declared_type) is tuple else 0
 
 
 def _find_infinite_numbers(node: YamlNode) -> Iterator[Finding]:

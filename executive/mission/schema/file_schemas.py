@@ -170,7 +170,7 @@ def _make_value_schema(key: Key) -> Schema:
 
 
 def _require_any_of(keys: Sequence[str]) -> Schema:
-    """Return the schema that requires at least one of these keys."""
+    """Return the schema that requires at least one of `keys`; {} without keys."""
     return {"anyOf": [{"required": [key]} for key in keys]} if keys else {}
 
 

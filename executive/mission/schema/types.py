@@ -1,4 +1,4 @@
-"""JSON Schema draft-07, which most editors support, of Python types, the cell file and the skills."""
+"""JSON Schemas (draft-07, for most editors) of Python types, the cell file and the skills."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ DIALECT = "http://json-schema.org/draft-07/schema#"
 
 
 class Draft07(GenerateJsonSchema):
-    """Pydantic's JSON Schema as draft-07, without titles from names in the code."""
+    """Generator of pydantic's JSON Schemas as draft-07, without titles from names in the code."""
 
     def tuple_schema(self, schema: core_schema.TupleSchema) -> Schema:
         """Return the schema of a tuple; draft-07 has the schemas of the elements under `items`."""
@@ -51,13 +51,13 @@ class Draft07(GenerateJsonSchema):
         return False
 
 
-def make_type_schema(declared: object) -> Schema:
+def make_type_schema(declared_type: object) -> Schema:
     """Return the schema of the plain values of a Python type."""
-    return TypeAdapter(cast("type[object]", declared)).json_schema(schema_generator=Draft07)
+    return TypeAdapter(cast("type[object]", declared_type)).json_schema(schema_generator=Draft07)
 
 
 def make_cell_schema() -> Schema:
-    """Return the schema of a cell file; with a `base`, other keys, detectors and their kinds are optional."""
+    """Return the schema of a cell file; with `base`, other keys and all keys of detectors are optional."""
     cell = CellConfig.model_json_schema(schema_generator=Draft07, ref_template="#/definitions/{model}")
     sections, required = cell.pop("$defs"), cell.pop("required")
     detector = sections["DetectorConfig"]
@@ -133,7 +133,7 @@ def _make_param_schema(param: Param) -> Schema:
 
 
 def _describe_param(param: Param) -> str:
-    """Return the description of a param with unit, bounds and default, which editors omit."""
+    """Return the description of a param with unit, bounds and default, because editors omit these."""
     limits = [f"at least {param.ge:g}"] if param.ge is not None else []
     limits += [f"at most {param.le:g}"] if param.le is not None else []
     limits += [f"{param.default} if not given"] if param.default not in (..., "", None) else []

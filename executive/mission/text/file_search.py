@@ -50,7 +50,7 @@ def find_mission(name: str | Path) -> Path:
 
 
 def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[str] = ("",)) -> Path:
-    """Return the file with the relative path `reference`, from `folder` or else from the shipped subfolders.
+    """Return the file with the relative path `reference` in `folder`, otherwise in a shipped subfolder.
 
     Raises:
         InputError: The reference leaves the folder, or the file does not exist.

@@ -1,10 +1,11 @@
-"""Values of plain YAML scalars by the core schema of YAML 1.2.2; in YAML 1.1 (PyYAML), `no` is false."""
+"""Values of plain YAML scalars by the core schema of YAML 1.2.2; unlike in YAML 1.1, `no` is a string."""
 
 from __future__ import annotations
 
 import math
 import re
 
+# Spellings of each kind of value in the core schema.
 _NULL_WORDS = frozenset({"", "~", "null", "Null", "NULL"})
 _TRUE_WORDS = frozenset({"true", "True", "TRUE"})
 _FALSE_WORDS = frozenset({"false", "False", "FALSE"})
@@ -13,9 +14,8 @@ _PREFIXED_INTEGER = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _INFINITE = re.compile(r"[-+]?\.(inf|Inf|INF)")
 _NAN_WORDS = frozenset({".nan", ".NaN", ".NAN"})
-"""The constants above contain the texts of each kind of value."""
 _MAX_NUMBER_LENGTH = 300
-"""Maximum number of characters of a number; a longer scalar is a text."""
+"""Maximum number of characters of a number; a longer scalar is a string."""
 
 ScalarValue = None | bool | int | float | str
 

@@ -23,7 +23,7 @@ _MAX_DEPTH = 50
 _SURROGATE = re.compile("[\ud800-\udfff]")
 """Half of a UTF-16 character, which an escape sequence can produce, but UTF-8 cannot encode."""
 _MAX_NODE_COUNT = 20_000
-"""Maximum number of keys and values, in which each alias counts like a copy of its anchor."""
+"""Maximum number of keys and values; an alias counts like a copy of the anchored node."""
 _ADVICE_BY_MESSAGE = {
     "mapping values are not allowed here": (
         "Is a colon missing at the end of the line above, or are braces, as in Detect: {view: full}? "
@@ -35,7 +35,7 @@ _ADVICE_BY_MESSAGE = {
 }
 """Advice on syntax errors, by the start of PyYAML's message."""
 _DEPTH_MESSAGE = f"lists and mappings are nested more than {_MAX_DEPTH} levels deep"
-"""Message of a finding about the depth."""
+"""Message of a finding about nesting deeper than `_MAX_DEPTH`."""
 _LINE_LENGTH = 1000
 """Length of a span [characters] that reaches the end of the line."""
 
@@ -163,7 +163,7 @@ class _Composer:
         return root
 
     def _read_node(self, event: yaml.Event, depth: int) -> YamlNode:
-        """Return the node that starts with `event`; `depth` is the number of lists and mappings around it."""
+        """Return the node that starts with `event`; `depth` is the number of containers around the node."""
         if isinstance(event, yaml.AliasEvent):
             return self._resolve_alias(event, depth)
         # PyYAML checks the YAML grammar, so that only these events can start a node.
@@ -232,7 +232,7 @@ class _Composer:
         return YamlMapping(self._make_span(event, 1), tuple(entries.values()))
 
     def _make_span(self, event: yaml.Event, length: int = 0) -> Span:
-        """Return the span of an event; 0 as `length` denotes the whole event, or its first line."""
+        """Return the span of an event; if `length` is 0, the span covers the first line of the event."""
         start, end = event.start_mark, event.end_mark
         assert start is not None and end is not None, "PyYAML locates every event"
         if not length:
