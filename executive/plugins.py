@@ -176,7 +176,7 @@ class Project:
         """Return the table `[project.entry-points."<group>"]`: import paths of classes by name.
 
         Raises:
-            InputError: The content of the pyproject.toml is not a table of strings `module:Class`.
+            InputError: The entry points of the group are not a table of strings `module:Class`.
         """
         groups = self.project_table.get("entry-points", {})
         entries = groups.get(group, {}) if isinstance(groups, dict) else groups

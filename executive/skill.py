@@ -144,7 +144,7 @@ class Skill:
         params: Declared params by name.
         ports: Declared ports by name.
         reasons: Reasons with which the skill may fail.
-        uses: Devices that no concurrent branch may use, too: `arm`, `tool`, `camera`.
+        uses: Devices that no concurrent branch may use at the same time: `arm`, `tool`, `camera`.
         senses: True if the skill gets new information: an image, or a request of the operator.
         moves: True if the skill moves the arm.
         tool_state: Required state of the tool (ANY: no requirement); state after success (ANY: unchanged).

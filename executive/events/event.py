@@ -46,4 +46,4 @@ Observer = Callable[[TimedEvent], None]
 
 
 def discard_event(event: Event) -> None:
-    """Ignore an event; the `Emit` function of a tree or device whose events nobody observes."""
+    """Ignore an event; serves as the `Emit` function if nobody observes the events."""

@@ -17,7 +17,7 @@ from executive.tree.node import ControlNode
 
 
 def find_unreachable(context: CheckContext) -> Iterator[Finding]:
-    """Yield a warning for the first of the children of each node that can never run."""
+    """For each node, yield a warning for the first child that can never run."""
     yield from _find_unreachable_below(context.tree, context.flow_analysis)
 
 

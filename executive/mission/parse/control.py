@@ -99,7 +99,7 @@ class _KeyReader:
         values: dict[str, KeyValue] = {}
         shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
         is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
-        # The keys of a mapping are always inner keys; a node below the shorthand key could be a mapping, too.
+        # A mapping is always read as inner keys, although a node in the shorthand form may be a mapping, too.
         is_wrong_list = is_list_required and isinstance(value, YamlScalar)
         has_inner_keys = isinstance(value, YamlMapping) or is_wrong_list
         if shorthand_key is not None and not (has_inner_keys and inner_keys):

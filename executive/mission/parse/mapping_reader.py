@@ -168,7 +168,7 @@ def make_literal(node: YamlNode) -> Literal:
 
 
 def _find_misplaced_dollars(node: YamlNode) -> Iterator[Finding]:
-    """Yield an error for each text with a `$` that is neither a reference nor escaped as `$$`."""
+    """Yield an error for each text with a `$`, not escaped as `$$`, at the start or before a letter."""
     for scalar in iterate_scalars(node):
         if isinstance(scalar.value, str) and _REFERENCE_START.search(scalar.value.replace("$$", "")):
             message = f'"{scalar.text}" is no reference: a reference is a whole value, as in key: $name'
