@@ -32,7 +32,7 @@ MAX_LABEL_FILE_SIZE = 10_000_000
 MAX_CLASS_FILE_SIZE = 100_000
 """Maximum size of a YOLO class file [byte]."""
 NORMALIZED_TOLERANCE = 1e-6
-"""Maximum rounding error of a normalized coordinate, which is 0 to 1."""
+"""Maximum rounding error of a normalized coordinate, as a fraction of the image side."""
 
 
 @dataclass
@@ -41,7 +41,7 @@ class ImageAnnotation:
 
     Attributes:
         labels: Class of each object.
-        boxes: Left, top, right and bottom of each object, [pixel] or normalized to 0 to 1.
+        boxes: Left, top, right and bottom of each object, in pixels or normalized to 0 to 1.
         is_normalized: True if the boxes are in normalized coordinates; False if they are in pixels.
         polygon_count: Number of boxes that enclose an annotated polygon.
     """
@@ -97,7 +97,7 @@ class _CocoCategory(BaseModel):
 
 
 class _CocoFile(BaseModel):
-    """The used keys of a COCO file."""
+    """The keys of a COCO file that are read."""
 
     images: list[_CocoImage]
     annotations: list[_CocoObject]
@@ -105,7 +105,7 @@ class _CocoFile(BaseModel):
 
 
 class _YoloClassFile(BaseModel):
-    """The used key of a YOLO class file: names by class number, or in the order of the numbers."""
+    """A YOLO class file: class names by class number, or in the order of the class numbers."""
 
     names: dict[int, str] | list[str]
 
@@ -216,7 +216,7 @@ def _read_labels(file: Path, class_names: Mapping[int, str]) -> ImageAnnotation:
 
 
 def _find_image(folder: Path, name: str, source: str) -> Path:
-    """Return the path of an image; `source` states, in error messages, which file and key contain the name.
+    """Return the path of an image; in error messages, `source` names the file and key with the name.
 
     Raises:
         InputError: The image is missing, is not a regular file, or lies outside of the folder.

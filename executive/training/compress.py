@@ -40,7 +40,7 @@ def export_model(detector: Any, folder: Path) -> onnx.ModelProto:
 
 
 def compress_weights(model: onnx.ModelProto) -> onnx.ModelProto:
-    """Return a copy of `model` with large matrices and filters as int8, with a scale per output channel.
+    """Return a copy of `model` with large matrices and filters as int8 and a scale per output channel.
 
     Other large weights become float16. The compression moved 99 % of the centres of detected boxes by less
     than 0.03 pixel in a measurement.
@@ -67,7 +67,7 @@ def compress_weights(model: onnx.ModelProto) -> onnx.ModelProto:
 
 
 def _to_float16(name: str, values: NDArray[np.float32], added_nodes: list[Any]) -> list[onnx.TensorProto]:
-    """Return a weight as float16; append the node that converts it to float32 to `added_nodes`."""
+    """Return a weight as float16; append its conversion node (to float32) to `added_nodes`."""
     tensor = numpy_helper.from_array(values.astype(np.float16), f"{name}_half")
     added_nodes.append(helper.make_node("Cast", [tensor.name], [name], to=TensorProto.FLOAT))
     return [tensor]
@@ -76,7 +76,7 @@ def _to_float16(name: str, values: NDArray[np.float32], added_nodes: list[Any]) 
 def _to_int8(
     name: str, values: NDArray[np.float32], axis: int, added_nodes: list[Any]
 ) -> list[onnx.TensorProto]:
-    """Return a weight as int8, and its scales; append the nodes that restore it to `added_nodes`."""
+    """Return a weight as int8, and its scales; append its conversion nodes (to float32) to `added_nodes`."""
     other_axes = tuple(index for index in range(values.ndim) if index != axis)
     # The largest weight of each output channel becomes 127, the maximum of int8.
     scales = np.abs(values).max(axis=other_axes, keepdims=True) / 127
@@ -89,7 +89,7 @@ def _to_int8(
 
 
 def _find_output_axes(graph: Any) -> dict[str, int]:
-    """Return the axis of the output channels, by name, of every weight of a matrix product or convolution."""
+    """Return the axis of the output channels of each weight of matrix products and convolutions, by name."""
     axes: dict[str, int] = {}
     dimension_counts = {tensor.name: len(tensor.dims) for tensor in graph.initializer}
     for node in graph.node:

@@ -2,7 +2,7 @@
 
 Layout `coco` has a file `_annotations.coco.json` beside the images of each split, like exports of Roboflow.
 Layout `yolo` has a file `data.yaml`, and folders `images` and `labels` in each split. The caller writes the
-images to `build_image_path`, and then all annotations with `write_annotations`.
+images to the paths of `build_image_path`, and then all annotations with `write_annotations`.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ class DatasetEntry:
     Attributes:
         split: `train`, `valid` or `test`.
         file: File name of the image.
-        size: Width and height [pixel].
+        size: Width and height of the image [pixel].
         labels: Class of each labelled object.
         boxes: Left, top, right and bottom [pixel] of each labelled object.
-        ignored_boxes: Boxes of objects that a detector may find or miss; both are correct [pixel].
-        truth: Further ground truth for measurements, as JSON values.
+        ignored_boxes: Boxes of objects that evaluations ignore, whether detected or missed [pixel].
+        truth: Further ground truth for evaluations, as JSON values by name.
     """
 
     split: str
@@ -72,7 +72,7 @@ def write_annotations(
     """Write the annotations of a dataset; the classes are numbered from 0 in the given order.
 
     Each split also gets `ignored.json` with `DatasetEntry.ignored_boxes`, and `truth.json` with
-    `DatasetEntry.truth`, by file name.
+    `DatasetEntry.truth`, by file name of the image.
 
     Raises:
         InputError: The layout is unknown.

@@ -23,16 +23,16 @@ class LabelledImage:
     """An image and the objects in it.
 
     Attributes:
-        file: File name.
-        image: `(H, W, 3)` uint8, RGB.
+        file: File name of the image.
+        image: Image `(H, W, 3)` uint8, RGB.
         labels: Class of each object.
         boxes: Box of each object [pixel].
-        ignored_boxes: Boxes of objects that a detector may find or miss; both are correct [pixel].
+        ignored_boxes: Boxes of objects that evaluations ignore, whether detected or missed [pixel].
         truth: Ground truth of the renderer, for instance `X_WC` and `positions`. The key `part` contains the
             region of the camera's full frame that the image shows [pixel].
         region: Region of the image [pixel] that is searched and labelled; None: the whole image.
-        depth: `(H, W)` [m], as in a `Frame`; None without a depth sensor.
-        second_image: Image of the scene from the same pose with other noise, or None.
+        depth: Depth image `(H, W)` [m] in the format of `Frame.depth`; None without a depth sensor.
+        second_image: Image of the same scene from the same camera pose with different noise, or None.
     """
 
     file: str
@@ -61,12 +61,12 @@ class LabelledImage:
         return distance >= MIN_BORDER_DISTANCE
 
     def get_visible_fraction(self, index: int) -> float:
-        """Return the visible fraction of an object, 0 to 1; 1 if it is unknown."""
+        """Return the visible fraction of an object, 0 to 1; 1 if the fraction is unknown."""
         fractions = self.truth.get("visible_fraction")
         return 1.0 if fractions is None else float(fractions[index])
 
     def is_fully_visible(self, index: int) -> bool:
-        """Return True if an object lies completely in the searched region and is hardly occluded."""
+        """Return True if an object lies completely in the searched region and is almost unoccluded."""
         return self.is_fully_inside(index) and self.get_visible_fraction(index) >= MIN_VISIBLE_FRACTION
 
     @property

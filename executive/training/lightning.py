@@ -18,7 +18,7 @@ class SymmetryAugmentedData(RFDETRDataModule):
     """
 
     def on_after_batch_transfer(self, batch: tuple[Any, Any], dataloader_idx: int) -> tuple[Any, Any]:
-        """Return a batch, with rotated and mirrored images during training."""
+        """Return a batch; during training, its images are rotated and mirrored at random."""
         samples, targets = super().on_after_batch_transfer(batch, dataloader_idx)
         if self.trainer is None or not self.trainer.training:
             return samples, targets

@@ -51,8 +51,8 @@ def render_card(
         blocks += [
             "## Accuracy",
             f"Precision and recall at confidence {', '.join(map('{:g}'.format, thresholds))} and IoU 0.5. "
-            "Centre and position: distance between the centres of the detected and the true box, in the "
-            "image and in the world at the height of the object; median / 95 % / 99 %.",
+            "Centre: distance between the centres of the detected and the true box in the image. Position: "
+            "this distance in the world at the height of the object. Both: median / 95 % / 99 % quantile.",
             _render_table(("dataset", *METRIC_COLUMNS, "centre [px]", "position [mm]"), rows),
         ]
     if epochs:
@@ -75,11 +75,11 @@ def read_epochs(metrics_file: Path) -> list[dict[str, float]]:
 
 
 def _render_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table."""
+    """Return a Markdown table with a row of headings, followed by `rows`."""
     lines = [headings, ["---"] * len(headings), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 
 
 def _format_distribution(errors: Distribution | None) -> str:
-    """Return median, 95th and 99th percentile, or "" without a distribution."""
+    """Return the text of median, 95th and 99th percentile, or "" if there is no distribution."""
     return "" if errors is None else f"{errors.median:.2f} / {errors.p95:.2f} / {errors.p99:.2f}"

@@ -40,7 +40,7 @@ def fit_model(
         epochs=settings.epochs,
         batch_size=BATCH_SIZE,
         lr=learning_rate,
-        # By default, smaller learning rates preserve pretrained encoder weights; no such weights are used.
+        # By default, the encoder has smaller learning rates, which would preserve pretrained weights.
         lr_encoder=learning_rate,
         lr_vit_layer_decay=1.0,
         lr_component_decay=1.0,
@@ -68,7 +68,7 @@ def fit_model(
 
 
 def _write_checkpoint(model: Path, out: Path) -> Path:
-    """Write the weights of an exported model as a checkpoint to the folder `out`, and return the path."""
+    """Write the weights of an exported model as a checkpoint to the folder `out`; return its path."""
     path = out / "start.pth"
     torch.save({"model": restore_model(model).model.model.state_dict()}, path)
     return path

@@ -25,7 +25,7 @@ class ProgressReporter(Callback):
         self._report_batch(finished_count, trainer.max_epochs * epoch_size)
 
     def on_train_epoch_end(self, trainer: Any, pl_module: Any) -> None:
-        """Report the metrics of the epoch, including those on the validation images."""
+        """Report the metrics of the epoch on the training images and on the validation images."""
         del pl_module
         metrics = {name: float(value) for name, value in trainer.callback_metrics.items()}
         self._report_epoch(trainer.current_epoch + 1, metrics)

@@ -1,4 +1,4 @@
-"""Parallel renderer of labelled images, which do not depend on the number of processes."""
+"""Parallel rendering of labelled images; the images do not depend on the number of processes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def generate_dataset(
         seed: Seed of the random scenes.
         layout: `coco` or `yolo`.
         worker_count: Number of rendering processes.
-        valid_fraction: Fraction of the images that are in the split `valid`, 0 to 1: the last images.
+        valid_fraction: Fraction of the images in the split `valid`, 0 to 1; the split has the last images.
         progress: Called after each block of `BLOCK_SIZE` images.
 
     Raises:
@@ -71,7 +71,7 @@ def render_run_frames(
     config: CellConfig, *, image_count: int, seed: int, worker_count: int, progress: ReportProgress,
     scene: SceneConfig = DECLARED_SCENE,
 ) -> list[LabelledImage]:  # fmt: skip
-    """Return full frames of a cell's camera, each with a random scene as at the start of a run.
+    """Return full frames of a cell's camera, each of a random scene like those of runs.
 
     The objects in the camera's view `table` are labelled.
 
@@ -92,7 +92,7 @@ def _render_in_blocks(
 ) -> list[ResultT]:
     """Return the results of `render` for images 0 to `count` - 1, in order, from worker processes."""
     image_numbers, results = range(count), dict[int, ResultT]()
-    blocks = [image_numbers[first : first + BLOCK_SIZE] for first in image_numbers[::BLOCK_SIZE]]
+    blocks = [image_numbers[start : start + BLOCK_SIZE] for start in image_numbers[::BLOCK_SIZE]]
     with WorkerPool(worker_count) as pool:
         for task in as_completed([pool.submit(render, block) for block in blocks]):
             results.update(task.result())
@@ -103,7 +103,7 @@ def _render_in_blocks(
 def _render_samples(
     cells: Sequence[CellConfig], seed: int, image_numbers: range, scene: SceneConfig | None = None
 ) -> Iterator[tuple[int, str, Sample]]:
-    """Yield number, camera and sample of random scenes; without `scene`, scenes vary more than in a run."""
+    """Yield image number, camera name and sample of random scenes; without `scene`, scenes vary more."""
     cv2.setNumThreads(1)
     cameras = [next(iter(cell.cameras)) for cell in cells]
     with contextlib.ExitStack() as stack:
@@ -140,7 +140,7 @@ def _render_frames(
 
 
 def _make_dataset_entry(sample: Sample, split: str, file: str, camera: str) -> DatasetEntry:
-    """Return the dataset entry of a sample, with the ground truth in JSON values for measuring localizers."""
+    """Return the dataset entry of a sample, with the ground truth for evaluations as JSON values."""
     truth = _collect_truth(sample, camera, sample.region)
     truth["matrix"] = sample.matrix.tolist()
     for name, digits in (("positions", 6), ("centres", 6), ("visible_fraction", 4)):
@@ -150,7 +150,7 @@ def _make_dataset_entry(sample: Sample, split: str, file: str, camera: str) -> D
 
 
 def to_labelled_frame(sample: Sample, camera: str, file: str) -> LabelledImage:
-    """Return the full frame of a sample, of which `sample.image` is a scaled part."""
+    """Return the full frame of a sample; `sample.image` is a scaled part of the full frame."""
     assert sample.frame is not None
     height, width = sample.frame.shape[:2]
     left, top, right, _ = sample.region

@@ -26,7 +26,7 @@ EVALUATION_SPLITS = ("test", "valid", "val", "train")
 
 
 class Samples:
-    """Labelled images of a split; of a dataset, the first existing split in `EVALUATION_SPLITS` is used.
+    """Labelled images of a split; a dataset is represented by its first split in `EVALUATION_SPLITS`.
 
     Args:
         folder: Folder of the split or the dataset.

@@ -35,7 +35,7 @@ class Settings:
             may have other classes; None: training starts from random weights.
         learning_rate: Learning rate; None: 1e-4 if `start_model` has the same classes, else 3e-4.
         epochs: Number of passes over the dataset.
-        seed: Seed of initial weights, order of the images and augmentation.
+        seed: Seed of the initial weights, of the order of the images, and of the augmentation.
     """
 
     start_model: Path | None = None
@@ -119,12 +119,12 @@ def _check_inputs(dataset: Path, start_model: Path | None) -> None:
     if not (all(map(Path.is_file, coco_files)) or any(map(Path.is_file, yolo_files))):
         raise InputError(
             f"{dataset} is not a dataset: it needs train/_annotations.coco.json and "
-            "valid/_annotations.coco.json (COCO), or data.yaml (YOLO); a Roboflow export has one of them"
+            "valid/_annotations.coco.json (COCO), or data.yaml (YOLO); a Roboflow export has either format"
         )
     for split in list_splits(dataset):
         read_annotations(split)
 
 
 def _find_validation_split(dataset: Path) -> Path:
-    """Return the folder of the validation split: `valid`, or `val` in some YOLO datasets."""
+    """Return the folder of the validation split: `valid` or `val`; without either, the dataset."""
     return next(path for path in (dataset / "valid", dataset / "val", dataset) if path.is_dir())

@@ -1,4 +1,4 @@
-"""Detector of a cell file that searches single frames outside of a run."""
+"""Detector of a cell file for single frames outside of a run."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from executive.cell.frame import Frame
 from executive.errors import Unavailable
 from executive.perception.detectors.detector_registry import build_detectors
 
-LOOK_INTERVAL = 1.0
-"""Simulated time between two requests [s], as between two frames in a run."""
+REQUEST_INTERVAL = 1.0
+"""Simulated time between two requests [s], similar to the time between two frames in a run."""
 ANSWER_TIMEOUT = 60.0
 """Maximum simulated time from a request to its answer [s]."""
 WHOLE_IMAGE_CAMERA = CameraConfig(
@@ -26,12 +26,12 @@ WHOLE_IMAGE_CAMERA = CameraConfig(
 
 
 class CellDetector:
-    """Detector of a cell file for measurements of its accuracy.
+    """Detector of a cell file for the evaluation of its accuracy.
 
     Args:
-        configs: Detectors of the cell file by name; the measured detector may use other detectors.
-        name: Name of the detector to measure.
-        base: Folder to which paths in the options are relative.
+        configs: Detectors of the cell file by name; the evaluated detector may call other detectors.
+        name: Name of the detector to evaluate.
+        base: Folder to which paths in the options of detectors are relative.
         camera: Camera of the frames; None: the detector searches whole images.
         view: Searched view of `camera`, `table` or `full`.
         classes: Classes of the cell; detections of other classes are dropped, as in a run. None: all classes.
@@ -70,7 +70,7 @@ class CellDetector:
                 self._now += STEP
             answer = request.result()
         finally:
-            self._now += LOOK_INTERVAL
+            self._now += REQUEST_INTERVAL
         latency = (time.perf_counter() - start_time) * 1000
         labels = {entry.label for entry in answer.confident} if self._classes is None else self._classes
         detections = tuple(entry for entry in answer.confident if entry.label in labels)

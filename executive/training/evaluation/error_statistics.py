@@ -29,7 +29,7 @@ class ErrorStatistics:
     Attributes:
         counts_by_object_count: Numbers of fully visible `objects`, `missed` and `confused` objects, and
             `false_detections`, by the number of objects in the image.
-        confusion: Number of objects by true and detected class; both can be `nothing`.
+        confusion: Number of objects by true and detected class; either can be `nothing`.
         centre_errors: Distances of the centres of correct detections from the true centres [pixel].
         position_errors: Distances between detected and true centres in the world, at the height of the
             object, of objects that are completely in the searched region [mm].
@@ -131,7 +131,7 @@ class ErrorStatistics:
             position = intersect_plane(frame.matrix, frame.X_WC, match.detection.centre, true_position[2])
             self.position_errors.append(float(np.linalg.norm(position - true_position) * 1000))
         if self._localizer is not None and "centres" in sample.truth:
-            # Objects without a measured depth are omitted, as in a run.
+            # A run omits objects without a measured depth, too.
             with contextlib.suppress(NoDepth):
                 position = self._localizer.locate(match.detection, frame)
                 true_centre = np.array(sample.truth["centres"][index])
@@ -157,7 +157,7 @@ class RepeatedErrors:
         self._localizer = localizer
         self.error_count = self.repeated_count = 0
         self._random_variances, self._error_products = list[float](), list[float]()
-        """Values for each object and axis, in the image [pixel²] and on the table [m²]."""
+        """Values for each object and axis: variances in the image [pixel²], products on the table [m²]."""
 
     def add(
         self, matches: list[BoxMatch], second_matches: list[BoxMatch], sample: LabelledImage, frame: Frame
@@ -189,7 +189,7 @@ class RepeatedErrors:
 
     @property
     def jitter(self) -> float | None:
-        """Standard deviation of the random error of a box's centre [pixel of the frame]; None if unknown."""
+        """Standard deviation of a box centre's random error [pixel of the frame]; None without a value."""
         return float(np.sqrt(np.mean(self._random_variances))) if self._random_variances else None
 
     @property

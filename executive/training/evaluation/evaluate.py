@@ -55,13 +55,13 @@ def evaluate(
     statistics_of_frames: list[FrameStatistics] = []
     latencies: list[float] = []
     answer_counts: Counter[str] = Counter()
-    unavailable_count, reason = 0, ""
+    unavailable_count, unavailable_reason = 0, ""
     for number, sample in enumerate(samples, 1):
         frame = sample.to_frame(number)
         try:
             answer, latency = detector.detect(frame)
         except Unavailable as error:
-            unavailable_count, reason = unavailable_count + 1, str(error)
+            unavailable_count, unavailable_reason = unavailable_count + 1, str(error)
             continue
         answer_counts[answer.detector] += 1
         latencies.append(latency)
@@ -95,7 +95,7 @@ def evaluate(
         by_class=errors.compute_class_metrics(),
         confusion=errors.make_confusion_matrix(),
         unavailable=unavailable_count,
-        why=reason,
+        why=unavailable_reason,
         answered_by=dict(answer_counts),
         by_count={count: dict(counts) for count, counts in errors.counts_by_object_count.items()},
         reliability=errors.estimate_error_rates(repeated_errors),
@@ -127,7 +127,7 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
     Args:
         model: The ONNX file.
         labels: The text file with the class names.
-        folder: A split, or a dataset of which the first split in `samples.EVALUATION_SPLITS` is used.
+        folder: Folder of a split, or of a dataset (its first split in `samples.EVALUATION_SPLITS`).
         threshold: Minimum confidence of a detection.
 
     Raises:
@@ -142,7 +142,7 @@ class AveragePrecision:
     """Mean average precision over all classes in the images."""
 
     def __init__(self) -> None:
-        # The import takes half a second and 120 MB, so only an evaluation makes it.
+        # The import takes half a second and 120 MB; only an evaluation needs the package.
         import supervision
         from supervision.metrics import MeanAveragePrecision
 
@@ -152,7 +152,7 @@ class AveragePrecision:
         self._has_objects = False
 
     def add(self, detections: Sequence[Detection], sample: LabelledImage) -> None:
-        """Add the detections in one image, which may have any confidence."""
+        """Add the detections in one image; the detections may have any confidence."""
         boxes = [detection.box for detection in detections]
         predicted = self._to_detections(boxes, [detection.label for detection in detections])
         predicted.confidence = np.array([detection.confidence for detection in detections], dtype=float)
@@ -160,7 +160,7 @@ class AveragePrecision:
         self._has_objects |= bool(sample.labels)
 
     def compute(self) -> tuple[float, float]:
-        """Return the value at IoU 0.5, and the mean over IoUs from 0.5 to 0.95; zeros without objects."""
+        """Return mAP at IoU 0.5, and the mean of mAP over IoUs from 0.5 to 0.95; zeros without objects."""
         if not self._has_objects:
             return 0.0, 0.0
         result = self._metric.compute()

@@ -27,7 +27,7 @@ class BoxMatch:
         detection: The detection.
         object_index: Index of the object in `LabelledImage.labels`; None for a false detection.
         is_correct: True if the detection has the class of the object.
-        box: Box of the object, or of a false detection [pixel].
+        box: Box of the object [pixel]; for a false detection, box of the detection.
     """
 
     detection: Detection
@@ -81,7 +81,7 @@ def is_occluded(index: int, matches: Sequence[BoxMatch], sample: LabelledImage) 
 
 
 def is_ignored(detection: Detection, sample: LabelledImage) -> bool:
-    """Return True if a detection shows an ignored object, with a higher IoU than any labelled object."""
+    """Return True if a detection has a higher IoU with an ignored object than with any labelled object."""
     iou = compute_ious([detection.box], sample.ignored_boxes).max(initial=0.0)
     return bool(iou >= MIN_IOU and iou > compute_ious([detection.box], sample.boxes).max(initial=0.0))
 

@@ -15,9 +15,9 @@ from executive.perception.envelope.measurement import StoredErrorRates
 CONFIDENCE_LEVEL = 0.95
 """Confidence level of the upper bounds."""
 MAX_PROPORTION = 0.99
-"""Maximum stored proportion: with a miss rate of 1, a look would give no information."""
+"""Maximum stored proportion: with a miss rate of 1, a frame would give no information."""
 MIN_JITTER = 0.01
-"""Minimum stored jitter [pixel]: with a jitter of 0, the position from one look would be exact."""
+"""Minimum stored jitter [pixel]: with a jitter of 0, a position from one frame would count as exact."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class MeasuredErrorRates:
         confusion_rate: Proportion of wrong classes among the detected, fully visible objects.
         false_detections: Mean number of false detections per image.
         jitter: Standard deviation of the random error of a box's centre, along each axis [pixel].
-        repeated: Laplace estimate of the fraction of errors that a second look from the same pose repeats.
+        repeated: Laplace estimate of the fraction of errors that a second frame from the same pose repeats.
         bias: Standard deviation of the systematic error of a position, along each axis [m].
     """
 
@@ -70,7 +70,7 @@ class MeasuredErrorRates:
 
     @property
     def rates(self) -> StoredErrorRates:
-        """Error rates for the ledger, rounded up: bounds of the counted rates, and the other values."""
+        """Error rates for the ledger, rounded up; each `CountedRate` is replaced by its bound."""
         return StoredErrorRates(
             miss_rate=min(round_up(self.miss_rate.bound), MAX_PROPORTION),
             confusion_rate=min(round_up(self.confusion_rate.bound), MAX_PROPORTION),

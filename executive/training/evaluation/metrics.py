@@ -12,12 +12,12 @@ from executive.perception.envelope.frame_statistics import FrameRange
 from executive.training.evaluation.measured_rates import MeasuredErrorRates
 
 NO_OBJECT = "nothing"
-"""Class name in a confusion matrix for a missed object or a false detection."""
+"""Detected class of a missed object, and true class of a false detection, in a confusion matrix."""
 
 
 @dataclass(frozen=True)
 class Distribution:
-    """Quantiles of a measured quantity, in its unit.
+    """Quantiles of a measured quantity, in the unit of the quantity.
 
     Attributes:
         median, p95, p99, worst: Median, 95th percentile, 99th percentile, and maximum.
@@ -65,18 +65,18 @@ class Evaluation:
         map50: Mean average precision at IoU 0.5 over detections with any confidence.
         map50_95: Mean average precision over IoUs from 0.5 to 0.95.
         centre: Distance between the centres of detected and true box [pixel].
-        position: Distance of these centres, projected into the world at the height of the object [mm].
+        position: Distance between detected and true centre in the world at the object's height [mm].
         localized: Distance between the localizer's position and the true centre of the object [mm].
         latency: Wall time from a frame to its detections [ms], without the first image.
         by_class: Metrics of each class.
-        confusion: Number of objects by true class, then by detected class; both can be `nothing`.
+        confusion: Number of objects by true class, then by detected class; either can be `nothing`.
         unavailable: Number of images without a usable answer of the detector.
         why: Message of the last unusable answer, or "".
         answered_by: Number of answers by name of the answering detector.
         by_count: Numbers of fully visible `objects`, `missed` and `confused` objects, and
             `false_detections`, by the number of objects in the image.
         reliability: Error rates for the ledger; None if there was no answer.
-        frames: Brightness, contrast and colours of the workspace; None if no image shows it as a whole.
+        frames: Brightness, contrast and colours of the workspace; None if no image shows all of it.
     """
 
     threshold: float

@@ -35,9 +35,9 @@ TRUE_COLOUR, DETECTED_COLOUR, OUTLINE_COLOUR = "#56B4E9", "#E69F00", "#000000"
 """Colours of true boxes, of detected boxes, and of the outline around their lines."""
 
 HEADER_BASELINE, TEXT_BASELINE, FILE_BASELINE = 21, 15, 32
-"""Distances of lines of text from the upper side of the header, and of a caption (two lines) [pixel]."""
+"""Baselines of the header text and of both caption lines, from the top of header and caption [pixel]."""
 FONT, FONT_SCALE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
-"""Font of OpenCV, and factor by which its base size is multiplied."""
+"""Font of OpenCV, and scale factor of the base size of the font."""
 
 Picture = NDArray[np.uint8]
 """An image `(H, W, 3)`, RGB."""
