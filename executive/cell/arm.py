@@ -26,9 +26,9 @@ class Goal:
 
     Attributes:
         position: Position of the tool centre point `(x, y, z)` [m].
-        yaw: Rotation about the vertical axis [rad]; None: the planner chooses the rotation.
-        guarded_length: Length of the guarded descent [m]: the slow vertical end of the motion, until the tool
-            touches the target; 0: no guarded descent.
+        yaw: Rotation of the tool about the vertical axis [rad]; None: the planner chooses the rotation.
+        guarded_length: Length of the guarded descent [m]; 0: no guarded descent. The guarded descent is the
+            slow vertical end of the motion, during which the tool may touch the target.
         guarded_speed: Maximum tool speed of the guarded descent [m/s].
     """
 
@@ -58,7 +58,7 @@ class Planning(Protocol):
 
     @property
     def ready(self) -> bool:
-        """True once the motion, or the reason why there is none, is available."""
+        """True once planning has finished, with a motion or with an error that `result` raises."""
 
     def result(self) -> Motion:
         """Return the planned motion; only allowed while `ready` is True.
@@ -78,7 +78,7 @@ class Arm(Protocol):
 
     @property
     def tool_pose(self) -> Pose:
-        """Pose `X_WT` of the tool centre point, from the joint positions; z points out of the tool."""
+        """Pose `X_WT` of the tool centre point in the world; the z axis points out of the tool."""
 
     @property
     def tool_velocity(self) -> Array:
@@ -99,8 +99,8 @@ class Arm(Protocol):
     def plan(self, goal: Goal | str, task: Task = Task()) -> Planning:
         """Start to plan a motion from the current position to a goal, or to a named pose of the cell file.
 
-        The motion is available at once if `plan_ahead` has planned the motion from the current position with
-        equal arguments.
+        The motion is available at once if an earlier call of `plan_ahead` with equal arguments has planned a
+        motion from the current position.
         """
 
     def plan_ahead(self, goal: Goal | str, task: Task = Task()) -> None:

@@ -18,7 +18,7 @@ class Bin:
 
     Attributes:
         name: Name in the cell file.
-        position: Centre of the floor `(3,)` [m].
+        position: Centre of the underside of the floor in the world `(3,)` [m].
         size: Inner length, width and wall height `(3,)` [m].
         slots: Drop positions over the floor `(N, 2)` [m], in the order of their use.
     """
@@ -29,5 +29,5 @@ class Bin:
     slots: Array
 
     def contains(self, position: Array, margin: float = 0.0) -> bool:
-        """Return True if `position` `(3,)` [m] is over the floor or at most `margin` [m] beside it."""
+        """Return True if `position` `(3,)` [m] is above the floor, enlarged by `margin` [m] on each side."""
         return bool(np.all(np.abs(position[:2] - self.position[:2]) <= self.size[:2] / 2 + margin))

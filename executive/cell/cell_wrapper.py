@@ -13,7 +13,7 @@ from executive.cell.workcell import Accounts, Workcell
 
 @dataclass(eq=False)
 class CellWrapper:
-    """Work cell that forwards each call to another work cell; subclasses override single methods.
+    """Work cell that forwards each call to another work cell; a subclass overrides some methods.
 
     Attributes:
         inner: The wrapped work cell.
@@ -53,15 +53,15 @@ class CellWrapper:
         self.after_step()
 
     def visuals(self) -> Visuals | None:
-        """Return shapes and poses for displays, or None if the cell has none."""
+        """Return the shapes and poses of the bodies for displays, or None if the cell has no visuals."""
         return self.inner.visuals()
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return the true object counts at the end, or None if they are unknown."""
+        """Return the true object counts by `AUDIT_KEYS`, or None if the counts are unknown."""
         return self.inner.audit()
 
     def close(self) -> None:
-        """Release all resources."""
+        """Release all resources of the cell."""
         self.inner.close()
 
 

@@ -30,7 +30,7 @@ class Detection:
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Centre of the box [pixel]."""
+        """Centre x and y of the box [pixel]."""
         left, top, right, bottom = self.box
         return (left + right) / 2, (top + bottom) / 2
 
@@ -39,15 +39,15 @@ class Detection:
 class Answer:
     """Detections of a detector in a frame.
 
-    A detector puts all detections into `confident`. Before a skill reads the answer, the cell moves doubtful
-    and unknown detections to the other attributes (`executive.perception.detectors.screening`).
+    A detector puts all detections into `confident`. Before a skill reads the answer, the function
+    `executive.perception.detectors.screening.screen_answer` moves detections to `doubtful` and `unknown`.
 
     Attributes:
         detector: Name of the detector in the cell file.
         confident: Confident detections of known classes, most confident first.
         error_rates: Error rates of the detector.
-        doubtful: Detections below the threshold, or whose second class has more than half the confidence.
-        unknown: Detections above the threshold with labels that the cell file does not declare.
+        doubtful: Detections below the threshold, or with a second class of over half their confidence.
+        unknown: Detections with labels that the cell file does not declare, above the threshold.
     """
 
     detector: str
@@ -57,20 +57,20 @@ class Answer:
     unknown: tuple[Detection, ...] = ()
 
     def describe_doubt(self, detection: Detection) -> str:
-        """Return the message for an answer without confident detections; `detection` is the best one."""
-        threshold, doubt = (
+        """Return the message for an answer without confident detections; `detection` is its best."""
+        threshold, reason = (
             self.error_rates.threshold,
             f"with another class at {detection.second_confidence:.2f}",
         )
         if detection.confidence < threshold:
-            doubt = f"< {threshold:.2f}"
-        best = f"a {detection.label} at {detection.confidence:.2f} {doubt}"
-        return f"detector {self.detector} found nothing certain: at best {best}"
+            reason = f"< {threshold:.2f}"
+        description = f"a {detection.label} at {detection.confidence:.2f} {reason}"
+        return f"detector {self.detector} found nothing certain: at best {description}"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Detections(Answer):
-    """Answer of a detector, with the frame and the region that the detector searched.
+    """Answer of a detector, with the searched frame and the searched region of its image.
 
     Attributes:
         frame: The searched frame.
@@ -85,12 +85,12 @@ class Detections(Answer):
     def is_in_area(self, points: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the world points `(N, 3)` [m] in the searched region of the image.
 
-        `margin` is the minimum distance of a pixel from the border of the region [pixel].
+        `margin` is the minimum distance of a projected point from the border of the region [pixel].
         """
         return self.frame.is_in_area(points, self.area, margin)
 
     def is_searched(self, points: Array) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the world points `(N, 3)` [m] at which a whole object is visible."""
+        """Return a mask `(N,)` of the world points `(N, 3)` [m] that are searched and unoccluded."""
         return self.is_in_area(points) & self.frame.is_unoccluded(points)
 
 
@@ -102,8 +102,8 @@ class Observation:
         detection: The detection.
         position: Centre of the object `(3,)` [m] in the world.
         std: Standard deviation of the random error of the position along each axis [m].
-        is_confident: False if the detection is doubtful (`Answer.doubtful`) or has a contradiction.
-        contradiction: Sentence with evidence of size or height against the detected class, or "".
+        is_confident: False if the detection is in `Answer.doubtful`, or if `contradiction` is not empty.
+        contradiction: Sentence that states how size or height contradict the detected class; "" if neither.
     """
 
     detection: Detection

@@ -14,7 +14,7 @@ Box = tuple[float, float, float, float]
 """Left, top, right and bottom side [pixel] of a box in an image; pixel i covers [i, i + 1)."""
 
 TYPICAL_OBJECT_POINTS = 0.03 * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
-"""Centre of a typical object and four points of the outline, relative to the centre `(5, 3)` [m]."""
+"""Centre of a typical object and four points of its outline, relative to the centre `(5, 3)` [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +24,14 @@ class Frame:
     Attributes:
         id: Number of the frame in this run, unique over all cameras.
         camera: Name of the camera.
-        image: `(H, W, 3)` uint8, RGB.
-        depth: `(H, W)` [m] along the optical axis, NaN for pixels without a measurement; None for a camera
-            without depth.
+        image: Image `(H, W, 3)` uint8, RGB.
+        depth: Depth image `(H, W)` [m] along the optical axis, NaN for pixels without a measurement; None
+            for a camera without a depth sensor.
         matrix: Camera matrix `(3, 3)` [pixel].
         X_WC: Camera pose in the world at capture, in the convention of OpenCV (z forward, y down).
         stamp: Capture time on the clock of the run [s].
-        visible: `(H, W)` bool, False for pixels that the arm may occlude, by the kinematics of the arm.
-        change_count: Number of changes of the table by the robot before the capture (`Ledger`).
+        visible: Mask `(H, W)`, False for pixels that the arm may occlude at its measured joint positions.
+        change_count: Value of `Ledger.change_count` at capture.
     """
 
     id: int
@@ -53,12 +53,12 @@ class Frame:
         return float(crop.mean()) if crop.size else 0.0
 
     def is_in_area(self, points: Array, area: Box, margin: float = 0.0) -> NDArray[np.bool_]:
-        """Return a mask `(N,)` of the world points in a region of the image.
+        """Return a mask `(N,)` of the points whose projections lie in a region of the image.
 
         Args:
             points: Points in the world `(N, 3)` [m].
             area: Region of the image [pixel].
-            margin: Minimum distance of a pixel from the border of the region [pixel].
+            margin: Minimum distance of a projection from the border of the region [pixel].
         """
         pixels, is_in_front = self._project(points)
         left, top, right, bottom = area
@@ -91,7 +91,7 @@ class Frame:
         return matrix, X_CW.rotation_vector, X_CW.position
 
     def _project(self, points: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the pixels `(N, 2)` of points `(N, 3)` [m], and a mask of the points before the camera."""
+        """Return the pixels `(N, 2)` of points `(N, 3)` [m], and a mask of points in front of the camera."""
         projected = self.X_WC.inverse().apply(points) @ self.matrix.T
         depth = projected[:, 2:]
         # A division by infinity avoids warnings for points behind the camera.

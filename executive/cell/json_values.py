@@ -16,17 +16,17 @@ from executive.cell.frame import Frame
 from executive.geometry import Pose
 
 DECIMAL_PLACES = 6
-"""Number of decimal places of floats: a micrometre, a microradian, a microsecond."""
+"""Number of decimal places of floats; the last is a micrometre, a microradian or a microsecond."""
 
 MAX_INTEGER_BITS = 2048
-"""Maximum size of an integer that is written as a number [bit]: 617 digits; every Python reads 640 digits."""
+"""Maximum size of an integer that is written as a number [bit]: 617 digits; Python always reads 640."""
 
 
 def to_json(value: Any) -> Any:
     """Return `value` converted to types that `json.dumps` accepts and every JSON parser can read.
 
     Floats are rounded to `DECIMAL_PLACES`. A frame is converted without its image. Infinities, NaN and
-    integers beyond `MAX_INTEGER_BITS` become text. Characters that are not UTF-8 are escaped.
+    integers beyond `MAX_INTEGER_BITS` become text. Lone surrogates are escaped, as UTF-8 cannot encode them.
     """
     return _find_converter(value.__class__)(value)
 
@@ -34,7 +34,7 @@ def to_json(value: Any) -> Any:
 def to_json_or_type_name(value: Any) -> Any:
     """Return the result of `to_json`, or the name of the type if the value cannot be converted.
 
-    An output of a skill can have any type; the run must not end if the output cannot be converted.
+    A skill output can have any type, and an output without a conversion must not end the run.
     """
     try:
         return to_json(value)
@@ -57,7 +57,7 @@ def _round_number(value: Any) -> float | str:
     number = float(value)
     if not math.isfinite(number):
         return str(number)
-    # The addition of zero turns -0.0 into 0.0; both are equal, but print differently.
+    # The addition of zero turns -0.0 into 0.0, so that equal numbers have the same text.
     return round(number, DECIMAL_PLACES) + 0.0
 
 

@@ -1,4 +1,4 @@
-"""Bins, object classes, heights and shapes, computed from a cell file."""
+"""Bins, object classes, heights and boxes of bin walls, computed from a cell file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Vector3 = tuple[float, float, float]
 TOOL_RADIUS = 0.012
 """Radius of the body of the tool [m]."""
 NECK_LENGTH = 0.015
-"""Length of the thin part at the end of the tool, which has the radius of the cup [m]."""
+"""Length of the thin end of the tool [m]; the thin end has the radius of the cup."""
 
 
 def build_bin(name: str, config: BinConfig) -> Bin:
@@ -27,7 +27,7 @@ def build_bin(name: str, config: BinConfig) -> Bin:
     columns, rows = config.slots
     x = position[0] + size[0] * ((np.arange(columns) + 0.5) / columns - 0.5)
     y = position[1] + size[1] * ((np.arange(rows) + 0.5) / rows - 0.5)
-    slots = np.array([[column, row] for column in x for row in y])
+    slots = np.array([[slot_x, slot_y] for slot_x in x for slot_y in y])
     return Bin(name, position, size, slots)
 
 
@@ -44,15 +44,15 @@ def compute_travel_height(config: CellConfig) -> float:
 
 
 def compute_max_pile_height(config: CellConfig) -> float:
-    """Return the maximum height of a pile on the table [m], which has two objects if stacks occur."""
+    """Return the maximum height of a pile on the table [m]: two objects if `stacked` is above 0, else one."""
     max_height = max(section.height for section in config.objects.values())
     return 2 * max_height if config.table.stacked else max_height
 
 
 def list_bin_boxes(size: Vector3) -> Sequence[tuple[Vector3, Vector3]]:
-    """Return a box, as half extents and centre, for the floor and for each wall of a bin.
+    """Return half extents and centre of each box of a bin: the floor and the four walls [m].
 
-    `size` contains length, width and height [m]; centres are relative to `Bin.position` [m].
+    `size` is `Bin.size`: length, width and height [m]. Centres are relative to `Bin.position`.
     """
     (length, width, height), thickness = size, BIN_THICKNESS
     wall_x, wall_y, wall_z = (length + thickness) / 2, (width + thickness) / 2, height / 2
@@ -66,7 +66,7 @@ def list_bin_boxes(size: Vector3) -> Sequence[tuple[Vector3, Vector3]]:
 def find_unreachable_places(
     config: CellConfig, require_reachable: Callable[[Array, float], None]
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Yield the key in the cell file and a message for each bin or safe place that the arm cannot reach.
+    """Yield key in the cell file and message for each place (bin or safe place) that the arm cannot reach.
 
     `require_reachable` is a function of a position `(2,)` [m] and of the height of the surface below the
     position [m]. The function raises `Unreachable` if the arm cannot reach the position.

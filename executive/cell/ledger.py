@@ -20,21 +20,21 @@ class Ledger(Protocol):
 
     @property
     def unknown_labels(self) -> Mapping[str, int]:
-        """Maximum number of boxes in a frame, by label, for labels that the cell file does not declare."""
+        """Maximum number of boxes per frame, by label, of the labels that the cell file does not declare."""
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
         """Update all items with the detections in a frame, and return the targets (`find_targets`).
 
-        The ledger ignores detections in a frame that has already been searched, and detections at positions
-        where the robot has moved objects since the capture.
+        The ledger ignores all detections in a frame of an earlier call, and detections at positions where the
+        robot has moved objects since the capture of the frame.
 
         Args:
-            detections: The frame, the searched region, and the error rates of the detector.
-            observations: The localized detections.
+            detections: Detections with their frame, its searched region, and the detector's error rates.
+            observations: The same detections, localized in the world.
         """
 
     def find_targets(self) -> Sequence[Target]:
-        """Return a target for each item that is still to be sorted, and whose position is known."""
+        """Return a target for each item that still has to be sorted and has a known position."""
 
     def find_objects_on_table(self) -> Sequence[Target]:
         """Return all items that lie on the table with a probability of at least 0.5."""
@@ -46,13 +46,13 @@ class Ledger(Protocol):
         """Return the item in the tool, or None."""
 
     def is_current(self, frame: Frame) -> bool:
-        """Return False if the robot may have moved all objects on the table since the capture of a frame."""
+        """Return False if an action since the capture of a frame may have moved all objects on the table."""
 
     def is_fresh(self, target: Target) -> bool:
         """Return False if the robot may have moved a target since its last detection."""
 
     def is_open(self, item: Item) -> bool:
-        """Return True if an item is still to be sorted: on the table or dropped, and not rejected."""
+        """Return True if an item still has to be sorted: it is on the table or dropped, but not rejected."""
 
     def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough to pick it."""
@@ -77,7 +77,7 @@ class Ledger(Protocol):
 
         Args:
             item: The item.
-            contradiction: Sentence that the height of the touch contradicts the class, or "".
+            contradiction: Sentence that states how the height of the touch contradicts the class, or "".
             may_miss_top: True if the cup may have touched the object below its top.
         """
 

@@ -21,7 +21,7 @@ class Target:
         position: Centre of the object `(3,)` [m] in the world, at half the height of its class.
         confidence: Confidence of the last detection, 0 to 1.
         frame: Id of the last frame that showed the item.
-        change_count: Number of changes of the table by the robot before the capture.
+        change_count: Value of `Ledger.change_count` at the capture of that frame.
         stamp: Capture time of the last frame that showed the item [s].
     """
 
@@ -43,7 +43,7 @@ class ObjectClass:
         height: Height of the object as it lies on the table [m].
         radius: Radius of the circle around the outline of the object, seen from above [m].
         ring: Distance of the contact point from the centre [m]; above 0 only for parts with a hole.
-        mass: Mass [kg].
+        mass: Mass of the object [kg].
     """
 
     label: str
@@ -71,10 +71,10 @@ class Obstacle:
     """An upright cylinder on the table that the arm must avoid.
 
     Attributes:
-        x, y: Position of the axis [m].
-        radius: Radius [m].
-        top: Height of the upper end [m].
-        name: Name in error messages.
+        x, y: Position of the axis in the world [m].
+        radius: Radius of the cylinder [m].
+        top: Height of the upper end in the world [m].
+        name: Name of the obstacle in error messages.
     """
 
     x: float

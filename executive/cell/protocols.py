@@ -22,7 +22,7 @@ Steps = Iterator[None]
 """Iterator that yields None once per control step, until a call is finished."""
 
 Routes = Mapping[str, tuple[str, ...]]
-"""Names of the permitted bins by class label, in the order of the mission."""
+"""Names of the permitted bins of each class, by class label, in the order of the mission file."""
 
 
 class Clock(Protocol):
@@ -67,7 +67,7 @@ class Camera(Protocol):
 
     @property
     def name(self) -> str:
-        """Name in the cell file."""
+        """Name of the camera in the cell file."""
 
     @property
     def scan_poses(self) -> Sequence[str]:
@@ -90,11 +90,11 @@ class Camera(Protocol):
 
 
 class Request(Protocol):
-    """Running or finished search of a frame by a detector."""
+    """Running or finished detection of objects in a frame."""
 
     @property
     def ready(self) -> bool:
-        """True once the answer, or the reason why there is none, is available."""
+        """True once the detector has finished, with an answer or with an error that `result` raises."""
 
     def result(self) -> Answer:
         """Return the answer of the detector; only allowed while `ready` is True.
@@ -106,14 +106,14 @@ class Request(Protocol):
 
 
 class Detector(Protocol):
-    """Finds objects in frames, in parallel with the control loop."""
+    """A detector of objects in frames, which runs in parallel with the control loop."""
 
     def request(self, frame: Frame, view: str) -> Request:
-        """Start to search a view of a frame: `table` (the workspace) or `full` (the whole image)."""
+        """Start detection in a view of a frame: `table` (the workspace) or `full` (the whole image)."""
 
 
 class Localizer(Protocol):
-    """Computes the positions of detected objects in the world."""
+    """Computation of the positions of detected objects in the world."""
 
     def locate(self, detection: Detection, frame: Frame) -> Array:
         """Return the centre `(3,)` [m] of the detected object in the world.
@@ -173,16 +173,16 @@ class Cell:
         tool: The tool at the flange of the arm.
         camera: The camera that sees the table.
         detectors: Detectors by name; the first is the default.
-        ledger: The items of the run.
+        ledger: The ledger, which tracks the items of the run.
         operator: The person or script that requests classes of objects.
         bins: Bins by name.
         classes: Known properties of each class of objects, by label.
         routes: Names of the permitted bins by class label, from the mission.
-        localizer: Computes the positions of detections.
+        localizer: The localizer, which computes the positions of detected objects.
         safe_place: Position on the table for putting down a held object `(3,)` [m].
         descent: Height above the expected surface at which the guarded descent of an approach starts [m].
         descent_speed: Tool speed of the guarded descent [m/s].
-        report_selection: Reports a target that a skill has selected, and the name of its bin, to the run.
+        report_selection: Function that reports a selected target and the name of its bin to the run.
     """
 
     clock: Clock

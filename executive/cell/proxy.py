@@ -25,9 +25,9 @@ _PROTOCOLS: Mapping[str, type] = {
     "operator": Operator,
     "localizer": Localizer,
 }
-"""Protocol of each role, which is an attribute of `Cell` or an object that a part returns."""
+"""Protocol by role: role of a part of the cell, or of an object that a part returns."""
 _RETURNED_ROLES = {"arm.plan": "plan", "detector.request": "request"}
-"""Role of the object that a call returns, by `Access.name`; a proxy of the object is returned."""
+"""Role of the object that a call returns, by `Access.name`; the caller receives a proxy of the object."""
 
 IS_METHOD: Mapping[str, Mapping[str, bool]] = {
     role: {name: callable(member) for name, member in vars(protocol).items() if not name.startswith("_")}
@@ -45,8 +45,8 @@ class Access:
         detector: Name of the detector for the roles `detector` and `request`, otherwise "".
         member: Name of the attribute or method.
         proceed: Function that performs the access on the part itself and returns the result.
-        arguments: Positional arguments of the call.
-        keywords: Keyword arguments of the call.
+        arguments: Positional arguments of the call; () for an attribute.
+        keywords: Keyword arguments of the call by name.
     """
 
     role: str
@@ -104,7 +104,7 @@ class _Proxy:
 
     def __getattr__(self, member: str) -> Any:
         if member.startswith("_") or member not in IS_METHOD[self._role]:
-            # The underscore is tested first, because `copy` reads private names before `_role` is set.
+            # The underscore is tested first: `copy` reads private names before `_role` has a value.
             raise AttributeError(f"{type(self).__name__} has no attribute {member!r}")
         if IS_METHOD[self._role][member]:
             return partial(self._call, member)

@@ -1,6 +1,6 @@
 """Shapes and true poses of the bodies in a cell, for displays.
 
-Skills know the objects from camera images only.
+Skills have no access to true poses; they detect objects in camera images.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class Shape:
 
     Attributes:
         body: Name of the body; "" for a shape that never moves.
-        kind: `box`, `cylinder`, `sphere` or `mesh`.
+        kind: Kind of shape: `box`, `cylinder`, `sphere` or `mesh`.
         size: Size along x, y and z [m]; for a mesh, scale factors along x, y and z.
         X_BS: Pose of the shape in the frame of the body.
         colour: Colour of the surface.
-        file: File of a mesh, with the suffix of its format; "" for other kinds.
+        file: Path of the file of a mesh, with the suffix of its format; "" for other kinds.
     """
 
     body: str

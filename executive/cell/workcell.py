@@ -13,28 +13,28 @@ from executive.events import Emit, ItemChanged
 
 AUDIT_KEYS = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
 """Keys of the object counts of an audit: objects in permitted bins, in other bins, left on the table, and
-elsewhere. The last two counts are subsets: objects that fell into a wrong bin, and undetected objects."""
+elsewhere. The last two keys count subsets: objects that fell into a wrong bin, and undetected objects."""
 
 
 class Accounts(Protocol):
-    """Ledger with the methods for the end and for the resumption of a run."""
+    """Ledger with the methods that are called at the end and at the resumption of a run."""
 
     def close(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the tree succeeded."""
 
     def reopen(self) -> None:
-        """Discard the items on the table; the next look adds a new item for each visible object."""
+        """Discard the items on the table; the next frame adds a new item for each detected object."""
 
     def count_states(self) -> dict[str, int]:
-        """Return the number of items by final state; the key `seen` counts all items except phantoms."""
+        """Return the number of items by final state; `seen` counts all items whose state is not `phantom`."""
 
     @property
     def unknown_labels(self) -> Mapping[str, int]:
-        """Maximum number of boxes in a frame, by label, for labels that the cell file does not declare."""
+        """Maximum number of boxes per frame, by label, of the labels that the cell file does not declare."""
 
     @property
     def assumption_reasons(self) -> Sequence[str]:
-        """Reasons why error rates of detectors were assumed, and not measured."""
+        """Reasons why error rates of detectors were assumed instead of measured."""
 
     def list_items(self) -> Sequence[ItemChanged]:
         """Return the current state of each item, in the order of the first detection."""
@@ -57,7 +57,7 @@ class Workcell(Protocol):
 
     @property
     def last_command(self) -> int:
-        """Control step of the last start of a motion or command to the tool.
+        """Control step at which the cell last started a motion or received a command to the tool.
 
         The step is 0 before the first command, and after an interruption that makes the step unknown.
         """
@@ -75,10 +75,10 @@ class Workcell(Protocol):
         """Execute one control step."""
 
     def visuals(self) -> Visuals | None:
-        """Return shapes and poses for displays, or None if the cell has none."""
+        """Return the shapes and poses of the bodies for displays, or None if the cell has no visuals."""
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return the true object counts by `AUDIT_KEYS`, or None if they are unknown, as on hardware."""
+        """Return the true object counts by `AUDIT_KEYS`, or None if the counts are unknown (hardware)."""
 
     def close(self) -> None:
         """Release all resources; the cell is unusable afterwards."""
@@ -90,8 +90,8 @@ class ResumePoint:
 
     Attributes:
         log_path: Log file that `log_to` started, from which the simulated world is reconstructed.
-        frame_count: Number of captured frames.
-        pose_count: Number of calls of `Camera.next_pose`.
+        frame_count: Number of frames captured before the interruption.
+        pose_count: Number of calls of `Camera.next_pose` before the interruption.
     """
 
     log_path: Path
@@ -123,7 +123,7 @@ KeyPath = tuple[str | int, ...]
 
 
 class CellKind(Protocol):
-    """A class of work cells; its name is an entry point of the group `executive.cells`."""
+    """A factory of one kind of work cells: an entry point of the group `executive.cells`."""
 
     def __call__(
         self, config: Any, *, seed: int, routes: Routes, emit: Emit, options: CellOptions
@@ -131,13 +131,13 @@ class CellKind(Protocol):
         """Return a cell for a cell file (`executive.cell.config.CellConfig`)."""
 
     def check(self, config: Any, base: Path) -> Iterable[tuple[KeyPath, str]]:
-        """Return the errors of a cell file that passes validation, each with its key and a message.
+        """Yield key and message of each error that the validation of the cell file does not find.
 
         `base` is the folder to which paths in the file are relative.
         """
 
     def labels(self, config: Any, base: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return the labels that each detector of a cell file can find, by name of the detector.
+        """Return the labels that each detector of a cell file can report, by name of the detector.
 
         The labels of a detector are None if they are unknown before its first answer. Errors in the file are
         ignored, because `check` reports errors.

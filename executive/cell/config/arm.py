@@ -9,13 +9,13 @@ from pydantic import Field, model_validator
 from executive.cell.config.section import MIN_LENGTH, Angle, Distance, Force, Length, Name, Section
 
 MIN_JOINT_RANGE = 2.0
-"""Minimum range of a joint position [degree]; a joint with a smaller range is fixed."""
+"""Minimum range of a joint's positions [degree]; a joint with a smaller range is regarded as fixed."""
 Speed = Annotated[float, Field(ge=1, le=1000)]
 """Joint velocity [degree/s]; the fastest arms reach 1000 degree/s."""
 Acceleration = Annotated[float, Field(ge=0.1, le=1000)]
-"""Joint acceleration [rad/s²]; below 0.1, a motion takes minutes, and the fastest arms reach about 100."""
+"""Joint acceleration [rad/s²]; at 0.1 rad/s², a motion takes minutes; the fastest arms reach 100 rad/s²."""
 Jerk = Annotated[float, Field(ge=1, le=1e5)]
-"""Joint jerk [rad/s³]; the bounds reach 0.1 rad/s² in 0.1 s and 1000 rad/s² in 0.01 s."""
+"""Joint jerk [rad/s³]; the minimum reaches 0.1 rad/s² in 0.1 s, the maximum 1000 rad/s² in 0.01 s."""
 
 
 class LimitsConfig(Section):

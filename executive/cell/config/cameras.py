@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from executive.cell.config.section import Distance, Fraction, Length, Name, Natural, Section, Vector
 
 Pixels = Annotated[float, Field(ge=-1e5, le=1e5)]
-"""An entry of a camera matrix [pixel]; with a focal length of 100,000, 640 pixels span 0.4 degrees."""
+"""An entry of a camera matrix [pixel]; at a focal length of 100,000 pixels, 640 pixels span 0.4 degrees."""
 Row = tuple[Pixels, Pixels, Pixels]
 """A row of a camera matrix."""
 RotationComponent = Annotated[float, Field(ge=-7, le=7)]
@@ -71,10 +71,10 @@ class CalibrationConfig(Section):
     matrix: tuple[Row, Row, Row]
     """[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] [pixel]; as in OpenCV, pixel centres have integer coordinates."""
     mount_to_camera: TransformConfig | None = None
-    """Transformation of points from the mount, which is the world (fixed camera) or the flange (wrist
-    camera), to the camera, as from `cv2.solvePnP`."""
+    """Transformation of points into the camera frame, from the world frame (fixed camera) or the flange
+    frame (wrist camera), for instance from `cv2.solvePnP`."""
     camera_to_mount: TransformConfig | None = None
-    """Inverse of `mount_to_camera`, as from `cv2.calibrateHandEye`; exactly one of the two is required."""
+    """Inverse of `mount_to_camera`, for instance from `cv2.calibrateHandEye`; exactly one key is required."""
 
     @model_validator(mode="after")
     def _check_matrix_and_pose(self) -> CalibrationConfig:

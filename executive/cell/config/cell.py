@@ -62,12 +62,12 @@ class CellConfig(Section):
     """Name of the detector that skills use by default; if not given, the first of `detectors`."""
     detectors: dict[Name, DetectorConfig] = Field(min_length=1)
     """Detectors by name. A detector of the base file keeps the keys that this file does not override, is
-    replaced if this file declares another kind, and is removed by its name without a value."""
+    replaced if this file declares another kind, and is removed if its name has no value in this file."""
     localization: Literal["plane", "depth", "ray"] = "plane"
-    """Source of the height of a detected object: `plane`, its class; `depth`, the depth image; `ray`, a ray
-    test of the simulator."""
+    """Source of the height of a detected object: `plane`, the height of its class; `depth`, the depth image;
+    `ray`, a ray test of the simulator."""
     objects: dict[Name, ObjectConfig] = Field(min_length=1)
-    """Classes of objects by label, as the detectors report it."""
+    """Classes of objects by the label that the detectors report."""
     ledger: LedgerConfig = LedgerConfig()
     """Thresholds of the ledger, which tracks the objects."""
     safe_place: Vector

@@ -18,20 +18,20 @@ class DetectorConfig(Section):
     kind: str
     """Kind of detector: the name of an entry point of the group `executive.detectors`."""
     threshold: float = Field(0.5, gt=0, lt=1)
-    """Minimum confidence of a detection that is not doubtful."""
+    """Confidence below which a detection is doubtful, 0 to 1."""
     floor: float = Field(0.25, gt=0, lt=1)
-    """Minimum confidence of a box; boxes with a lower confidence are ignored."""
+    """Minimum confidence of a detection; detections with a lower confidence are discarded."""
     latency: Seconds = 0.05
     """Time from the frame to the answer, on the clock of the run [s]."""
     miss_rate: float = Field(0.03, gt=0, lt=1)
-    """Fraction of the completely visible objects that the search of a frame misses. The keys `miss_rate`,
-    `confusion_rate`, `false_detections` and `jitter` are for fake detectors; others are measured."""
+    """Fraction of the completely visible objects that a fake detector misses in a frame. For other kinds of
+    detectors, measurements replace `miss_rate`, `confusion_rate`, `false_detections` and `jitter`."""
     confusion_rate: float = Field(0.004, gt=0, lt=1)
-    """Fraction of the found objects that get a wrong class."""
+    """Fraction of the detected objects that get a wrong class."""
     false_detections: float = Field(0.02, gt=0, le=100)
-    """Mean number of false detections per frame."""
+    """Mean number of false detections (false positives) per frame."""
     jitter: float = Field(1.0, gt=0, le=1000)
-    """Standard deviation of the random error of the centre of a box, along each axis [pixel]."""
+    """Standard deviation of the random error of a box's centre, along each axis of the image [pixel]."""
 
     @model_validator(mode="after")
     def _check_floor(self) -> DetectorConfig:

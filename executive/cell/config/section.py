@@ -48,7 +48,7 @@ Coordinate = Annotated[float, Field(ge=-MAX_LENGTH, le=MAX_LENGTH)]
 Count = Annotated[int, Field(ge=1, le=1000)]
 """A positive number of objects; no bin, table or image has more than 1000 objects."""
 Natural = Annotated[int, Field(ge=0, le=1000)]
-"""A number that may be 0."""
+"""An integer that may be 0."""
 Range = Annotated[tuple[Coordinate, Coordinate], AfterValidator(check_ascending)]
 """Minimum and maximum coordinate [m]."""
 Vector = tuple[Coordinate, Coordinate, Coordinate]
