@@ -26,7 +26,7 @@ class FinalObject:
         rest_positions: Positions of the object `(3,)` [m] at the start, and after each move and each fall.
         is_dropped: True if the object fell from the tool and has not been picked up since.
         is_held: True if the tool holds the object.
-        is_removed: True if the object was removed from the world; `bin` is then its bin before the removal.
+        is_removed: True if the object was removed from the world; `bin` is then the bin before the removal.
     """
 
     label: str
@@ -44,7 +44,7 @@ def audit_objects(
 
     `right` and `wrong_bin` count objects in permitted and in other bins. `left` counts objects on the table
     and the held object. `elsewhere` counts objects below the table, and objects that fell into a wrong bin,
-    which `fell_in_wrong_bin` counts too. `unseen` counts objects without a ledger item first seen near them.
+    which `fell_in_wrong_bin` counts too. `unseen` counts objects near which no ledger item was first seen.
     A removed object counts only if it was seen: as `elsewhere`, unless the tool placed the object in a bin.
     An unseen object without a class counts only if it is in a wrong bin, and never as `unseen`.
 
@@ -52,7 +52,7 @@ def audit_objects(
         objects: The objects of the world, including removed objects.
         records: The items of the ledger.
         routes: Names of the permitted bins of each class.
-        max_distance: Maximum horizontal distance from the first position of an item to its object [m].
+        max_distance: Maximum horizontal distance between the first position of an item and its object [m].
     """
     counts = dict.fromkeys(AUDIT_KEYS, 0)
     first_positions = [record.first_position for record in records if record.state is not State.PHANTOM]

@@ -16,16 +16,16 @@ class CellMinTimes:
 
     def __init__(self, config: CellConfig, touch_distance: float, max_excess_height: float = 0.0) -> None:
         self._config = config
-        self._max_shortening = touch_distance + max_excess_height
+        self._max_descent_shortening = touch_distance + max_excess_height
 
     @property
     def descent_time(self) -> float:
-        """Minimum time of a guarded descent [s], which an object above its expected height shortens."""
+        """Minimum time [s] of a guarded descent onto an object, which may be above its expected height."""
         motion = self._config.motion
-        return max(0.0, motion.descent - self._max_shortening) / motion.descent_speed
+        return max(0.0, motion.descent - self._max_descent_shortening) / motion.descent_speed
 
     def get_transport_time(self, bin: str | None) -> float:
-        """Return the minimum time to transport an object to a bin, or for None to the nearest bin [s].
+        """Return the minimum time [s] to transport an object to `bin`, or to the nearest bin if it is None.
 
         The time is 0 for a bin that the cell lacks or that the arm does not reach.
         """
@@ -33,7 +33,7 @@ class CellMinTimes:
         return min(map(self._compute_min_transport_time, names), default=0.0)
 
     def get_answer_time(self, detector: str) -> float:
-        """Return the latency of a detector, or for "" of the first detector [s]; 0 without the detector."""
+        """Return the latency of a detector [s], "" for the first one; 0 if the cell lacks the detector."""
         detectors = self._config.detectors
         config = detectors.get(detector or next(iter(detectors)))
         return config.latency if config else 0.0

@@ -24,7 +24,7 @@ class CellWithoutHardware:
     """Clock, bins, classes and ledger of a cell; implements `executive.cell.workcell.Workcell`.
 
     Arm, tool, camera, detectors and localizer of `cell` are None until a subclass adds them. A replay uses
-    the class without a subclass.
+    this class itself.
 
     Args:
         config: The cell file.
@@ -37,7 +37,7 @@ class CellWithoutHardware:
         config: The cell file.
         routes: Names of the permitted bins of each class.
         accounts: The ledger of the run.
-        cell: The cell as skills use it.
+        cell: The interface of the cell for skills.
         steps: Number of control steps since the start of the run.
         last_command: Control step of the last logged command to arm or tool; 0 if there is none.
     """

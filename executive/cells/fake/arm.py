@@ -59,7 +59,7 @@ class FakeArm:
 
     Attributes:
         poses: Tool pose of each named pose; a run begins at `home`.
-        next_obstacle: Obstacle that stops the arm in the middle of its next motion, or None; set by tests.
+        next_obstacle: Name of an obstacle in the middle of the next motion, or None; set by tests.
         commands: Names of the executed commands, `start` or `stop`, in order, for tests.
     """
 
@@ -112,7 +112,7 @@ class FakeArm:
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
         """Begin to plan a motion to a goal or a named pose; a plan from `plan_ahead` is complete at once.
 
-        The result raises Unreachable for a goal beyond `MAX_REACH` from the base, and Blocked if the tool tip
+        The plan raises Unreachable for a goal beyond `MAX_REACH` from the base, and Blocked if the tool tip
         or the load would enter the table or a bin, even on the guarded part of the motion.
         """
         return self._plans.plan(self.destination, goal, task)
@@ -170,7 +170,7 @@ class FakeArm:
     def _find_load_collision(self, pose: Pose) -> Collision | None:
         """Return the collision of the held object on the way to `pose`, or None.
 
-        A plan without `task.load` did not check the held object.
+        A plan for a task without a load has not checked the held object.
         """
         held = self._world.held_object
         if held is None:
@@ -191,7 +191,7 @@ class FakeArm:
         raise Blocked(message)
 
     def _generate_paths(self, start: Array, goal: Goal | str) -> Iterator[list[Pose]]:
-        """Yield candidate paths: for a named pose first a straight path, then a path at travel height."""
+        """Yield paths: for a named pose a straight path, then for any goal a path at travel height."""
         raised_position = np.array([*start[:2], max(start[2], self._travel_height)])
         if isinstance(goal, str):
             end = self.poses[goal]
@@ -293,12 +293,12 @@ def check_reachable(position: Array) -> None:
 
 
 def find_places_out_of_reach(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each bin and safe place of the cell file beyond `MAX_REACH`."""
+    """Yield key and message for each bin beyond `MAX_REACH`, and for a safe place beyond `MAX_REACH`."""
     height = compute_travel_height(config)
     return find_unreachable_places(config, lambda place, _: check_reachable(np.array([*place, height])))
 
 
 def _make_straight_path(start: Array, end: Array, rotation: Array, speed: float) -> list[Pose]:
-    """Return the tool poses on the line from `start` (without its pose) to `end` `(3,)` [m]."""
+    """Return the tool pose after each control step from `start` to `end` `(3,)` [m] at `speed` [m/s]."""
     count = math.ceil(float(np.linalg.norm(end - start)) / speed / STEP)
     return [Pose(rotation, start + (end - start) * (i + 1) / count) for i in range(count)]

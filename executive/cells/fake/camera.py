@@ -112,7 +112,7 @@ class FakeDetector:
         config: Section of the detector in the cell file.
         world: The world with the true objects.
         clock: Clock of the run.
-        get_view_region: Returns the region of the image of a view, which is `table` or `full` [pixel].
+        get_view_region: Returns the image region [pixel] of a view, which is `table` or `full`.
         make_answer: Returns the detections, or a message if the detector is unavailable. Its arguments are
             the number of the request (from 1) and the true detections.
         request_count: Number of requests so far.
@@ -149,7 +149,7 @@ class FakeDetector:
         """Do nothing: the detector holds no resources."""
 
     def _make_detection(self, label: str, column: float, row: float, scale: float) -> Detection:
-        """Return the detection of an object around the pixel of its centre, for a scale [pixel/m]."""
+        """Return the detection of an object from the pixel of its centre and the image scale [pixel/m]."""
         half_side = scale * self.world.classes[label].radius
         box = (column - half_side, row - half_side, column + half_side, row + half_side)
         return Detection(label, max(DEFAULT_CONFIDENCE, self.config.threshold), box)

@@ -53,11 +53,11 @@ class FakeCell(CellWithoutHardware):
     straight lines, table and bins are obstacles, the tool always seals, and every detector finds all objects.
 
     Args:
-        config: The cell file; by default `load_empty_cell`.
+        config: The cell file; by default the result of `load_empty_cell`.
         seed: Random seed for the classes and positions of the objects.
         routes: Names of the permitted bins of each class.
         emit: Receives the events of the cell.
-        options: Options of the run; by default with an operator without requests.
+        options: Options of the run; by default, the operator requests nothing.
 
     Attributes:
         world: Objects and bins.
@@ -66,7 +66,7 @@ class FakeCell(CellWithoutHardware):
         camera: The fake camera.
         detectors: The fake detectors by name.
         detector: The first detector.
-        ledger: The ledger of the run.
+        ledger: The ledger of the run, the same object as `accounts`.
 
     Raises:
         InputError: The workspace has no room for the objects, or `options` request a window.
@@ -168,11 +168,11 @@ class FakeCell(CellWithoutHardware):
         return FakeVisuals(self.config, self.world, lambda: self.arm.tool_pose)
 
     def audit(self) -> dict[str, int]:
-        """Return the counts of `executive.cells.audit.audit_objects` for the objects of the cell."""
+        """Return the number of objects by outcome, such as `right`, `wrong_bin`, `left` and `elsewhere`."""
         world, final_objects = self.world, []
         for fake_object in (*world.objects, *world.removed_objects):
             bin = self._find_bin(fake_object)
-            # The ledger of a resumed run first sees an object in a bin at the centre of the bin.
+            # For an item in a bin, a resumed run records the centre of the bin as first position.
             positions = fake_object.rest_positions + ([self.cell.bins[bin].position] if bin else [])
             is_held, is_removed = fake_object is world.held_object, fake_object in world.removed_objects
             state = FinalObject(
@@ -183,7 +183,7 @@ class FakeCell(CellWithoutHardware):
 
     def _find_bin(self, fake_object: FakeObject) -> str:
         """Return the name of the bin that contains an object, or ""."""
-        # A bin contains an object on its wall, unless the object is inside another bin.
+        # An object on the wall of a bin counts as in this bin, unless the object is inside another bin.
         wall_margin = BIN_THICKNESS + self.cell.classes[fake_object.label].radius / 2
         for margin in (0.0, wall_margin):
             for name, bin in self.cell.bins.items():
@@ -205,7 +205,7 @@ def load_empty_cell() -> CellConfig:
 
 
 def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
-    """Put objects of random classes on random points of a grid; the key `table.objects` limits their number.
+    """Put objects of random classes on random grid points; the cell file limits the number of objects.
 
     Raises:
         InputError: The workspace has no room for the objects.

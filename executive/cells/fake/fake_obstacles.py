@@ -52,7 +52,7 @@ class FakeObstacles:
     def find_collision(self, tip_positions: Array, load: ObjectClass | None) -> Collision | None:
         """Return the deepest collision along a path of the tool tip, or None.
 
-        The depth in an obstacle must not exceed the depth at the start of the path.
+        A depth that does not exceed the depth at the start of the path is no collision.
 
         Args:
             tip_positions: Positions of the tool tip along the path `(N, 3)` [m], from the current position.
@@ -60,15 +60,15 @@ class FakeObstacles:
         """
         height, radius = (load.height, load.radius + load.ring) if load else (0.0, self._cup_radius)
         positions = tip_positions[:, None, :2]
-        # Distances from the two nearer sides of each box, negative inside; then from the box as a whole.
+        # Offsets beyond the nearer side along x and along y, then distances from the box; negative inside.
         offsets = np.maximum(self._lower_corners[:, :2] - positions, positions - self._upper_corners[:, :2])
         distances = np.linalg.norm(np.maximum(offsets, 0.0), axis=2) + np.minimum(offsets.max(axis=2), 0.0)
         depths = np.minimum(radius - distances, self._upper_corners[:, 2] - (tip_positions[:, 2:] - height))
         violations = depths - np.maximum(depths[0], MAX_PENETRATION)
-        index, obstacle = map(int, np.unravel_index(np.argmax(violations), violations.shape))
-        if violations[index, obstacle] <= 0:
+        point, box = map(int, np.unravel_index(np.argmax(violations), violations.shape))
+        if violations[point, box] <= 0:
             return None
-        x, y, z = tip_positions[index]
+        x, y, z = tip_positions[point]
         part = f"the held {load.label}" if load else "the tool"
         position_text = f"with the tool at ({x:.3f}, {y:.3f}, {z:.3f}) m"
-        return Collision(part, self._names[obstacle], float(depths[index, obstacle]), position_text)
+        return Collision(part, self._names[box], float(depths[point, box]), position_text)

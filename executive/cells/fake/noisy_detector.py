@@ -83,7 +83,7 @@ class NoisyDetector:
 
     def _add_errors(self, answer: Answer, frame: Frame, view: str) -> Answer:
         """Return the answer with random errors, which depend on the seed, the frame and the view."""
-        # The names of the views differ in length.
+        # The length of the name identifies the view, because the names of all views differ in length.
         rng = np.random.default_rng([self._setting.seed, frame.id, len(view)])
         detections = [detection for detection in answer.confident if rng.random() >= self._config.miss_rate]
         detections = [self._shift_box(self._replace_class(detection, rng), rng) for detection in detections]
@@ -117,5 +117,5 @@ class NoisyDetector:
         return Detection(str(rng.choice(self._options.classes)), self._draw_confidence(1.0, rng), box)
 
     def _draw_confidence(self, max_confidence: float, rng: np.random.Generator) -> float:
-        """Return a random confidence from the lower limit of the cell file to `max_confidence`."""
+        """Return a random confidence from `floor` of the cell file to `max_confidence`."""
         return float(rng.uniform(self._config.floor, max_confidence))

@@ -38,7 +38,7 @@ class FakeStateLog(LogFile):
             "tool": [arm.tool_pose.rotation, arm.tool_pose.position],
         }
         text = json.dumps(state, default=np.ndarray.tolist).encode()
-        # Blanks pad the text to the length of the longest state so far, and so overwrite the last state.
+        # Blanks pad the text to the length of the longest state so far, to overwrite all old text.
         self._length = max(self._length, len(text))
         self.write(text.ljust(self._length), 0)
 
@@ -50,7 +50,7 @@ def restore_world(path: Path, world: FakeWorld, arm: FakeArm) -> tuple[int, int]
         Number of control steps, and control step of the last command to arm or tool.
 
     Raises:
-        InputError: The log contains no state.
+        InputError: The log cannot be read, or contains no valid state.
     """
     try:
         state: Mapping[str, Any] = json.loads(path.read_bytes())

@@ -44,10 +44,10 @@ class FakeWorld:
     Attributes:
         classes: Classes of the objects, by label.
         objects: The objects, in the order in which they were added.
-        removed_objects: The removed objects.
+        removed_objects: The objects that were removed from the world.
         bins: The bins of the cell.
         held_object: The object that the tool holds, or None.
-        is_commanded: True if arm or tool received a command in this control step.
+        is_commanded: True if arm or tool has received a command since the last control step.
     """
 
     classes: Mapping[str, ObjectClass]
@@ -102,7 +102,7 @@ class FakeWorld:
         self._move_into_bin(fake_object)
 
     def _move_into_bin(self, fake_object: FakeObject) -> bool:
-        """Move an object from the wall of a bin into the bin, and return True if a bin contains it."""
+        """Move an object on a bin wall into the bin, and return True if the object is then in a bin."""
         radius = self.classes[fake_object.label].radius
         if any(bin.contains(fake_object.position) for bin in self.bins):
             return True

@@ -26,7 +26,7 @@ from executive.motion.trajectory import Trajectory
 DIFFERENTIATION_STEP = 1e-4
 """Time step of the numerical derivative of the tool position [s]."""
 START_TOLERANCE = math.radians(0.2)
-"""Maximum difference of a joint position between the arm and the start of a motion [rad]."""
+"""Maximum difference between the position of a joint and its position at the start of a motion [rad]."""
 TRACKING_TOLERANCE = math.radians(0.5)
 """Maximum tracking error of a joint [rad]; the error of an undisturbed arm is below 0.001°."""
 
@@ -35,14 +35,14 @@ class SimArm:
     """The arm of a PyBullet world; implements `executive.cell.arm.Arm`.
 
     Each physics step needs one call of `advance` before the step, which commands the joint positions at the
-    end of the step. The arm brakes if a disturbance pushes it off its path or if it collides.
+    end of the step. The arm brakes after a collision, or if a disturbance pushes the arm off its path.
 
     Args:
         world: The world of the arm.
         planner: Motion planner of the arm.
         config: The cell file.
         clock: Clock of the run.
-        get_held_body: Returns the body that the tool holds, or None; its contacts count as those of the arm.
+        get_held_body: Returns the held body, or None; contacts of this body count as contacts of the arm.
         emit: Receives the events of the arm.
         interrupted_state: State of an interrupted run, from which the arm brakes; None: the arm is at rest.
 
@@ -208,7 +208,7 @@ class SimArm:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
     def _check_positions(self, q: Array, tolerance: float, description: str) -> None:
-        """Store a fault message if a joint is over `tolerance` [rad] away from `q`, named `description`."""
+        """Store a fault message if a joint is over `tolerance` [rad] from `q`, which `description` names."""
         errors = np.abs(self.q - q)
         joint = int(np.argmax(errors))
         if errors[joint] > tolerance:
@@ -221,9 +221,7 @@ class SimArm:
         self._raise_fault()
         if self._motion is not None:
             remaining = self._motion.duration - self._motion_time
-            raise Fault(
-                f"the arm was asked to {action} while moving ({remaining:.2f} s to go); wait for `at_rest`"
-            )
+            raise Fault(f"the arm cannot {action} while moving ({remaining:.2f} s to go); wait for `at_rest`")
 
     def _raise_fault(self) -> None:
         if self._fault_message is not None:

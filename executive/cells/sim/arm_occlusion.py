@@ -32,7 +32,7 @@ class ArmOcclusion:
         arm: The arm.
         kinematics: Kinematics of the arm.
         config: The cell file.
-        is_loaded: Returns True if the tool holds an object. Every held object counts as the largest one.
+        is_loaded: Returns True if the tool holds an object; its assumed size is that of the largest class.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class ArmOcclusion:
         self._workspace_corners = np.array(list(itertools.product(config.table.x, config.table.y, heights)))
 
     def compute_visibility_mask(self, matrix: Array, X_WC: Pose, size: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return a mask `(H, W)` of the pixels that are not occluded; `size` is width and height."""
+        """Return a mask `(H, W)` of the visible pixels; `size` is width and height of the image [pixel]."""
         q = self._arm.q
         X_WF, X_WT = self._kinematics.compute_flange_pose(q), self._kinematics.compute_tool_pose(q)
         joint_frames = self._kinematics.compute_joint_frames(q)

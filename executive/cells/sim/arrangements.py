@@ -25,13 +25,13 @@ from executive.geometry import Array, Pose, make_tool_down_pose, rotate_about_z,
 MAX_SPARSE_OBJECT_COUNT, MAX_DENSE_OBJECT_COUNT = 7, 20
 """Maximum number of objects in a sparse scene and in a dense scene."""
 SCALE_FACTORS = (0.75, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.2, 1.3)
-"""Scale factors of objects with another size than the class."""
+"""Scale factors of objects whose size differs from the size of their class."""
 UNKNOWN_MODEL_COUNT, DAMAGED_MODEL_NUMBER = 1000, 168
-"""Number of the shapes in `random_urdfs` of pybullet_data, and index of the shape with a damaged mesh."""
+"""Number of shapes in `random_urdfs` of pybullet_data, and index of the shape with a damaged mesh."""
 TRAINING_MODEL_NUMBERS = tuple(number for number in range(800) if number != DAMAGED_MODEL_NUMBER)
 """Indices of the shapes for unknown objects in training; all other shapes are reserved for tests."""
 TABLE_X_RANGE, TABLE_Y_RANGE = (-0.05, 0.86), (-0.71, 0.71)
-"""Ranges of the positions of objects on the table top [m]."""
+"""Ranges of the x and y coordinates of objects on the table top [m]."""
 MIN_BASE_DISTANCE = 0.16
 """Minimum distance of an object from the axis of the base of the arm [m]."""
 SETTLING_STEP_COUNT = 360
@@ -45,8 +45,8 @@ class SceneObject:
     Attributes:
         label: Class of the object, or `UNKNOWN_LABEL`.
         model: Model of the object, already scaled.
-        X_WO: Pose of the object.
-        colour: Colour of the object.
+        X_WO: Pose of the object in the world.
+        colour: Red, green and blue of the object, each 0 to 1.
     """
 
     label: str
@@ -56,7 +56,7 @@ class SceneObject:
 
 
 def move_arm_randomly(world: World, camera: CameraConfig, rng: Generator) -> bool:
-    """Move the arm to a random pose of a run, and return whether the tool holds an object in the scene."""
+    """Move the arm to a random pose of a run, and return True if the tool shall hold an object."""
     poses = camera.scan_poses
     pose = poses[0] if rng.random() < 0.6 else str(rng.choice(poses))
     world.set_joint_positions(np.radians(world.config.arm.poses_deg[pose]))
@@ -108,14 +108,14 @@ def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Gene
 
 
 def scale_model(model: ObjectConfig, factor: float) -> ObjectConfig:
-    """Return a model that is `factor` times as large."""
+    """Return the model of an object scaled by `factor`."""
     names = ("scale", "height", "radius", "ring")
     return model.model_copy(update={name: getattr(model, name) * factor for name in names})
 
 
 @cache
 def load_unknown_model(number: int) -> ObjectConfig:
-    """Return a shape of `random_urdfs` of pybullet_data by its number, 0 to 999; most are 12 cm long."""
+    """Return shape `number` (0 to 999) of `random_urdfs` in pybullet_data; most shapes are 12 cm long."""
     name = f"random_urdfs/{number:03d}/{number:03d}.urdf"
     mesh = load_mesh(ObjectConfig(urdf=name, height=1.0, radius=1.0))
     return ObjectConfig(urdf=name, height=mesh.top - mesh.bottom, radius=mesh.radius)
@@ -129,7 +129,7 @@ def draw_arrangement(
     Args:
         config: The cell file.
         footprint: Corners `(N, 2)` [m] of the visible part of the table.
-        shows_workspace: True to put most objects into the workspace or near the workspace.
+        shows_workspace: True to put most objects into or near the workspace.
         table_colour: Mean colour of the table.
         rng: Random number generator.
     """
@@ -145,7 +145,7 @@ def draw_arrangement(
         margin = rng.uniform(0.0, 0.02 + 0.006 * count)
         low = np.maximum(low, np.array([config.table.x[0], config.table.y[0]]) - margin)
         high = np.minimum(high, np.array([config.table.x[1], config.table.y[1]]) + margin)
-    bins = [bin for bin in config.bins.values() if _is_in_rectangle(bin, low, high)]
+    bins = [bin for bin in config.bins.values() if _overlaps_rectangle(bin, low, high)]
     random_number = rng.random()
     if random_number < 0.15:
         return simulate_fall(config, _draw_heap(objects[:MAX_SPARSE_OBJECT_COUNT], low, high, bins, rng))
@@ -213,14 +213,14 @@ def _draw_rotation(rng: Generator) -> Array:
     return rotation_from_quaternion(rng.normal(size=4))
 
 
-def _is_in_rectangle(bin: BinConfig, low: Array, high: Array) -> bool:
-    """Return True if a bin is over 4 cm inside the rectangle from `low` to `high` `(2,)` [m]."""
+def _overlaps_rectangle(bin: BinConfig, low: Array, high: Array) -> bool:
+    """Return True if a bin overlaps the rectangle from `low` to `high` `(2,)` [m] by over 4 cm."""
     half_size = np.array(bin.size[:2]) / 2
     centre = np.array(bin.position[:2])
     return bool((centre + half_size > low + 0.04).all() and (centre - half_size < high - 0.04).all())
 
 
-def _has_in_outline(bin: BinConfig, point: Array, margin: float) -> bool:
+def _outline_contains(bin: BinConfig, point: Array, margin: float) -> bool:
     """Return True if a point `(2,)` [m] is inside the outline of a bin, enlarged by a margin [m]."""
     return bool((np.abs(point - bin.position[:2]) < np.array(bin.size[:2]) / 2 + margin).all())
 
@@ -241,7 +241,7 @@ def _draw_heap(
 
 
 def _stack_randomly(objects: list[SceneObject], rng: Generator) -> None:
-    """Put some objects on others, nearly centred; the balance of the stacks is not simulated."""
+    """Put some objects nearly centred on others; the stability of the stacks is not simulated."""
     for _ in range(int(rng.integers(1, 1 + max(1, len(objects) // 3)))):
         if len(objects) < 2:
             return
@@ -276,10 +276,10 @@ def _place_side_by_side(
                 bin = bins[int(rng.integers(len(bins)))]
                 max_offset = np.maximum(np.array(bin.size[:2]) / 2 - radius, 0.0)
                 point = np.array(bin.position[:2]) + rng.uniform(-max_offset, max_offset)
-            bins_at_point = [bin for bin in config.bins.values() if _has_in_outline(bin, point, -radius)]
+            bins_at_point = [bin for bin in config.bins.values() if _outline_contains(bin, point, -radius)]
             if bins_at_point:
                 floor_height = bins_at_point[0].position[2] + BIN_THICKNESS
-            elif any(_has_in_outline(bin, point, radius + BIN_THICKNESS) for bin in config.bins.values()):
+            elif any(_outline_contains(bin, point, radius + BIN_THICKNESS) for bin in config.bins.values()):
                 continue
             is_free = all(
                 np.linalg.norm(item.X_WO.position[:2] - point) > radius + item.model.radius + gap

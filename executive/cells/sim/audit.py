@@ -34,7 +34,7 @@ def audit_bodies(
         records: The items of the ledger.
         bins: The bins of the cell.
         routes: Names of the permitted bins of each class.
-        max_distance: Maximum horizontal distance from the first position of an item to its object [m].
+        max_distance: Maximum horizontal distance between the first position of an item and its object [m].
         held_body: Body that the tool holds, or None.
         dropped_bodies: Bodies that fell from the tool and have not been picked up since.
     """

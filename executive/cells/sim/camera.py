@@ -40,12 +40,12 @@ ReflectionCoefficient = Annotated[float, Field(ge=0, le=3)]
 
 
 class Light(Section):
-    """A distant lamp and the ambient light; the defaults apply to every simulated cell."""
+    """A directional light and the ambient light; the defaults apply to every simulated cell."""
 
     direction: tuple[float, float, Annotated[float, Field(gt=0)]] = (0.3, 0.2, 1.0)
-    """Direction x, y, z in the world from the table to the lamp; z is above 0, the length is ignored."""
+    """Direction x, y, z in the world from the table to the light; z is above 0, the length is ignored."""
     colour: Colour = (1.0, 1.0, 1.0)
-    """Colour of the lamp's light: r, g, b, each 0 to 1."""
+    """Colour of the directional light: r, g, b, each 0 to 1."""
     ambient: ReflectionCoefficient = 0.6
     """Ambient coefficient of the Phong model, 0 to 3."""
     diffuse: ReflectionCoefficient = 0.35
@@ -57,9 +57,9 @@ class Light(Section):
 
 
 CELL_LIGHT = Light()
-"""Light of every simulated cell: a white lamp, slightly in front and to the left, without shadows."""
+"""Default light of simulated cells: white, from above, slightly from the front left, without shadows."""
 DEPTH_SEED = 1
-"""Additional number in the seed of the depth noise, so that it differs from the seed of the image noise."""
+"""Additional number in the seed of the depth noise, which is otherwise the seed of the image noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +68,11 @@ class RenderedImage:
 
     Attributes:
         image: Colour image of the region `(H, W, 3)` uint8, RGB.
-        bodies: Visible body at each pixel `(H, W)`, -1 for none.
+        bodies: Segmentation `(H, W)`: number of the visible body at each pixel, -1 for none.
         depth_buffer: Depth buffer of OpenGL `(H, W)`, 0 to 1.
-        matrix: Camera matrix of the camera image `(3, 3)` [pixel].
-        X_WC: Pose of the camera.
-        region: The region of the camera image.
+        matrix: Camera matrix of the whole camera image `(3, 3)` [pixel].
+        X_WC: Pose of the camera in the world.
+        region: The rendered region of the camera image.
     """
 
     image: Image
@@ -93,7 +93,7 @@ class RenderedImage:
 
 
 def get_camera_pose(world: World, config: CameraConfig) -> Pose:
-    """Return the current pose `X_WC` of a camera."""
+    """Return the current pose `X_WC` of a camera; frame M is the mount, i.e. the world or the flange."""
     _, X_MC = compute_calibration(config)
     return X_MC if config.mount == "fixed" else world.get_flange_pose() @ X_MC
 
@@ -173,11 +173,11 @@ class SimCamera(MountedCamera):
         clock: Clock for the time stamps of the frames.
         seed: Seed of the noise.
         occlusion: Occlusion by the arm; None: nothing is occluded, and the table is always visible.
-        get_change_count: Returns the number of changes of the table (see `Ledger`).
+        get_change_count: Returns the number of changes of the objects on the table so far.
         light: Light of the scene.
-        true_config: True pose, lens and noise of the camera; None: those of `config`. The frames contain the
-            matrix and the pose of `config`.
-        bins: Bins from whose positions in a frame a displacement of the camera is detected.
+        true_config: True extrinsics, intrinsics and noise of the camera; None: those of `config`. The frames
+            contain the matrix and the pose of `config`.
+        bins: Bins that serve as landmarks for the detection of a displaced camera.
     """
 
     def __init__(
@@ -220,7 +220,7 @@ class SimCamera(MountedCamera):
         return compute_calibration(self._true_config)[0], get_camera_pose(self._world, self._true_config)
 
     def _capture_images(self) -> tuple[Image, Array | None]:
-        """Return colour and depth image of the current frame; the depth image is None without a sensor."""
+        """Return colour and depth image of the current frame; without a depth sensor, the latter is None."""
         rendered = render(self._world, *self._get_true_view(), (0, 0, *self._size), self._light)
         rng = np.random.default_rng([self._seed, self._frame_count])
         image = add_noise(rendered.image, self._true_config.noise, rng)

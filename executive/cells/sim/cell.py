@@ -91,9 +91,9 @@ class SimCell(CellWithoutHardware):
         )
         if options.resume is not None:
             self._camera.set_counts(options.resume.frame_count, options.resume.pose_count)
-        classes = {label: build_simulated_class(label, kind) for label, kind in config.objects.items()}
+        classes = {label: build_simulated_class(label, section) for label, section in config.objects.items()}
         localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
-        # Detectors are built last, because their processes would not be ended if a later statement failed.
+        # Detectors are built last, because their processes would outlive an exception in a later statement.
         folders = (options.base, get_shipped_folder() / "cells")
         self._detectors = build_detectors(
             config, clock=clock, base=options.base, seed=seeds.detectors, folders=folders
@@ -130,7 +130,7 @@ class SimCell(CellWithoutHardware):
 
     @staticmethod
     def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
-        """Return the classes of each detector, None if they are unknown, without loading a model."""
+        """Return the classes that each detector knows, or None if unknown; no detector model is loaded."""
         return find_detectable_labels(config.detectors, base)
 
     @staticmethod
@@ -155,7 +155,7 @@ class SimCell(CellWithoutHardware):
         return SimVisuals(self._world)
 
     def audit(self) -> dict[str, int]:
-        """Return the counts of `executive.cells.audit.audit_objects` for the objects of the cell."""
+        """Return the number of objects by outcome, such as `right`, `wrong_bin`, `left` and `elsewhere`."""
         moves = self._world.rest_positions
         return audit_bodies(
             self._world,

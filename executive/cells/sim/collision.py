@@ -24,18 +24,18 @@ from executive.geometry import Array, Pose
 ROUNDING_ERROR = 1e-5
 """Maximum rounding error of a distance [m]."""
 SUPPORT_TOLERANCE = 0.001
-"""Maximum height above the floor of a bin at which a contact of the load counts as a contact with it [m]."""
+"""Maximum height [m] above the floor of a bin at which a contact of the load is a contact with the floor."""
 PARKING_POSITION = (0.0, 0.0, 50.0)
 """Position of currently unused bodies, far from the arm [m]."""
 
 
 class ClosestApproach(NamedTuple):
-    """Closest approach of a part of the robot and a body.
+    """Closest approach between a part of the robot and a body.
 
     Attributes:
-        part, body: Names of part and body for messages.
-        distance: Distance of part and body [m], negative for a penetration.
-        min_distance: Required minimum of the distance [m].
+        part, body: Names of the part and of the body for messages.
+        distance: Distance between part and body [m], negative for a penetration.
+        min_distance: Required minimum distance [m].
     """
 
     part: str
@@ -56,9 +56,9 @@ class ClosestApproach(NamedTuple):
 class ClearanceChecker:
     """Checks paths of the arm for collisions with table, bins, obstacles and the arm itself.
 
-    After a stop, or with a held object on the table, a motion begins within the margin of a body. The
-    distance from this body must then not decrease. The model of a held object is an upright cylinder under
-    the tool, which may touch the table and the floors of bins.
+    After a stop, or with a held object on the table, a motion may begin closer to a body than the margin.
+    The distance from this body must then not decrease. A held object is modelled by an upright cylinder
+    under the tool, which may touch the table and the floors of bins.
 
     Attributes:
         world: World of the check, whose arm is at the last checked joint positions.
@@ -67,7 +67,7 @@ class ClearanceChecker:
     def __init__(self, config: CellConfig) -> None:
         self.world = World(config, visuals=False)
         self._margin = config.motion.margin
-        self._loads: dict[ObjectClass, int] = {}
+        self._load_bodies: dict[ObjectClass, int] = {}
         """Body that models a held object of each class."""
         self._cylinders: dict[tuple[float, float], list[int]] = {}
         """Bodies that model obstacles, by radius and height [m]."""
@@ -84,8 +84,8 @@ class ClearanceChecker:
             self._check_path(path, task.load)
 
     def _check_path(self, path: Array, load: Load | None) -> None:
-        # For a pair within the margin at the start, the limit is the distance at the start. The margin is the
-        # limit again after the pair has left the margin.
+        # A pair that starts closer than the margin must keep its initial distance until the pair has been
+        # apart by the margin once. Every other pair must keep the margin.
         start_approaches = self._find_closest_approaches(path[0], load)
         start_distances = {pair: approach.distance for pair, approach in start_approaches.items()}
         for q in path[1:]:
@@ -106,7 +106,7 @@ class ClearanceChecker:
         return closest
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
-        """Return the closest approach of the arm without a load at `q` `(n,)` [rad] if it is a violation."""
+        """Return the closest approach of the unloaded arm at `q` `(n,)` [rad] if too close, else None."""
         closest = min(self._find_approaches(q, None), key=lambda approach: approach.distance, default=None)
         return closest if closest and closest.distance < closest.min_distance - ROUNDING_ERROR else None
 
@@ -142,7 +142,7 @@ class ClearanceChecker:
     def _find_load_approaches(
         self, load: ObjectClass, bodies: Sequence[tuple[str, int]]
     ) -> Iterator[ClosestApproach]:
-        """Yield the approaches of the load to the arm and to `bodies` (with names) within the margin."""
+        """Yield the approaches within the margin of the load to the arm and to the named `bodies`."""
         load_body, get_points = self._get_load_body(load), self.world.client.getClosestPoints
         X_WH = self.world.get_tool_pose() @ Pose.of([0, 0, load.height / 2])
         self.world.client.resetBasePositionAndOrientation(load_body, X_WH.position, X_WH.quaternion)
@@ -161,7 +161,7 @@ class ClearanceChecker:
 
     @contextmanager
     def _place_obstacles(self, obstacles: Sequence[Obstacle]) -> Iterator[None]:
-        """Put cylinders in place of the obstacles on the table until the context ends."""
+        """Represent the obstacles by cylinders on the table until the context ends."""
         client, placed_counts = self.world.client, Counter[tuple[float, float]]()
         for obstacle in obstacles:
             size = round(obstacle.radius, 4), round(obstacle.top, 4)
@@ -184,8 +184,8 @@ class ClearanceChecker:
 
     def _get_load_body(self, load: ObjectClass) -> int:
         """Return the body that models a held object of a class, created at the first call."""
-        if load not in self._loads:
+        if load not in self._load_bodies:
             client, radius = self.world.client, load.radius + load.ring
             shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=load.height)
-            self._loads[load] = int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION))
-        return self._loads[load]
+            self._load_bodies[load] = int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION))
+        return self._load_bodies[load]

@@ -35,7 +35,7 @@ _PAYLOAD_FORMATS = {
     **dict.fromkeys((RUN_STEP, IDLE_STEP, VACUUM_ON, VACUUM_OFF, SEAL_BREAK, MOTION_END), ""),
     MOTION: "2dI", SET_POSE: "i7d", REMOVE: "i",
 }  # fmt: skip
-"""Formats (of `struct`) of the numbers of each kind; the format of JOINT_TARGETS depends on the arm."""
+"""Formats for `struct` of the arguments of each kind; the format of JOINT_TARGETS depends on the arm."""
 
 
 class Command(NamedTuple):
@@ -70,7 +70,7 @@ class CommandLog:
         if path is None:
             return
         header = FILE_SIGNATURE + f"{FORMAT_VERSION} joints {joint_count}\n".encode()
-        self._length = max((end for _, end in _read_with_ends(path)), default=len(header)) if resume else 0
+        self._length = max((end for _, end in _read_with_offsets(path)), default=len(header)) if resume else 0
         self._file = LogFile(path, "the log of the world", self._length)
         if not resume:
             try:
@@ -118,11 +118,11 @@ def read_commands(path: Path) -> Iterator[Command]:
     Raises:
         InputError: The file cannot be read, or is no valid log.
     """
-    for command, _ in _read_with_ends(path):
+    for command, _ in _read_with_offsets(path):
         yield command
 
 
-def _read_with_ends(path: Path) -> Iterator[tuple[Command, int]]:
+def _read_with_offsets(path: Path) -> Iterator[tuple[Command, int]]:
     """Yield the complete commands of a log, each with the offset of its end in the file [byte]."""
     data = _read_content(path)
     if not data.startswith(FILE_SIGNATURE):
@@ -158,7 +158,7 @@ def _read_with_ends(path: Path) -> Iterator[tuple[Command, int]]:
                 return
             states = np.frombuffer(data, "<f8", number_count, offset).reshape(-1, state_size)
             offset += 8 * number_count
-        # The second number of a motion is the start of the guarded part; infinite: there is no guarded part.
+        # The second number of a motion, the start time of the guarded part, is infinite without this part.
         finite_numbers = numbers if states is None else (numbers[0], *states.flat)
         if not all(map(math.isfinite, finite_numbers)):
             raise _make_damage_error(path, command_offset)

@@ -25,7 +25,7 @@ class ContactMonitor:
         self._world = world
         self._get_held_body = get_held_body
         self._last_contact_steps: dict[tuple[str, int], int] = {}
-        """Number of the step of the last contact of each ignored pair of a robot part and a body."""
+        """Physics step of the last contact of each ignored pair of a robot part and a body."""
 
     def reset(self) -> None:
         """Ignore each pair of bodies that is in contact now until the two bodies separate."""
@@ -33,10 +33,10 @@ class ContactMonitor:
         self._last_contact_steps = {(part, body): step for part, body, _, _ in self._iterate_contacts()}
 
     def describe_new_contact(self, lip_may_touch: bool) -> str | None:
-        """Return the description of a contact that began in this step; None: no contact that is forbidden."""
+        """Return a description of a new forbidden contact, or None; the lip is exempt if `lip_may_touch`."""
         now, last_steps = self._world.step_count, self._last_contact_steps
-        oldest = now - SEPARATION_STEP_COUNT
-        self._last_contact_steps = {pair: step for pair, step in last_steps.items() if step >= oldest}
+        oldest_step = now - SEPARATION_STEP_COUNT
+        self._last_contact_steps = {pair: step for pair, step in last_steps.items() if step >= oldest_step}
         for part, body, position, force in self._iterate_contacts():
             if (part, body) in self._last_contact_steps:
                 self._last_contact_steps[part, body] = now

@@ -23,8 +23,8 @@ class SimMinTimes(CellMinTimes):
     """Lower bounds of motion times for any planner; implements `executive.cell.protocols.MinTimes`.
 
     A transport begins at rest on an object and ends at rest over the bin. On any path, each joint needs at
-    least the time of a rest-to-rest motion of this joint. The bound is the minimum over all pairs of joint
-    configurations; the last joint is ignored, because the yaw of the tool is arbitrary.
+    least the time of a rest-to-rest motion of this joint. The bound is the minimum over all pairs of first
+    and last configurations; the last joint is ignored, because the yaw of the tool is arbitrary.
 
     Args:
         config: The cell file.

@@ -18,7 +18,7 @@ from executive.geometry import Array
 MAX_MODEL_SIZE = 20_000_000
 """Maximum size of a model file [byte], to limit the duration of the check."""
 MAX_TRIANGLE_COUNT = 20_000
-"""Maximum number of triangles of a mesh: a collision takes PyBullet 3 s with 20,000, 60 s with 300,000."""
+"""Maximum number of triangles of a mesh: a collision in PyBullet takes 3 s with 20,000, 60 s with 300,000."""
 
 
 def find_model(name: str) -> Path:
@@ -70,7 +70,7 @@ def find_mesh(urdf: Path, mesh: ElementTree.Element) -> Path:
 
 
 def _normalize_name(urdf: Path, name: str) -> str:
-    """Return a file name of a URDF without `package://`; raise `InputError` outside of the folder."""
+    """Return a file name without `package://`; raise `InputError` for a file outside of the URDF's folder."""
     name = name.removeprefix("package://")
     if is_outside_path(name) or has_outside_link(urdf.parent, name):
         raise InputError(f'the model {urdf.name} names the file "{name}", which is outside of its folder')
@@ -113,7 +113,7 @@ def read_wavefront(path: Path) -> tuple[Array, NDArray[np.intp]]:
             if keyword == "v":
                 vertices.append([float(word) for word in words[:3]])
             elif keyword == "f":
-                # A word such as 3/1/2 starts with the number of a vertex: from 1, or negative from the end.
+                # A word such as 3/1/2 starts with a vertex number, from 1 or, if negative, from the end.
                 numbers = [int(word.split("/")[0]) for word in words]
                 indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
                 triangles += [(indices[0], *pair) for pair in pairwise(indices[1:])]

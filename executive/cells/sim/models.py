@@ -28,7 +28,7 @@ ROLLING_FRICTION = 0.0005
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangle mesh in the upright frame O of an object (see `compute_upright_pose`).
+    """Triangle mesh in the upright frame O of an object, whose z axis points up.
 
     Attributes:
         vertices: Positions of the vertices `(N, 3)` [m].
@@ -139,7 +139,7 @@ def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message if the declared height or radius of a class is not the size of the model.
+    """Yield key and message if the declared height or radius of a class differs from that of its model.
 
     The executive computes the centre, the top and the free space of an object from height and radius.
     """

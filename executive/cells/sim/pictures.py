@@ -22,21 +22,21 @@ from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.viewpoint import Viewpoint
 from executive.processes import WorkerPool
 
-FILM_LIGHT = Light(direction=(0.5, -0.6, 1.2), ambient=0.6, diffuse=0.4, shadow=True)
-"""Light with contrast between objects: from the right, with shadows."""
+PICTURE_LIGHT = Light(direction=(0.5, -0.6, 1.2), ambient=0.6, diffuse=0.4, shadow=True)
+"""Light of the pictures: from the right and with shadows, for contrast between objects."""
 TOP_COLOUR, BOTTOM_COLOUR = (226, 231, 237), (172, 182, 194)
 """Colours of the background at the top and at the bottom of a picture, RGB, each 0 to 255."""
 MIN_EDGE_CONTRAST = 24
 """Minimum difference in brightness of neighbouring pixels at an edge, 0 to 255."""
 MAX_PICTURES_PER_BLOCK = 24
-"""Maximum number of pictures of a block; each block rebuilds its own world from the start of the run."""
+"""Maximum number of pictures in a block; the world is rebuilt from the start of the run for each block."""
 MAX_PICTURES_IN_FIRST_BLOCK = 2
-"""Maximum number of pictures of the first block, which is small to get the first picture early."""
+"""Maximum number of pictures in the first block, which is small so that the first picture is ready early."""
 
 
 @dataclass(frozen=True, eq=False)
 class PictureSource:
-    """Run and viewpoint of pictures.
+    """Run and viewpoint from which pictures are rendered.
 
     Attributes:
         config: The cell file of the run.
@@ -101,7 +101,7 @@ def render_pictures_in_process(source: PictureSource, steps: Sequence[int]) -> l
                 rebuilder.execute(command)
                 executed_step_count += command.kind == RUN_STEP
             region = (0, 0, *viewpoint.size)
-            rendered = render(world, viewpoint.matrix, viewpoint.X_WC, region, FILM_LIGHT)
+            rendered = render(world, viewpoint.matrix, viewpoint.X_WC, region, PICTURE_LIGHT)
             pictures.append(_compose_picture(rendered))
         return pictures
     finally:

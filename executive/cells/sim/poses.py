@@ -63,7 +63,7 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
 
 
 def _find_occluding_poses_and_bins(config: CellConfig, world: World) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message for each scan pose or bin that occludes a part of the workspace for a camera."""
+    """Yield key and message for each scan pose or bin that hides a part of the workspace from a camera."""
     planner = build_planner(config)
     arm = SimArm(world, planner, config, StepClock(lambda: 0.0))
     occlusion = ArmOcclusion(arm, planner.kinematics, config)

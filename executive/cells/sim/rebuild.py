@@ -51,21 +51,21 @@ class WorldRebuilder:
 
     def __init__(self, world: World, tool: SuctionTool) -> None:
         self._world, self._tool = world, tool
-        self._command: Array = np.zeros(0)
+        self._joint_targets: Array = np.zeros(0)
         self._motion: Trajectory | None = None
         self._motion_time = 0.0
         self._step_count = self._last_command_step = 0
-        self._applied_command: tuple[Array, float] | None = None
-        """Joint positions and motion time of the last physics step; None: the step was the last command."""
+        self._applied_targets: tuple[Array, float] | None = None
+        """Joint targets and motion time of the last physics step; None if no targets followed the step."""
 
     @property
     def interrupted_state(self) -> InterruptedState:
         """State after the executed commands."""
         # If the arm started from joint targets that no physics step has used, the arm would move by two steps
         # at once, which may tear a load off the cup.
-        command, time = self._command, self._motion_time
-        if self._applied_command and self._motion is not None:
-            command, time = self._applied_command
+        command, time = self._joint_targets, self._motion_time
+        if self._applied_targets and self._motion is not None:
+            command, time = self._applied_targets
         return InterruptedState(command, self._motion, time, self._step_count, self._last_command_step)
 
     def execute(self, command: Command) -> None:
@@ -76,14 +76,14 @@ class WorldRebuilder:
         world, tool = self._world, self._tool
         if kind in (command_log.RUN_STEP, command_log.IDLE_STEP):
             self._step_count += kind == command_log.RUN_STEP
-            self._applied_command = None
+            self._applied_targets = None
             world.step()
             tool.advance()
         elif kind == command_log.JOINT_TARGETS:
-            if self._command.size:
-                self._applied_command = self._applied_command or (self._command, self._motion_time)
-            self._motion_time, self._command = numbers[0], np.array(numbers[1:])
-            world.command_arm(self._command, self._motion_time)
+            if self._joint_targets.size:
+                self._applied_targets = self._applied_targets or (self._joint_targets, self._motion_time)
+            self._motion_time, self._joint_targets = numbers[0], np.array(numbers[1:])
+            world.command_arm(self._joint_targets, self._motion_time)
         elif kind == command_log.MOTION:
             duration, guarded_start_time, _ = numbers
             self._motion = build_trajectory(get_joint_states(command), duration, guarded_start_time)

@@ -21,7 +21,7 @@ from executive.mission.text.yaml_text import YamlNode, parse_yaml
 from executive.perception.camera_model import compute_calibration, compute_field_of_view
 
 ANY_CLASS = "any"
-"""Key in `objects` of the section for all other classes."""
+"""Key in `objects` of the section for all classes without their own section."""
 MAX_FOV_DEG = 178.0
 """Maximum vertical field of view of a camera [degree]."""
 
@@ -60,7 +60,7 @@ Palette = Annotated[tuple[Colour, ...], AfterValidator(check_palette)]
 
 
 class LightConfig(Light):
-    """The lamp and the ambient light; the defaults apply to every simulated cell."""
+    """The directional light and the ambient light; the defaults apply to every simulated cell."""
 
     brightness: float = Field(1.0, ge=0, le=5)
     """Factor on `ambient`, `diffuse` and `specular`."""
@@ -79,8 +79,8 @@ class SceneTableConfig(Section):
     """Minimum distance between the outlines of two objects [m]; 0: outlines may touch. By default
     as in the cell file."""
     stacked: Fraction | None = None
-    """Fraction of the objects that are put on top of another object, 0 to 1; unstable stacks are undone.
-    By default as in the cell file."""
+    """Fraction of the objects that are put on top of another object, 0 to 1; objects of an unstable
+    stack return to the table. By default as in the cell file."""
 
 
 class SceneObjectConfig(Section):
@@ -102,13 +102,13 @@ class UnknownConfig(Section):
     """First and last number of the shapes in `random_urdfs` of pybullet_data, 0 to 999; the shipped detector
     was trained with 0 to 799."""
     scale: float = Field(0.6, ge=0.1, le=2)
-    """Factor on the size of the shapes; most shapes are 0.12 m long at 1."""
+    """Factor on the size of the shapes; most shapes are 0.12 m long at factor 1."""
     colours: Palette = ((1.0, 1.0, 1.0),)
     """Colours (r, g, b, each 0 to 1) of which each object gets one."""
 
 
 class SceneCameraConfig(Section):
-    """Errors of the camera; its frames contain the matrix and the pose that the cell file declares."""
+    """Calibration errors of the camera; its frames contain the matrix and the pose of the cell file."""
 
     shift: tuple[Displacement, Displacement, Displacement] = (0.0, 0.0, 0.0)
     """Displacement x, y, z [m], each -1 to 1: in the world, or for a wrist camera in the flange frame."""
@@ -130,7 +130,7 @@ class SceneConfig(Section):
     scene: str = Field(min_length=1)
     """Name of the scene."""
     light: LightConfig = LightConfig()
-    """The lamp and the ambient light."""
+    """The directional light and the ambient light."""
     table: SceneTableConfig = SceneTableConfig()
     """The table, and the number and positions of the objects."""
     objects: dict[str, SceneObjectConfig] = Field(default_factory=dict)
@@ -138,7 +138,7 @@ class SceneConfig(Section):
     unknown: UnknownConfig | None = None
     """Objects without a class; none by default."""
     camera: SceneCameraConfig = SceneCameraConfig()
-    """Errors of the camera."""
+    """Calibration errors and noise of the camera."""
 
 
 DECLARED_SCENE = SceneConfig(scene="as declared")

@@ -1,4 +1,4 @@
-"""Changes of a scene file to the simulated world: cell, lamp, table and unknown objects."""
+"""Changes of a scene file to the simulated world: cell, light, table and unknown objects."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def apply_scene(config: CellConfig, scene: SceneConfig) -> CellConfig:
 
 
 def build_light(light: LightConfig) -> Light:
-    """Return the lamp and the ambient light of a scene, with `brightness` applied to the coefficients."""
+    """Return the light of a scene, with `brightness` applied to the coefficients."""
     scaled = {key: light.brightness * getattr(light, key) for key in ("ambient", "diffuse", "specular")}
     return Light.model_construct(**{**light.model_dump(exclude={"brightness"}), **scaled})
 
@@ -62,8 +62,8 @@ def draw_unknown_models(unknown: UnknownConfig | None, rng: np.random.Generator)
     """Return random models of objects without a class; none if `unknown` is None."""
     if unknown is None:
         return []
-    first, last = unknown.models
-    numbers = [number for number in range(first, last + 1) if number != DAMAGED_MODEL_NUMBER]
+    first_number, last_number = unknown.models
+    numbers = [number for number in range(first_number, last_number + 1) if number != DAMAGED_MODEL_NUMBER]
     count = int(rng.integers(*unknown.count, endpoint=True))
     models = [load_unknown_model(int(number)) for number in rng.choice(numbers, count)]
     colours = {"colours": unknown.colours}
@@ -76,13 +76,13 @@ def _change_object(model: ObjectConfig, section: SceneObjectConfig | None) -> Ob
         return model
     colours = section.colours or model.colours
     if len(colours) == 1:
-        # The number of colours stays, because each later random choice depends on it.
+        # The number of colours is kept, because each later random choice depends on this number.
         colours *= len(model.colours)
     return scale_model(model, section.scale).model_copy(update={"colours": colours})
 
 
 def _change_camera(camera: CameraConfig, section: SceneCameraConfig) -> CameraConfig:
-    """Return a camera with the errors of a scene, with pose and intrinsics as a calibration."""
+    """Return a camera with the errors of a scene, whose key `calibration` contains pose and intrinsics."""
     if section.noise is not None:
         camera = camera.model_copy(update={"noise": section.noise})
     if not any((*section.shift, *section.turn_deg, *section.orbit_deg)) and section.fov_factor == 1:

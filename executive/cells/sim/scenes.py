@@ -1,7 +1,7 @@
 """Random labelled scenes of a cell, for the training and the evaluation of detectors.
 
-A sample depends only on cell file, camera and seed. Labels are amodal with subpixel accuracy: the box of an
-object contains the whole silhouette of the mesh, including occluded parts.
+A sample depends only on its seed and on the arguments of `SceneRenderer`. Labels are amodal with subpixel
+accuracy: the box of an object contains the whole silhouette of the mesh, including occluded parts.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ BLACK = (0.0, 0.0, 0.0)
 """Placeholder for an unused colour."""
 IMAGE_SIZE = 256
 """Side of the image of a sample, as a detector gets it [pixel]."""
-MIN_VISIBLE_FRACTION, MIN_LABELLED_FRACTION = 0.15, 0.5
-"""Minimum visible fractions of the silhouettes of half occluded objects and of labelled objects."""
-MAX_HALF_OCCLUDED_FRACTION = 1 / 6
-"""Maximum fraction of half occluded objects in a scene with several half occluded objects."""
+MIN_VISIBLE_FRACTION, MIN_LABELLED_VISIBLE_FRACTION = 0.15, 0.5
+"""Visible fractions below which an object is background, or is ignored instead of labelled."""
+MAX_HEAVILY_OCCLUDED_FRACTION = 1 / 6
+"""Maximum fraction of heavily occluded objects in a scene; one such object is always allowed."""
 MAX_ATTEMPTS = 50
-"""Maximum number of random scenes for a sample if the objects find no room."""
-DECLARED_FRACTION = 0.2
-"""Fraction of the scenes with table, lamp, camera and noise as in the cell file."""
+"""Number of random scenes for a sample after which a lack of room for the objects is an error."""
+UNVARIED_SCENE_FRACTION = 0.2
+"""Fraction of the random scenes with table, light, camera and noise as in the cell file."""
 MIN_CONTRAST = 5
 """Minimum contrast between a labelled object and its surroundings, in standard deviations of the noise."""
 
@@ -65,13 +65,13 @@ class Sample:
         labels: Classes of the `N` labelled objects.
         boxes: Boxes of the labelled objects `(N, 4)` [pixel], clipped to `image`.
         visible_fraction: Visible fraction of each labelled object `(N,)`, 0 to 1.
-        positions: Positions `(N, 3)` [m] of the objects in the world from a localization without errors: the
-            ray through the centre of the whole box, at the height of the centre of the object.
+        positions: Positions `(N, 3)` [m] from a localization without errors: the points at which the rays
+            through the centres of the unclipped boxes reach the heights of the object centres.
         centres: Centres of the bounding boxes of the labelled objects in the world `(N, 3)` [m].
         ignored: Boxes `(M, 4)` [pixel] of objects that are neither labelled nor background.
         region: Region of the camera image that `image` shows.
         matrix: Camera matrix `(3, 3)` [pixel]; for an initial scene, the matrix of the cell file.
-        X_WC: Pose of the camera; for an initial scene, the pose of the cell file.
+        X_WC: Pose of the camera in the world; for an initial scene, the pose of the cell file.
         frame: Camera image of an initial scene `(H, W, 3)`; None for a random scene.
         depth: Depth image of an initial scene `(H, W)` [m]; None without a depth sensor.
         second_frame: Camera image of an initial scene `(H, W, 3)` with different noise.
@@ -116,7 +116,7 @@ class SceneRenderer:
         self._matrix, _ = compute_calibration(self._camera)
 
     def render_sample(self, seed: int) -> Sample:
-        """Return the sample of a seed: the first scene of the seed with few half occluded objects.
+        """Return the first sample generated from a seed in which few objects are heavily occluded.
 
         Raises:
             InputError: The workspace has no room for the objects.
@@ -139,12 +139,12 @@ class SceneRenderer:
         self._world.close()
 
     def _render_random(self, rng: np.random.Generator) -> Sample | None:
-        """Return the sample of a random scene, or None if too many objects are half occluded."""
+        """Return the sample of a random scene, or None if too many objects are heavily occluded."""
         world = self._world
         is_holding = arrangements.move_arm_randomly(world, self._camera, rng)
         matrix, X_WC = self._matrix, get_camera_pose(world, self._camera)
         (colour, texture), light, noise = ((1.0, 1.0, 1.0), WOOD_TEXTURE), CELL_LIGHT, self._camera.noise
-        if rng.random() >= DECLARED_FRACTION:
+        if rng.random() >= UNVARIED_SCENE_FRACTION:
             matrix, X_WC = variations.draw_camera(self._camera, matrix, X_WC, rng)
             (colour, texture), light = variations.draw_table_appearance(rng), variations.draw_light(rng)
             noise = variations.draw_noise(noise, rng)
@@ -167,7 +167,7 @@ class SceneRenderer:
         return replace(sample, image=_resize(add_noise(rendered.image, noise, rng)))
 
     def _render_initial(self, rng: np.random.Generator) -> Sample | None:
-        """Return the sample of an initial scene of a run, or None if too many objects are half occluded."""
+        """Return the sample of an initial scene, or None if too many objects are heavily occluded."""
         world, camera = self._world, self._camera
         pose = np.radians(self._config.arm.poses_deg[str(rng.choice(camera.scan_poses))])
         world.set_joint_positions(pose)
@@ -187,12 +187,12 @@ class SceneRenderer:
         second_frame = add_noise(rendered.image, camera.noise, rng)
         left, top, right, bottom = region = camera.table_view
         pixels = np.s_[top:bottom, left:right]
-        shown = replace(rendered, image=rendered.image[pixels], bodies=rendered.bodies[pixels], region=region)
+        view = replace(rendered, image=rendered.image[pixels], bodies=rendered.bodies[pixels], region=region)
         # The minimum contrast depends on the declared noise, so that more noise does not reduce the labels.
-        sample = _build_sample(shown, MIN_CONTRAST * self._declared_camera.noise.read, objects)
+        sample = _build_sample(view, MIN_CONTRAST * self._declared_camera.noise.read, objects)
         if sample is None:
             return None
-        # A run uses the declared matrix and pose, even if the scene has errors of the camera.
+        # A run uses the declared matrix and pose, even if the scene has calibration errors.
         sample = replace(sample, matrix=compute_calibration(self._declared_camera)[0], X_WC=declared_X_WC)
         image = _resize(frame[pixels])
         return replace(sample, image=image, frame=frame, depth=depth, second_frame=second_frame)
@@ -201,12 +201,12 @@ class SceneRenderer:
 def _build_sample(
     rendered: RenderedImage, min_contrast: float, objects: Mapping[int, SceneObject]
 ) -> Sample | None:
-    """Return a sample without noise, or None if too many of the objects, by body, are half occluded.
+    """Return a sample without noise, or None if too many objects are heavily occluded.
 
-    A labelled object has at least `min_contrast` [grey level].
+    `objects` is indexed by body. Objects with less contrast than `min_contrast` [grey level] are ignored.
     """
     labels, boxes, fractions, positions, centres = [], [], [], [], []
-    ignored, half_occluded_count = [], 0
+    ignored, heavily_occluded_count = [], 0
     corner = np.array(rendered.region[:2], dtype=float)
     scale = IMAGE_SIZE / (rendered.region[2] - rendered.region[0])
     for body, scene_object in objects.items():
@@ -217,23 +217,23 @@ def _build_sample(
         vertices = scene_object.X_WO.apply(mesh.vertices)
         pixels = project(rendered.matrix, rendered.X_WC, vertices)
         fraction = compute_visible_fraction(mesh, pixels, mask)
-        whole_box = compute_bounding_box(pixels)
-        box = _transform_box(whole_box, corner, scale)
+        unclipped_box = compute_bounding_box(pixels)
+        box = _transform_box(unclipped_box, corner, scale)
         if fraction < MIN_VISIBLE_FRACTION:
             continue
-        is_half_occluded = fraction < MIN_LABELLED_FRACTION
-        half_occluded_count += is_half_occluded
-        if is_half_occluded or measure_contrast(rendered.image, mask) < min_contrast:
+        is_heavily_occluded = fraction < MIN_LABELLED_VISIBLE_FRACTION
+        heavily_occluded_count += is_heavily_occluded
+        if is_heavily_occluded or measure_contrast(rendered.image, mask) < min_contrast:
             ignored.append(box)
             continue
         centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-        pixel = ((whole_box[0] + whole_box[2]) / 2, (whole_box[1] + whole_box[3]) / 2)
+        pixel = ((unclipped_box[0] + unclipped_box[2]) / 2, (unclipped_box[1] + unclipped_box[3]) / 2)
         labels.append(scene_object.label)
         boxes.append(box)
         fractions.append(fraction)
         positions.append(intersect_plane(rendered.matrix, rendered.X_WC, pixel, float(centre[2])))
         centres.append(centre)
-    if half_occluded_count > max(1, len(objects) * MAX_HALF_OCCLUDED_FRACTION):
+    if heavily_occluded_count > max(1, len(objects) * MAX_HEAVILY_OCCLUDED_FRACTION):
         return None
     return Sample(
         image=rendered.image,
@@ -262,8 +262,8 @@ def _remove_at_end(world: World, bodies: Iterable[int]) -> Iterator[None]:
 def measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
     """Return the contrast between an object and a ring of two pixels around the object [grey level].
 
-    The contrast of a pixel is its maximum difference over the three colours from the median of the ring. The
-    result is the median of the contrasts of the object's pixels, or 0 if the ring is empty.
+    The contrast of a pixel is the maximum difference from the median of the ring over the three channels.
+    The result is the median contrast of the object's pixels, or 0 if the ring is empty.
 
     Args:
         image: Image `(H, W, 3)`.

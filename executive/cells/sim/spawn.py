@@ -33,7 +33,7 @@ MAX_STACK_OFFSET = 0.004
 PUSH_SPEED = 0.1
 """Horizontal speed given to an upper object to test a stack [m/s]; a stable object stops within 1 mm."""
 MAX_DISPLACEMENT = 0.005
-"""Maximum distance from the goal of an object of a stable stack [m]."""
+"""Maximum distance of an object in a stable stack from its goal position [m]."""
 
 
 @dataclass(frozen=True)

@@ -41,11 +41,11 @@ class _Grip:
 
 
 class SuctionTool:
-    """The suction tool of a `World`; implements `Tool`. Each physics step is followed by a call of `advance`.
+    """The suction tool of a `World`; implements `Tool`. Call `advance` after each physics step.
 
     A held body keeps its pose relative to the tool until the filtered pull on the seal exceeds the breakaway
-    force; moments do not break the seal. Right after a break the object is still within reach. The seal
-    therefore forms again only after the object has left the reach or the vacuum was off.
+    force; moments do not break the seal. The object is still within reach immediately after a break. A
+    new seal therefore forms only after the object has left the reach or the vacuum has been off.
 
     Attributes:
         dropped_bodies: Bodies whose last seal broke; ground truth, not for skills.
@@ -58,7 +58,7 @@ class SuctionTool:
         self._grip: _Grip | None = None
         self._separating_body: int | None = None
         self._last_touch_check = (-1, False)
-        """Number of physics steps at the last check of `touching`, and its result."""
+        """Number of physics steps at the last check of `touching`, and the result of the check."""
         self.dropped_bodies: set[int] = set()
 
     @property
@@ -95,7 +95,7 @@ class SuctionTool:
         self._world.log.append(command_log.VACUUM_ON)
         self._is_vacuum_on = True
         if self._grip is None:
-            self._seal()
+            self._try_to_seal()
 
     def open(self) -> None:
         """Release the held body and switch the vacuum off."""
@@ -120,7 +120,7 @@ class SuctionTool:
         if self._grip is not None:
             self._check_pull(self._grip)
         elif self._is_vacuum_on:
-            self._seal()
+            self._try_to_seal()
 
     def _check_pull(self, grip: _Grip) -> None:
         """Filter the pull on the seal, and break the seal if the pull exceeds the breakaway force."""
@@ -129,7 +129,7 @@ class SuctionTool:
         if float(np.linalg.norm(grip.pull)) > grip.breakaway_force:
             self.break_seal()
 
-    def _seal(self) -> None:
+    def _try_to_seal(self) -> None:
         """Hold a body within reach if the seal is strong enough."""
         near_bodies = set(self._find_bodies_near(self._config.reach))
         if self._separating_body not in near_bodies:

@@ -71,7 +71,7 @@ def draw_table_appearance(rng: np.random.Generator) -> tuple[Colour, str]:
 
 
 def draw_object_colour(palette: Sequence[Colour], table_colour: Colour, rng: np.random.Generator) -> Colour:
-    """Return a colour of an object: of its class, any hue, grey, nearly black, or similar to the table.
+    """Return a random object colour: of the class, of any hue, grey, nearly black, or similar to the table.
 
     Args:
         palette: Colours of the class of the object.
@@ -104,7 +104,7 @@ def draw_hsv_colour(
 def draw_camera(
     camera: CameraConfig, matrix: Array, X_WC: Pose, rng: np.random.Generator
 ) -> tuple[Array, Pose]:
-    """Return camera matrix and pose of a camera: as declared in 40 % of the scenes, else random.
+    """Return camera matrix and pose of a camera: as declared in 40 % of the scenes, otherwise random.
 
     The pose of a camera on the wrist is not changed, because the pose of the arm already varies.
 
@@ -133,9 +133,9 @@ def draw_camera(
 
 
 def draw_noise(noise: NoiseConfig, rng: np.random.Generator) -> NoiseConfig:
-    """Return the noise of a camera: as declared in 60 % of the scenes, else random.
+    """Return the noise of a camera: as declared in 60 % of the scenes, otherwise random.
 
-    The random gain noise is larger than declared, and the random read noise is 0.37 to 9 times as large.
+    Random gain noise exceeds the declared noise; random read noise is 0.37 to 9 times the declared noise.
     """
     if rng.random() < 0.6:
         return noise

@@ -76,9 +76,9 @@ class World:
         self.client.setPhysicsEngineParameter(deterministicOverlappingPairs=1)
         flags = 0 if visuals else pybullet.URDF_IGNORE_VISUAL_SHAPES
         self.floor = self.client.loadURDF(str(find_model("plane.urdf")), [0, 0, -TABLE_HEIGHT], flags=flags)
-        table, position = str(find_model("table/table.urdf")), [*TABLE_CENTRE, -TABLE_HEIGHT]
+        urdf, position = str(find_model("table/table.urdf")), [*TABLE_CENTRE, -TABLE_HEIGHT]
         quaternion = self.client.getQuaternionFromEuler([0, 0, np.pi / 2])
-        self.table = self.client.loadURDF(table, position, quaternion, useFixedBase=True, flags=flags)
+        self.table = self.client.loadURDF(urdf, position, quaternion, useFixedBase=True, flags=flags)
         self.table_top = TableTop(self.client, self.table)
         self.arm = self._load_arm(flags)
         self.bin_bodies = {name: add_bin(self.client, bin) for name, bin in config.bins.items()}
@@ -98,7 +98,7 @@ class World:
 
         Args:
             label: Class of the object.
-            X_WO: Pose of the upright frame O of the object (see `compute_upright_pose`).
+            X_WO: Pose of the upright frame O of the object, whose z axis points up, in the world.
             colour: Red, green and blue, each 0 to 1.
             model: Model of the object; None: the model of the class in the cell file.
         """
@@ -194,9 +194,9 @@ class World:
         tool = self.config.tool
         text = text.replace("</robot>", _make_tool_urdf(tool.length, tool.cup_radius, self.robot))
         with tempfile.TemporaryDirectory() as folder:
-            generated = Path(folder) / "arm_with_tool.urdf"
-            generated.write_text(text)
-            return int(self.client.loadURDF(str(generated), useFixedBase=True, flags=flags))
+            urdf_path = Path(folder) / "arm_with_tool.urdf"
+            urdf_path.write_text(text)
+            return int(self.client.loadURDF(str(urdf_path), useFixedBase=True, flags=flags))
 
 
 def name_load(label: str) -> str:
