@@ -30,7 +30,7 @@ def check_arm_at_rest(workcell: Workcell) -> Iterator[str]:
 
 
 def check_journal(events: Sequence[TimedEvent], run_end: RunEnded) -> Iterator[str]:
-    """Yield a problem if not only the last event is `RunEnded`, or if a node starts twice or does not end."""
+    """Yield a problem unless the last event is the only `RunEnded`, and each node ends before it restarts."""
     ends = [timed.event for timed in events if isinstance(timed.event, RunEnded)]
     if len(ends) != 1 or events[-1].event is not ends[0]:
         yield f"the journal has {len(ends)} RunEnded in {len(events)} events; only the last must be one"

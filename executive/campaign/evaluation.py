@@ -55,7 +55,7 @@ class SceneSettings:
         image_count: Number of images per cell.
         seed: Random seed.
         is_varied: True for scenes that vary as in training; False for the initial scenes of runs.
-        view: Region that is searched in initial scenes of runs: `table`, or `full` for the whole frame.
+        view: Image region of detection in initial scenes of runs: `table`, or `full` for the whole image.
         workers: Number of rendering processes.
         scene: Scene file that changes the initial scenes of runs; None: no change.
     """

@@ -37,7 +37,7 @@ class MissionUnderTest:
 
     @property
     def requests(self) -> list[str]:
-        """Requests of the operator: enough for each class of the mission, if all objects have this class."""
+        """Requests of the operator: for each class of the mission, as many as objects can be on the table."""
         return [*self.loaded.routes] * self.loaded.cell_config.table.objects[1]
 
 

@@ -49,23 +49,23 @@ def run_jobs(
     """
     pending_indices = deque(range(len(jobs)))
     results: dict[int, JobResult] = {}
-    running: dict[Future[JobResult], int] = {}
+    running_jobs: dict[Future[JobResult], int] = {}
     pool, is_broken, is_halted, signal_event = WorkerPool(workers), False, False, threading.Event()
     try:
         with handle_signals(HALT_SIGNALS, lambda *_: signal_event.set()):
-            while running or (pending_indices and not is_halted):
-                # The pool gets only jobs that can start, because it cannot remove a job from its queue.
-                while pending_indices and len(running) < workers:
+            while running_jobs or (pending_indices and not is_halted):
+                # The pool gets only jobs that can start at once, because queued jobs cannot be removed.
+                while pending_indices and len(running_jobs) < workers:
                     if is_broken or is_halted or signal_event.is_set():
                         break
                     index = pending_indices[0]
                     try:
-                        running[pool.submit(run_job, jobs[index])] = index
+                        running_jobs[pool.submit(run_job, jobs[index])] = index
                     except BrokenExecutor:  # A worker died after its last result was read.
                         is_broken = True
                     else:
                         pending_indices.popleft()
-                ended, _ = wait(running, MAX_HALT_DELAY, FIRST_COMPLETED)
+                ended_jobs, _ = wait(running_jobs, MAX_HALT_DELAY, FIRST_COMPLETED)
                 # Two signals within `MAX_HALT_DELAY` count as one signal: the command `timeout` sends two.
                 if signal_event.is_set():
                     signal_event.clear()
@@ -77,15 +77,15 @@ def run_jobs(
                         on_halt()
                 if is_halted:
                     _halt_runs()
-                for future in ended:
-                    index, error = running.pop(future), future.exception()
+                for future in ended_jobs:
+                    index, error = running_jobs.pop(future), future.exception()
                     is_broken = is_broken or isinstance(error, BrokenExecutor)
                     if is_halted and isinstance(error, BrokenExecutor):
                         continue  # The signal also killed a worker.
                     results[index] = future.result() if error is None else make_failure(jobs[index], error)
                     if progress is not None:
                         progress(len(results), len(jobs))
-                if is_broken and not running:
+                if is_broken and not running_jobs:
                     pool.shutdown()
                     pool, is_broken = WorkerPool(workers), False
     finally:

@@ -76,7 +76,7 @@ def summarize_results(results: Sequence[Result], requested_count: int) -> dict[s
     """
     results = [result for result in results if result.status != "HALTED"]
     audits = [result.audit for result in results if result.audit is not None]
-    right_count = sum(audit.right for audit in audits)
+    sorted_count = sum(audit.right for audit in audits)
     total_count = sum(audit.right + audit.wrong_bin + audit.left + audit.elsewhere for audit in audits)
     return {
         "asked": requested_count,
@@ -84,10 +84,10 @@ def summarize_results(results: Sequence[Result], requested_count: int) -> dict[s
         "runs": len(results),
         "succeeded": sum(result.status == "SUCCESS" for result in results),
         "objects": {
-            "right": right_count,
+            "right": sorted_count,
             "total": total_count,
-            "share": round(right_count / total_count, 6) if total_count else 0.0,
-            "interval_95": [round(limit, 6) for limit in compute_wilson_interval(right_count, total_count)],
+            "share": round(sorted_count / total_count, 6) if total_count else 0.0,
+            "interval_95": [round(limit, 6) for limit in compute_wilson_interval(sorted_count, total_count)],
         },
         "disagreements": [
             {"seed": result.seed, "items": asdict(result.items), "audit": asdict(audit), "run": result.run}
@@ -96,7 +96,7 @@ def summarize_results(results: Sequence[Result], requested_count: int) -> dict[s
         ],
         "robot_time_s": summarize_values([result.robot_time_s for result in results]),
         "robot_time_per_object_s": (
-            round(sum(result.robot_time_s for result in results) / right_count, 3) if right_count else None
+            round(sum(result.robot_time_s for result in results) / sorted_count, 3) if sorted_count else None
         ),
         "planning": {
             key: round(sum(getattr(result.planning, key) for result in results), 3)

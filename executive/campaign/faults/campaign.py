@@ -76,7 +76,7 @@ class Campaign:
         """Execute a run for each single fault and return the results.
 
         If a node runs only after other faults, the smallest combination of faults that activates the node is
-        injected, too. If a fault of the cell does not let the node fail, its skill fails in another run.
+        injected, too. If a fault of the cell does not let the node fail, the skill fails in another run.
         """
         trials: list[Trial] = []
         is_complete = True
@@ -113,19 +113,19 @@ class Campaign:
         )  # fmt: skip
 
     def _list_next_combinations(self, trials: Sequence[Trial]) -> list[FaultNumbers]:
-        """Return the combinations of faults that can occur according to the ended trials."""
+        """Return the combinations of faults for the next trials, which can occur according to `trials`."""
         triggers_by_path = self._find_smallest_triggers(trials)
         trials_by_number = {trial.fault_numbers[-1]: trial for trial in trials}
         combinations = []
         for number, fault in enumerate(self.faults, 1):
             if number in trials_by_number:
                 continue
-            replaced = trials_by_number.get(fault.replaced_number)
-            if fault.replaced_number and (replaced is None or replaced.raised):
+            replaced_trial = trials_by_number.get(fault.replaced_number)
+            if fault.replaced_number and (replaced_trial is None or replaced_trial.raised):
                 continue
-            required = triggers_by_path.get(fault.location) if fault.is_conditional else ()
-            if required is not None and len(required) < MAX_FAULTS_PER_RUN:
-                combinations.append((*required, number))
+            required_faults = triggers_by_path.get(fault.location) if fault.is_conditional else ()
+            if required_faults is not None and len(required_faults) < MAX_FAULTS_PER_RUN:
+                combinations.append((*required_faults, number))
         return combinations
 
     def _find_smallest_triggers(self, trials: Iterable[Trial]) -> dict[str, FaultNumbers]:
@@ -140,7 +140,7 @@ class Campaign:
     def _run_trials(self, combinations: Sequence[FaultNumbers], offset: int) -> tuple[list[Trial], bool]:
         """Execute a trial for each combination of faults; `offset` is the number of earlier trials.
 
-        Return the complete trials, and True if the user halted no trial.
+        Return the complete trials, and True if all trials are complete.
         """
 
         def report_progress(ended_count: int, total: int) -> None:
@@ -155,8 +155,8 @@ class Campaign:
             progress=report_progress,
             on_halt=self._on_halt,
         )
-        complete = [trial for trial in trials if trial is not None and not trial.is_halted_by_user]
-        return complete, len(complete) == len(combinations)
+        complete_trials = [trial for trial in trials if trial is not None and not trial.is_halted_by_user]
+        return complete_trials, len(complete_trials) == len(combinations)
 
 
 def _make_aborted_trial(faults: FaultsByNumber, error: BaseException) -> Trial:

@@ -18,11 +18,11 @@ from executive.testing.faults.effect import Effect
 from executive.testing.faults.script import ScheduledFault, TimeSpan, after, between, during
 
 FAULT_DURATIONS = (0.5, 5.0)
-"""Durations of faults of detectors and tool [s]; a request to a detector fails after the longer duration."""
+"""Durations of faults of detectors and tool [s]; the longer one is also the timeout of hanging requests."""
 QUARTER_FRACTIONS: tuple[tuple[Occasion, float], ...] = (("first", 0.25), ("middle", 0.5), ("late", 0.75))
 """Fractions of the nominal run, or of a motion, after which faults of objects occur, by occasion."""
 REPEATED_ACTIVATIONS = tuple(range(1, 21))
-"""Numbers of the activations in which a lasting fault occurs that must not last until the end of the run."""
+"""Numbers of the activations with a repeated fault, if the fault must end before the end of the run."""
 TRANSPORT_FRACTIONS: tuple[tuple[Occasion, float], ...] = (
     ("first", 0.1), ("first", 0.3), ("middle", 0.5), ("late", 0.7), ("late", 0.9),
 )  # fmt: skip
@@ -86,7 +86,7 @@ def list_faults(mission: MissionUnderTest, nominal_run: NominalRun) -> tuple[Pla
         *lister.list_object_faults(),
         *lister.list_tool_faults(),
     ]
-    # A fault with the provisional number -1 replaces the fault directly before it in the list.
+    # `replaced_number` -1 marks a fault that replaces the fault directly before it in the list.
     return tuple(
         replace(fault, replaced_number=index) if fault.replaced_number else fault
         for index, fault in enumerate(faults)
@@ -103,7 +103,7 @@ class _FaultLister:
         self.nodes = list_skill_nodes(mission)
 
     def list_failures(self, node: SkillNode) -> Iterator[PlannedFault]:
-        """Yield the failures of a node: each reason on each occasion, caused by cell and by skill."""
+        """Yield the failures of a node: each reason on each occasion, caused by the cell and by the skill."""
         skill = self._skills[node.skill]
         activation_count = len(self._nominal_run.steps_by_path.get(node.path, ()))
         occasions: list[tuple[Occasion, tuple[int, ...]]] = [("first", (1,)), ("lasting", ())]
@@ -179,7 +179,7 @@ class _FaultLister:
                     yield self._make_node_fault(node, kind, occasion, _describe_time(fraction), cell_fault)
 
     def list_tool_faults(self) -> Iterator[PlannedFault]:
-        """Yield broken seals during a transport, and impossible seals during a grasp."""
+        """Yield losses of the seal during a transport, and times in which the suction cup cannot seal."""
         for node in self.nodes:
             skill = self._skills[node.skill]
             if not (skill.moves and skill.tool_state[0] is HOLDING and self._has_run(node)):

@@ -17,7 +17,7 @@ from executive.run.assembly import RunOptions, assemble
 MIN_TIMEOUT = 60.0
 """Minimum time on the run's clock after which a run with faults ends as a fault [s]."""
 MAX_DELAY_FACTOR = 10.0
-"""Maximum duration of a run with faults, relative to the nominal run, in addition to `MIN_TIMEOUT`."""
+"""Additional time for a run with faults, as a multiple of the duration of the nominal run."""
 
 
 @dataclass(frozen=True)

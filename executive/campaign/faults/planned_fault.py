@@ -54,7 +54,7 @@ class PlannedFault:
         cause: Cause of the fault, a few words.
         cell_faults: Injected faults of the cell.
         skill_faults: Injected faults of skills.
-        is_failure_reason: True if `kind` is a failure reason, with which the node must fail.
+        is_failure_reason: True if `kind` is a failure reason: the fault must let the node fail with it.
         expected_reason: Reason with which skills should fail because of a fault of a part; "": no reason.
         is_conditional: True if the node runs only after another fault.
         replaced_number: Number of the fault that this fault replaces if the node does not fail; 0: none.
@@ -92,12 +92,12 @@ def make_substitutes(
         skill = substitutes.get(fault.node, skills[fault.node])
         error = InjectedError("a bug that the campaign injected")
         if fault.kind == "fails":
-            faulty = _make_failing(skill, fault.reason)
+            faulty_type = _make_failing(skill, fault.reason)
         elif fault.kind == "raises":
-            faulty = make_raising(skill, error, delay_steps=fault.delay_steps)
+            faulty_type = make_raising(skill, error, delay_steps=fault.delay_steps)
         else:
-            faulty = make_raising_when_halted(skill, error)
-        substitutes[fault.node] = make_substitute(skill, "Faulty", faulty.run, fault.activations or None)
+            faulty_type = make_raising_when_halted(skill, error)
+        substitutes[fault.node] = make_substitute(skill, "Faulty", faulty_type.run, fault.activations or None)
     return substitutes
 
 

@@ -64,9 +64,9 @@ def record_trial(
 
 def make_empty_trial(faults: FaultsByNumber) -> Trial:
     """Return a trial with these faults and without results."""
-    last = list(faults.values())[-1]
+    fault = list(faults.values())[-1]
     descriptions = tuple(map(str, faults.values()))
-    return Trial(tuple(faults), descriptions, last.name, last.mission_line, last.kind, last.occasion)
+    return Trial(tuple(faults), descriptions, fault.name, fault.mission_line, fault.kind, fault.occasion)
 
 
 class _TrialRun:
@@ -140,7 +140,7 @@ class _TrialRun:
             self._events.append(timed)
 
     def _stop_run_for_halt_error(self) -> None:
-        """Stop the run if a skill must be halted now, because it must raise an error when it is halted."""
+        """Stop the run at the tick at which a skill that raises an error when halted must be halted."""
         for skill_fault in self._skill_faults:
             start_tick = self._recorder.start_ticks.get(skill_fault.node)
             if skill_fault.kind != "raises when halted" or start_tick is None:
@@ -163,7 +163,7 @@ class _TrialRun:
         return not names.isdisjoint(injected) or (bool(fault.skill_faults) and self._has_effect(fault))
 
     def _has_effect(self, fault: PlannedFault) -> bool:
-        """Return True if the node raised the bug or failed as intended, or if neither is intended."""
+        """Return True if the fault let its node raise the bug or fail with the reason; True for other faults."""
         node_ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
         node_ends = [end for end in node_ends if end.node == fault.location]
         if fault.is_bug:

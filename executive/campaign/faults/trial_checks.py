@@ -44,7 +44,7 @@ def check_end(
         run_end: End of the run.
         faults: Injected faults.
         unhandled_failures: Failures with which the mission may end, according to the check of the mission.
-        is_bug_raised: True if an injected bug was raised; then the run must end as a fault at its node.
+        is_bug_raised: True if an injected bug was raised: the run must end as a fault at the node of the bug.
     """
     if run_end.status == "FAULT":
         nodes = [fault.location for fault in faults if fault.is_bug]
@@ -129,7 +129,7 @@ def check_ledger(
 def check_success(
     run_end: RunEnded, audit: Mapping[str, int] | None, events: Sequence[TimedEvent]
 ) -> Iterator[str]:
-    """Yield a problem if the run searched images and succeeded, but never detected some of the objects."""
+    """Yield a problem if detectors were used and the run succeeded, but some objects were never detected."""
     has_searched = any(isinstance(timed.event, FrameSearched) for timed in events)
     is_complete = run_end.status in ("SUCCESS", "INCOMPLETE")
     if has_searched and is_complete and audit is not None and audit["unseen"]:
