@@ -1,7 +1,7 @@
 """Association of observations with items: by position first, then by class.
 
-`associate` matches each observation to a nearby item, `find_moved_item` a new item to a known item that may
-have been moved, and `find_duplicate` two items at one position.
+`associate` matches observations to nearby items. `find_moved_item` matches a new item to a known item that
+may have been moved. `find_duplicate` finds a second item at the position of an item.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from executive.ledger.staleness import Staleness
 MAX_STANDARD_DEVIATIONS = 3.5
 """Number of standard deviations within which two measurements of a position agree with probability 0.999."""
 AMBIGUITY_FACTOR = 1.5
-"""Maximum distance of an item that an observation may show, as a multiple of the association distance."""
+"""Maximum distance of an observation from an item it may show, as a multiple of the association distance."""
 MAX_PUSH_DISTANCE = 0.12
 """Maximum distance by which a person may push an item that still counts as the same item [m]."""
 MAX_MISS_PROBABILITY_OF_MOVED_ITEM = 0.05

@@ -22,7 +22,7 @@ ITEM_AREA_FRACTION = 0.02
 MAX_LOG_ODDS_OF_AMBIGUOUS_ITEM = math.log(0.1)
 """Maximum log odds of existence of a new item that may be a known item at a wrongly measured position."""
 MIN_LOG_ODDS_OF_PROOF = math.log(1e4)
-"""Minimum log odds of existence of a proved item; two equal detections of a good detector suffice."""
+"""Minimum log odds of existence of a proved item (`Belief.is_proved`); two equal detections may suffice."""
 
 
 def make_viewpoint_key(look: Detections) -> str:
@@ -51,11 +51,11 @@ class Belief:
         is_proved: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
         uncertain_look_count: Number of looks with a low-confidence detection since the last confident look.
-        last_label_by_viewpoint: Last detected class by viewpoint key, since the last possible move.
+        last_label_by_viewpoint: Last detected class by viewpoint key; cleared if the item may have moved.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.
         label_counts: Number of looks by detected class.
-        max_confusion_rate: Largest rate of wrong classes of the detectors that detected the item, 0 to 1.
+        max_confusion_rate: Largest confusion rate of the detectors that detected the item, 0 to 1.
     """
 
     first_label: str

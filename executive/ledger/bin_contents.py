@@ -77,9 +77,9 @@ class BinContents:
     def place_dropped_items(
         self, look: Detections, bin_names: Mapping[Observation, str | None], records: Collection[ItemRecord]
     ) -> list[ItemRecord]:
-        """Mark and return, as PLACED, the dropped items that almost certainly lie in a permitted bin.
+        """Set dropped items that almost certainly lie in a permitted bin to PLACED; return these items.
 
-        If a look shows more objects of a class in a bin than known items, an object may be a dropped item.
+        If a look shows more objects of a class in a bin than known items, one object may be a dropped item.
 
         Args:
             look: Detections in a whole image.

@@ -18,13 +18,13 @@ MIN_P_VALUE = 0.01
 MAX_P_VALUE_TO_REJECT = 0.001
 """Upper limit of the p-value of an item that is rejected because the looks disagree about its class."""
 RETRY_STANDARD_ERROR_FACTOR = 2 / 3
-"""Maximum standard error of an item's position after a failed grasp, as a fraction of the usual maximum."""
+"""Maximum standard error of an item's position after a failed grasp, as a fraction of `max_position_std`."""
 MIN_MISS_PROBABILITY_OF_PICK = 0.1
 """Minimum miss probability (`Belief.miss_probability`) of an item that is picked."""
 MIN_LOOKS_TO_REJECT = 40
 """Minimum number of looks at an item that is rejected because the looks disagree about its class."""
 MIN_CONTRADICTIONS_TO_REJECT = 3
-"""Minimum number of contradicted looks (`ItemRecord.contradiction_count`) at a rejected item."""
+"""Minimum number of looks that contradict the class (`ItemRecord.contradiction_count`) of a rejected item."""
 MIN_REPEATS_FOR_SATURATION = 2
 """Number of repeated classes after which more looks from a viewpoint add hardly any evidence."""
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
@@ -49,7 +49,7 @@ class Certainty:
         """Return True if an item's existence, class and position are certain enough to touch the item.
 
         After a failed grasp, the position must be known more precisely. A larger class error is permitted if
-        the height of a touch can prove the class, and more looks from the same viewpoint cannot.
+        further looks from the same viewpoint cannot prove the class, but the height of a touch can.
         """
         belief, max_class_error = record.belief, self.config.max_class_error
         is_saturated = belief.repeat_count >= MIN_REPEATS_FOR_SATURATION
@@ -108,7 +108,7 @@ class Certainty:
     def register_low_touch(self, record: ItemRecord) -> bool:
         """Count a touch below the height of the class; return False if the touch contradicts the class.
 
-        The first low touch is no contradiction if the looks prove the class; the cup may have missed the top.
+        The first low touch is no contradiction if the looks prove the class: the cup may have missed the top.
         """
         record.low_touch_count += 1
         return record.low_touch_count == 1 and record.belief.class_error <= self.config.max_class_error

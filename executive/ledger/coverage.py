@@ -23,14 +23,14 @@ PRIOR_OUTSIDE_AFTER_CHANGE = 0.1
 MIN_MISS_PROBABILITY = 1e-4
 """Lower limit of the miss probability; correlated looks must not add evidence without limit."""
 RECENT_FULL_LOOK_COUNT = 4
-"""Number of most recent looks at the whole image; a point that none of them shows is not visible."""
+"""Number of most recent looks at the whole image; a point that is in none of these looks is not visible."""
 BORDER_WIDTH = 12.0
 """Width of the border of an image in which a point does not count as visible [pixel]."""
 WORKSPACE_TOLERANCE = 0.03
 """Maximum distance from the workspace of an object that counts as inside [m]."""
 PRIOR_IN_WORKSPACE = 0.1
-"""Prior probability of an object at a grid point of the workspace: three objects of 6 cm x 6 cm on the
-22 cm x 44 cm of the shipped cells."""
+"""Prior probability of an object at a grid point of the workspace: three objects of 6 cm x 6 cm in the
+workspace of the shipped cells, which measures 22 cm x 44 cm."""
 POINT_HEIGHT = 0.025
 """Height of the grid points above the table [m]: the centre of a typical object."""
 

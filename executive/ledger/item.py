@@ -67,7 +67,7 @@ class ItemRecord:
         first_change_count: Number of changes of the table before the first detection.
         first_stamp: Capture time of the first detection [s].
         has_appeared: True if the position of the first detection was empty in earlier looks.
-        position: Mean of the measured positions since the last possible move `(3,)` [m].
+        position: Mean of the positions measured since the last possible move of the item `(3,)` [m].
         standard_error: Standard error of `position` along each axis [m].
         bias_std: Standard deviation of the systematic error of `position` along each axis [m].
         was_moved: True if the item was detected after a possible move.
@@ -79,11 +79,11 @@ class ItemRecord:
         bin: Name of the bin that contains the item, or "".
         reason: Reason of the state, or "".
         attempt_count: Number of failed attempts to pick the item.
-        empty_probe_count: Number of descents that touched only the table, since the last move or touch.
+        empty_probe_count: Number of descents that found only the table, since the item was moved or touched.
         had_contact: True if the tool has touched the item at any height.
         touched_label: Class whose height the last touch confirmed, or "".
         low_touch_count: Number of touches below the height of the class, since the last confirmed height.
-        contradiction_count: Number of looks that contradict the class, since the last possible move.
+        contradiction_count: Number of looks against the class since the last possible move of the item.
         last_contradiction: Sentence with the last evidence of size or height against the class, or "".
         bin_log_odds: Log odds, by bin, that the dropped item lies in the bin.
         is_untracked: True if the tool may have moved the item while the journal was incomplete.
@@ -154,7 +154,7 @@ class ItemRecord:
         self.belief.repeat_count = self.contradiction_count = 0
 
     def update_position(self, position: Array, std: float, *, is_unmoved: bool) -> None:
-        """Replace the position by a measurement after a move, else by the inverse-variance weighted mean.
+        """Set the position to a measurement or, if the item is unmoved, to the weighted mean of all positions.
 
         Args:
             position: Measured position `(3,)` [m].

@@ -43,7 +43,7 @@ def make_look_event(look: Detections, observations: Sequence[Observation]) -> Fr
 
 @dataclass(frozen=True)
 class LookUpdate:
-    """Update of all items with one look, step by step.
+    """Update of all items with one look; `apply` executes the update.
 
     Attributes:
         config: Thresholds of the ledger, from the cell file.
@@ -62,7 +62,7 @@ class LookUpdate:
     def apply(self, observations: Sequence[Observation]) -> list[ItemRecord]:
         """Update the items with the observations on the table, and return the changed items.
 
-        Observations at positions where the robot has moved objects since the capture are ignored.
+        Observations at positions where the robot may have moved objects since the capture are ignored.
         """
         observations = [entry for entry in observations if self._is_unmoved_since_capture(entry.position)]
         confident_observations = [entry for entry in observations if entry.is_confident]
@@ -72,7 +72,7 @@ class LookUpdate:
         uncertain_items = self._update_uncertain_items(detected_items, doubtful_observations)
         missed_items = [item for item in known_items if item not in (*detected_items, *uncertain_items)]
         phantoms = self._update_missed_items(missed_items)
-        # The positions of rejected items count as searched: no other look is necessary.
+        # The positions of rejected items count as searched: no further look at these items is necessary.
         uncertain_positions = [item.position for item in uncertain_items if item.state is State.SEEN]
         self.coverage.update(self.look, uncertain_positions)
         phantoms += self._merge_moved_items(detected_items) + self._remove_duplicates(detected_items)
@@ -86,7 +86,7 @@ class LookUpdate:
         self, known_items: Sequence[ItemRecord], observations: Sequence[Observation]
     ) -> list[ItemRecord]:
         """Update known items with confident observations, add new items, and return the detected items."""
-        # An object at the position of an unlikely item that may have been moved is a new item.
+        # An object at the position of an unlikely item that may have been moved counts as a new item.
         likely_items = [item for item in known_items if item.belief.existence_probability >= 0.5]
         candidates = [item for item in known_items if item in likely_items or self.staleness.is_unmoved(item)]
         matches = associate(observations, candidates, self.staleness, self.config.gate)
@@ -115,16 +115,16 @@ class LookUpdate:
         """Update items with low-confidence observations, and return these items.
 
         Observations near detected items are ignored. Other observations are assigned to the nearest item. If
-        no item is near, the observation becomes a new item, except at a position that looks found empty.
+        no item is near, the observation becomes a new item, unless earlier looks found the position empty.
         """
         updated_items: list[ItemRecord] = []
         for observation in observations:
             if self._may_show_any_item(observation, detected_items):
                 continue
-            on_table = [record for record in self.records if record.state in ON_TABLE]
-            near = [record for record in on_table if may_show_item(observation, record, self.config.gate)]
+            on_table = [item for item in self.records if item.state in ON_TABLE]
+            near_items = [item for item in on_table if may_show_item(observation, item, self.config.gate)]
             max_miss_probability = self.config.max_miss_probability
-            candidates = [item for item in near if item.belief.miss_probability > max_miss_probability]
+            candidates = [item for item in near_items if item.belief.miss_probability > max_miss_probability]
             record = min(candidates, key=lambda item: item.distance_to(observation.position), default=None)
             if record is None:
                 prior_odds = self._compute_expected_count(observation) * ITEM_AREA_FRACTION

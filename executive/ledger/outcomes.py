@@ -29,7 +29,7 @@ def find_final_state(
     The first rule that applies determines the state:
 
     1. An item in the tool is rejected.
-    2. An item with low-confidence detections only, which no look has missed, is rejected.
+    2. An item that only low-confidence detections show, and that no look has missed, is rejected.
     3. An item whose probability of existence is below 0.5 is a phantom.
     4. An item that the tool never touched in at least `MIN_EMPTY_PROBES` descents to the table is a phantom,
        if the tool has touched another item at the expected height.
@@ -43,7 +43,7 @@ def find_final_state(
 
     Args:
         record: The item.
-        certainty: Thresholds of the evidence for a certain item.
+        certainty: Criteria for an item with sufficient evidence.
         has_route: True if the mission has a bin for the item's class.
         is_completed: True if the behaviour tree succeeded.
         has_touched_item: True if the tool has touched any item at the height of its class.
@@ -78,8 +78,8 @@ def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[Ite
     """Set lost items that a person has moved elsewhere to PHANTOM, and return the phantoms.
 
     A lost item counts as moved if a new item of the same class appeared at an empty position after the last
-    detection of the lost item. A new item must certainly exist, and replaces one lost item. Dropped items
-    do not count, because the tool held them after their last detection.
+    detection of the lost item. The new item must be proved to exist, and replaces only one lost item.
+    Dropped items do not count, because the tool held them after their last detection.
     """
     proved_items = (record for record in records if record.belief.is_proved and record.state in FINAL_STATES)
     new_items = [record for record in proved_items if record.has_appeared]

@@ -57,7 +57,7 @@ class Tracker:
         self._bins = BinContents(config, bins, routes)
         self._coverage, self._staleness = Coverage(table), Staleness()
         self._recovery: Recovery | None = None
-        """Search for untracked items between `lose_track` and `record_bin_contents`, otherwise None."""
+        """Recovery of untracked items between `lose_track` and `record_bin_contents`; otherwise None."""
         self._last_frame_id = 0
         self.unknown_labels: Counter[str] = Counter()
         self.assumption_reasons: list[str] = []
@@ -95,17 +95,17 @@ class Tracker:
 
     def find_objects_on_table(self) -> Sequence[Target]:
         """Return all items that lie on the table with a probability of at least 0.5."""
-        on_table = [record for record in self.records if record.state in ON_TABLE]
-        probable_items = [record for record in on_table if record.belief.existence_probability >= 0.5]
+        items_on_table = [record for record in self.records if record.state in ON_TABLE]
+        probable_items = [record for record in items_on_table if record.belief.existence_probability >= 0.5]
         return [item.target for item in probable_items if not self._certainty.is_position_empty(item)]
 
     def find_uncertain_items(self) -> Sequence[Item]:
         """Return the unsorted items in the workspace that are uncertain, or that may have been moved."""
-        on_table = [record for record in self.records if self._certainty.may_be_on_table(record)]
-        in_workspace = [record for record in on_table if self._coverage.is_in_workspace(record.position)]
-        unmoved_items = [record for record in in_workspace if self._staleness.is_unmoved(record)]
+        possible_items = [record for record in self.records if self._certainty.may_be_on_table(record)]
+        workspace_items = [item for item in possible_items if self._coverage.is_in_workspace(item.position)]
+        unmoved_items = [record for record in workspace_items if self._staleness.is_unmoved(record)]
         certain_items = [record for record in unmoved_items if self._certainty.is_certain(record)]
-        return [record.item for record in in_workspace if record not in certain_items]
+        return [record.item for record in workspace_items if record not in certain_items]
 
     def find_held_item(self) -> Item | None:
         """Return the item in the tool, or None."""
@@ -120,12 +120,12 @@ class Tracker:
         return self._staleness.is_unchanged(target.position, target.change_count)
 
     def is_open(self, item: Item) -> bool:
-        """Return True if an item is still to be sorted: on the table or dropped, and not rejected."""
+        """Return True if an item still has to be sorted: it is on the table or dropped, and not rejected."""
         record = self._records.find(item)
         return record.state in (State.SEEN, State.DROPPED) and not record.reason
 
     def is_certain(self, item: Item) -> bool:
-        """Return True if the existence, class and position of an item are certain enough."""
+        """Return True if the existence, class and position of an item are certain enough to sort the item."""
         return self._certainty.is_certain(self._records.find(item))
 
     def is_table_empty(self, label: str | None = None) -> bool:
@@ -135,8 +135,8 @@ class Tracker:
         """
         if self._coverage.max_object_probability > self._config.max_miss_probability:
             return False
-        on_table = [record for record in self.records if self._certainty.may_be_on_table(record)]
-        visible_items = [record for record in on_table if self._coverage.is_visible(record.position)]
+        possible_items = [record for record in self.records if self._certainty.may_be_on_table(record)]
+        visible_items = [record for record in possible_items if self._coverage.is_visible(record.position)]
         labels = [routed_label for routed_label in self._routes if label in (None, routed_label)]
         # An item without a confident detection counts as an object of every class.
         return not any(item.label in labels or not item.belief.look_count for item in visible_items)
@@ -227,7 +227,7 @@ class Tracker:
     def reject(self, item: Item, reason: str) -> None:
         """Reject an item, so that no skill selects the item again.
 
-        A held item stays HELD until its release, a dropped item DROPPED until its detection.
+        A held item stays HELD until its release; a dropped item stays DROPPED until its next detection.
         """
         self._records.reject(self._records.find(item), reason)
 

@@ -14,7 +14,7 @@ from executive.ledger.records import ItemRecords
 
 
 class Recovery:
-    """Search for items on the table and in the bins after actions of the tool that the journal lacks.
+    """Recovery of items on the table and in the bins after actions of the tool that the journal lacks.
 
     Args:
         records: All items.
@@ -33,8 +33,8 @@ class Recovery:
         """
         for name in self._bins.bins:
             if self._bins.is_floor_visible(name, look):
-                in_bin = [observation for observation in bin_names if bin_names[observation] == name]
-                labels = (observation.detection.label for observation in in_bin if observation.is_confident)
+                observed_objects = [entry for entry in bin_names if bin_names[entry] == name]
+                labels = (entry.detection.label for entry in observed_objects if entry.is_confident)
                 self._counts_by_bin[name].append(Counter(labels))
 
     def record_bin_contents(self, change_count: int) -> None:
@@ -43,8 +43,8 @@ class Recovery:
         `change_count` is the number of changes of the table so far.
         """
         for label, bin_name in self._find_unknown_objects():
-            untracked = (record for record in self._records if record.is_untracked and record.label == label)
-            record = next((record for record in untracked if record.state is State.DROPPED), None)
+            untracked_items = (item for item in self._records if item.is_untracked and item.label == label)
+            record = next((item for item in untracked_items if item.state is State.DROPPED), None)
             if record is None:
                 belief = Belief(label, MIN_LOG_ODDS_OF_PROOF, is_proved=True)
                 position = self._bins.bins[bin_name].position
