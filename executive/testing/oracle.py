@@ -39,7 +39,7 @@ class TrueFrame(Frame):
     """A frame with the true detections of its objects.
 
     Attributes:
-        true_detections: Boxes of loose objects in front of the camera whose centre no other object occludes.
+        true_detections: Detections of loose objects; excluded if another object occludes the box centre.
     """
 
     true_detections: tuple[Detection, ...]
@@ -108,7 +108,7 @@ class TruthCamera(SimCamera):
 class Oracle:
     """A detector that returns the true detections of a `TrueFrame`; implements `cell.protocols.Detector`.
 
-    Detections are returned if their centre is in the searched region and not occluded by the arm.
+    The detector omits boxes whose centre is outside the requested view or occluded by the arm.
 
     Attributes:
         name: Name of the detector in the cell file.
@@ -129,10 +129,10 @@ class Oracle:
     def request(self, frame: Frame, view: str) -> PendingSearch:
         """Request the true detections of `frame`, which are available after the latency of the detector."""
         assert isinstance(frame, TrueFrame), "an oracle requires frames of a TruthCamera"
-        random = np.random.default_rng([self.seed, frame.id])
+        random_generator = np.random.default_rng([self.seed, frame.id])
         detections = []
         for true_detection in frame.true_detections:
-            box = np.array(true_detection.box) + random.normal(0.0, self.box_std, 4)
+            box = np.array(true_detection.box) + random_generator.normal(0.0, self.box_std, 4)
             detection = replace(true_detection, box=(box[0], box[1], box[2], box[3]))
             column, row = detection.centre
             left, top, right, bottom = self.camera.get_view_box(view)
@@ -150,7 +150,7 @@ class Oracle:
 def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> Callable[..., SimCell]:
     """Return a function for `RunOptions.kind` that makes simulated cells with oracles as detectors.
 
-    `box_std` [pixel] has the same meaning as in `Oracle`, and `renders_images` as in `TruthCamera`.
+    `box_std` is the standard deviation of box coordinates [pixel]; `renders_images` False: black images.
     """
     camera = partial(TruthCamera, renders_images=renders_images)
     return partial(SimCell, build_camera=camera, build_detectors=partial(_build_oracles, box_std=box_std))

@@ -33,7 +33,7 @@ class MissionResult(RunEnded):
 
     Attributes:
         events: All events of the run, in order.
-        items: Number of items of the ledger by final state; see `Accounts.count_states`.
+        items: Number of items of the ledger by final state; `seen` counts all items except phantoms.
         accounts: The ledger, with the final state of each item.
         audit: True number of objects by final place; None if the cell has no ground truth.
         cell: The closed cell of the run, without wrappers.
@@ -51,7 +51,7 @@ class MissionResult(RunEnded):
         return self.audit is None or is_confirmed_by_audit(self.items, self.audit, self.is_table_empty)
 
     def list_activated_nodes(self, pattern: str) -> list[str]:
-        """Return the paths of all activated nodes, in order of activation, that match the pattern."""
+        """Return the paths of the activated nodes whose paths match the pattern, in order of activation."""
         started_paths = (timed.event.node for timed in self.events if isinstance(timed.event, NodeStarted))
         return [path for path in started_paths if fnmatchcase(path, pattern)]
 

@@ -137,7 +137,7 @@ def log_commands(cell: Cell, commands: list[str]) -> Cell:
 
 
 def describe_argument(argument: object) -> str:
-    """Return a short description of an argument of a command, or "" for all other types."""
+    """Return a short description of an argument of a command, or "" for an argument of another type."""
     if isinstance(argument, str):
         return argument
     if isinstance(argument, Goal):

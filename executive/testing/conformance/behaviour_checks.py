@@ -1,6 +1,6 @@
 """Rules for the behaviour of a skill: in each situation, under each fault, and with a halt at any tick.
 
-Each public function is a rule: its docstring states the rule, and it yields one text per violation.
+Each public function is a rule: its docstring states the rule, and the function yields one text per violation.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MEASUREMENTS = ("camera.capture", "operator.ask")
 def can_succeed(runs: SkillRuns) -> Iterator[str]:
     """The skill can be tested, and succeeds in at least one situation."""
     try:
-        _ = runs.situations  # Generates all values.
+        _ = runs.situations  # Generates the values of all params and inputs.
     except ArrangementFailed as error:
         yield f"{runs.name} cannot be tested: {error}"
         return
@@ -59,15 +59,15 @@ def terminates(runs: SkillRuns) -> Iterator[str]:
 def ends_as_declared(runs: SkillRuns) -> Iterator[str]:
     """Under each fault the skill succeeds with all outputs, or fails with a declared reason and a message."""
     for test_run in runs.complete_runs:
-        start = f"{test_run.description} at tick {test_run.ticks}"
+        prefix = f"{test_run.description} at tick {test_run.ticks}"
         if test_run.status == "FAULT":
             yield (
-                f"{start} {test_run.message}. This is a fault, which ends the run: fail with a declared "
+                f"{prefix} {test_run.message}. This is a fault, which ends the run: fail with a declared "
                 "reason, or correct the code."
             )
         elif test_run.status == "FAILURE" and not test_run.message.strip():
             yield (
-                f'{start} it failed with "{test_run.reason}" and no message. '
+                f'{prefix} it failed with "{test_run.reason}" and no message. '
                 "State what happened, with numbers: the operator reads only this message."
             )
 
@@ -136,47 +136,47 @@ def halts_in_one_tick(runs: SkillRuns) -> Iterator[str]:
 
 def is_deterministic(runs: SkillRuns) -> Iterator[str]:
     """Two runs in the same situation make the same calls at the same ticks, and end with the same result."""
-    for _, first, second in runs.repeated_runs:
-        if difference := _describe_difference(first, second):
+    for _, run, rerun in runs.repeated_runs:
+        if difference := _describe_difference(run, rerun):
             yield (
-                f"{first.description}, in two equal runs, {difference}. "
+                f"{run.description}, in two equal runs, {difference}. "
                 "The skill may not depend on chance, wall time or earlier runs; a seed may be a param."
             )
 
 
 def has_short_ticks(runs: SkillRuns) -> Iterator[str]:
     """No tick computes for longer than 50 ms in the faster of two equal runs."""
-    for _, first, second in runs.repeated_runs:
-        durations = list(map(min, first.tick_durations, second.tick_durations))
+    for _, run, rerun in runs.repeated_runs:
+        durations = list(map(min, run.tick_durations, rerun.tick_durations))
         longest = max(durations, default=0.0)
         if longest > MAX_TICK_DURATION:
             yield (
-                f"{first.description} tick {durations.index(longest)} computed for {longest * 1000:.0f} ms, "
+                f"{run.description} tick {durations.index(longest)} computed for {longest * 1000:.0f} ms, "
                 "which blocks the arm. Distribute the work over ticks with yield, or do it in a detector."
             )
 
 
-def _describe_difference(first: SkillTestRun, second: SkillTestRun) -> str:
+def _describe_difference(run: SkillTestRun, rerun: SkillTestRun) -> str:
     """Return a description of the first difference between two runs, or ""."""
-    for call, other in zip(first.calls, second.calls, strict=False):
+    for call, other in zip(run.calls, rerun.calls, strict=False):
         if (call.tick, call.name) != (other.tick, other.name):
             return f"it called {call.name} at tick {call.tick} and then {other.name} at tick {other.tick}"
         if not has_equal_pickle(call.arguments, other.arguments):
             return f"it called {call.name} at tick {call.tick} with different arguments"
-    if (first.ticks, first.status) != (second.ticks, second.status):
-        end, other_end = f"{first.status} after {first.ticks}", f"{second.status} after {second.ticks}"
+    if (run.ticks, run.status) != (rerun.ticks, rerun.status):
+        end, other_end = f"{run.status} after {run.ticks}", f"{rerun.status} after {rerun.ticks}"
         return f"it ended as {end} ticks and then as {other_end}"
-    return "" if has_equal_pickle(first.outputs, second.outputs) else "it set its outputs to different values"
+    return "" if has_equal_pickle(run.outputs, rerun.outputs) else "it set its outputs to different values"
 
 
 def _find_first_violations(
     test_runs: Iterable[SkillTestRun], is_violation: Callable[[SkillTestRun], bool]
 ) -> Iterable[SkillTestRun]:
     """Return, for each situation, the first run that violates a rule."""
-    first_by_situation: dict[str, SkillTestRun] = {}
+    runs_by_situation: dict[str, SkillTestRun] = {}
     for test_run in filter(is_violation, test_runs):
-        first_by_situation.setdefault(test_run.description, test_run)
-    return first_by_situation.values()
+        runs_by_situation.setdefault(test_run.description, test_run)
+    return runs_by_situation.values()
 
 
 def _is_arm_left_moving(test_run: SkillTestRun) -> bool:

@@ -53,7 +53,7 @@ class Check:
 
     Attributes:
         skill_runs: The test runs of the skill, which all its checks share.
-        rule: The rule to which the skill is checked.
+        rule: The rule against which the skill is checked.
     """
 
     skill_runs: SkillRuns
@@ -105,8 +105,8 @@ def list_conformance_checks(
 
     Args:
         skill: Class of the skill.
-        arrange: Function that gets the `SkillScene` of each run. The function may change the scene. It
-            returns values of params and inputs by name; required ones that it omits are generated.
+        arrange: Function that gets the `SkillScene` of each run. The function may change the scene, and
+            returns values of params and inputs by name; missing required values are generated.
         name: Name under which the skill is installed; "": the name of the class.
     """
     skill_runs = SkillRuns(name or skill.__name__, skill, arrange)

@@ -1,6 +1,6 @@
 """Rules for the declarations and the source code of a skill, which are checked without a run.
 
-Each public function is a rule: its docstring states the rule, and it yields one text per violation.
+Each public function is a rule: its docstring states the rule, and the function yields one text per violation.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from executive.mission.model.port_types import describe_type
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 
 GENERATED_NUMBER = 0.1
-"""Value generated for each number, clipped to the bounds of its param; small, as it may be a duration [s]."""
+"""Value generated for each number, clipped to the bounds of its param; as a duration [s], it is short."""
 
 _HOLDING_BY_STATE: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY: (False, True)}
 """Values of `Situation.is_holding` by the declared state of the tool before the run."""
@@ -29,7 +29,7 @@ _TOOL_TEXTS = {False: "with an empty tool", True: "with an item in the tool"}
 
 @dataclass(frozen=True)
 class SkillScene:
-    """A fake cell in which one image has been captured and searched for objects.
+    """A fake cell with one captured image, its detections and their targets.
 
     Attributes:
         cell: Cell with a row of objects on the table, one per class; its operator requests each class once.
@@ -183,8 +183,8 @@ def _find_name_in_scene(refers: str, scene: SkillScene) -> str | None:
 def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
     """Return a new scene for a skill; if `is_holding` is True, the tool holds an item of the ledger.
 
-    The suction cup touches the first target if the skill cannot move there: it has a target as input, and
-    uses the tool without the arm.
+    If the skill has a target as input, and uses the tool without the arm, the suction cup touches the
+    first target.
     """
     fake = FakeCell(options=CellOptions(SilentOperator(list(SHIPPED_ROUTES)), base=Path()))
     table, labels = load_empty_cell().table, list(fake.cell.classes)
@@ -193,8 +193,8 @@ def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
     detections, targets = detect_targets(fake)
     item = targets[0].item
     if is_holding or _starts_at_target(skill):
-        kind = fake.cell.classes[targets[0].label]
-        top = targets[0].position + np.array([kind.ring, 0.0, kind.height / 2])
+        object_class = fake.cell.classes[targets[0].label]
+        top = targets[0].position + np.array([object_class.ring, 0.0, object_class.height / 2])
         fake.arm.set_tool_pose(make_tool_down_pose(top, 0.0))
     if is_holding:
         fake.tool.close()

@@ -1,4 +1,4 @@
-"""Faults with which a skill is tested, one per run, in each situation."""
+"""Faults that the conformance checks inject into test runs of a skill, one fault per run."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from executive.testing import faults
 from executive.testing.faults.effect import Effect, Occurrence
 
 SEAL_BREAK_INTERVALS = 20
-"""Number of equal intervals of a run; one test run for each boundary, at which the seal breaks."""
-START_MOTION_STEPS = 24
-"""Duration of a motion during which the skill starts [control steps]."""
+"""Number of equal intervals into which a run is divided; at each boundary the seal breaks in a test run."""
+PRECEDING_MOTION_STEPS = 24
+"""Duration of a motion that is still in progress when the skill starts [control steps]."""
 MAX_REMOVED_OBJECTS = 10
 """Number of removals that empties the table; more than there are objects."""
 
@@ -25,7 +25,7 @@ class NamedFault:
     Attributes:
         name: Description, as a part of a sentence: `while the table is empty`.
         effect: Effect of the fault on the cell.
-        part: Resource that affected skills use: `arm`, `tool` or `camera`; "" if all skills are affected.
+        resource: Resource that affected skills use: `arm`, `tool` or `camera`; "" if all skills are affected.
         requires_holding: True if the fault affects only runs with an object in the tool at the start.
         count: Number of equal faults that are injected together.
         tick: Control step before which the fault begins.
@@ -33,7 +33,7 @@ class NamedFault:
 
     name: str
     effect: Effect
-    part: str = ""
+    resource: str = ""
     requires_holding: bool = False
     count: int = 1
     tick: int = 0
@@ -46,7 +46,7 @@ def list_skill_faults(skill: type[Skill], ticks: int, *, is_holding: bool) -> It
     """
     for fault in _FAULTS:
         can_occur = is_holding or not fault.requires_holding
-        if can_occur and (not fault.part or fault.part in skill.uses):
+        if can_occur and (not fault.resource or fault.resource in skill.uses):
             yield fault
     if "tool" in skill.uses:
         for tick in sorted(
@@ -58,7 +58,7 @@ def list_skill_faults(skill: type[Skill], ticks: int, *, is_holding: bool) -> It
 def _move_arm(occurrence: Occurrence) -> bool:
     """Start a motion of the arm, as a preceding skill could have done."""
     arm = occurrence.context.cell.arm
-    arm.start(FakeMotion([arm.tool_pose] * START_MOTION_STEPS))
+    arm.start(FakeMotion([arm.tool_pose] * PRECEDING_MOTION_STEPS))
     return True
 
 

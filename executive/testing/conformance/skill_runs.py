@@ -46,13 +46,13 @@ class SkillRuns:
     @cached_property
     def complete_runs(self) -> list[SkillTestRun]:
         """Runs without a halt: for each situation, one run without a fault and one run per fault."""
-        runs_without_fault = [first for _, first, _ in self.repeated_runs]
+        runs_without_fault = [test_run for _, test_run, _ in self.repeated_runs]
         return runs_without_fault + [
             self._run(situation, fault)
-            for situation, first, _ in self.repeated_runs
+            for situation, test_run, _ in self.repeated_runs
             # If the run without a fault does not end, a run with a fault would not end either.
-            if first.status != "RUNNING"
-            for fault in list_skill_faults(self.skill, first.ticks, is_holding=first.holds_before)
+            if test_run.status != "RUNNING"
+            for fault in list_skill_faults(self.skill, test_run.ticks, is_holding=test_run.holds_before)
         ]
 
     @cached_property
@@ -60,9 +60,9 @@ class SkillRuns:
         """Halted runs: for each situation, one run per tick of `_choose_halt_ticks`."""
         return [
             self._run(situation, halt_at=tick)
-            for situation, first, _ in self.repeated_runs
-            if first.status != "RUNNING"
-            for tick in _choose_halt_ticks(first)
+            for situation, test_run, _ in self.repeated_runs
+            if test_run.status != "RUNNING"
+            for tick in _choose_halt_ticks(test_run)
         ]
 
     def _run(

@@ -143,10 +143,10 @@ class SkillTestRun:
                     return "HALTED"
                 if self.ticks == fault_tick:
                     cell.on_event(TimedEvent(0, 0.0, NodeStarted("skill")))
-                start = perf_counter()
+                start_time = perf_counter()
                 run = run or SkillRun(skill(**values), observed_cell)
                 has_succeeded = run.step()
-                self.tick_durations.append(perf_counter() - start)
+                self.tick_durations.append(perf_counter() - start_time)
                 if has_succeeded:
                     self.outputs = run.read_outputs()
                     return "SUCCESS"
@@ -175,7 +175,7 @@ class TickStuck(BaseException):
 
 @contextmanager
 def detect_stuck_ticks(skill: type[Skill], count_ticks: Callable[[], int]) -> Iterator[None]:
-    """Interrupt the body if `count_ticks` returns the same number during `STUCK_TIMEOUT`.
+    """Interrupt the body of the `with` if `count_ticks` returns the same number during `STUCK_TIMEOUT`.
 
     Bodies in other threads than the main thread are not interrupted: Python handles signals only there.
 

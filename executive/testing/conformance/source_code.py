@@ -113,7 +113,7 @@ def _find_return_type(callee: Any) -> Any:
 
 
 def _find_member(owner: Any, name: str) -> Any:
-    """Return the declared type of an attribute; without one, the member of the module or class, or None."""
+    """Return the declared type of an attribute; if undeclared, the member of the module or class, or None."""
     if owner is None:
         return None
     if isinstance(owner, type) and not issubclass(owner, Skill) and name in get_type_hints(owner):

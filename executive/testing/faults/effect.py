@@ -37,7 +37,7 @@ class FaultContext:
     Args:
         workcell: The cell without faults.
         open_world: Function that returns the access to the world of a cell.
-        emit: Emits events of the run.
+        emit: Function that emits events of the run.
 
     Attributes:
         cell: The cell without faults, as skills see it.
@@ -61,7 +61,7 @@ class FaultContext:
 
     @property
     def motion_progress(self) -> float:
-        """Elapsed fraction of the duration of the motion, 0 to 1; 0 without a motion or after its end."""
+        """Elapsed fraction of the current motion, 0 to 1; 0 without a motion or after its end."""
         motion, start_time = self.motion or (None, 0.0)
         if motion is None or motion.duration == 0.0:
             return 0.0
@@ -164,7 +164,7 @@ class Occurrence:
 
 
 def validate_fraction(fraction: float | None) -> float:
-    """Return the fraction of a motion after which a fault occurs; 0, at once, for None.
+    """Return `fraction`, a part of a motion after which a fault occurs; 0 (at once) for None.
 
     Raises:
         InputError: The fraction is not between 0 and 1, both excluded.

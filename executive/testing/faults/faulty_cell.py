@@ -37,7 +37,7 @@ class FaultyCell(CellWrapper):
     Args:
         inner: The cell without faults.
         faults: Fault script.
-        emit: Emits events of the run.
+        emit: Function that emits events of the run.
         open_world: Function that returns the access to the world of a cell.
         timeout: Time on the run's clock after which the run ends as a fault [s].
     """
@@ -73,7 +73,7 @@ class FaultyCell(CellWrapper):
         return self._context.world
 
     def on_event(self, timed: TimedEvent) -> None:
-        """Begin or end the faults of a node; an observer of the run on this cell."""
+        """Begin or end the faults of a node; must be called with each event of the run on this cell."""
         match timed.event:
             case NodeStarted(node, _, item):
                 for index, (effect, time) in enumerate(self._node_faults):
@@ -102,7 +102,7 @@ class FaultyCell(CellWrapper):
         """Advance the cell by one control step, and inject the faults that are due.
 
         Raises:
-            Fault: The timeout has expired. A later call does not raise it again, so that the arm can brake.
+            Fault: The timeout has expired; later calls do not raise it again, so that the arm can brake.
         """
         self.inner.advance()
         self._update_occurrences()

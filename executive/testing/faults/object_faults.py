@@ -30,7 +30,7 @@ def object_removed(choice: ObjectChoice = "node", fraction: float | None = None)
     """Return an effect: an object is removed once, even from the tool.
 
     Args:
-        choice: Number of the object from 1, `nearest` to the tool, or the object of the `node`.
+        choice: Number of the object, from 1; `nearest` to the tool; or `node` for the object of the node.
         fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
 
     Raises:
@@ -46,7 +46,7 @@ def object_moved(
 
     Args:
         displacement: Displacement along x and y [m]; a simulated object at the destination is pushed aside.
-        choice: Number of the object from 1, `nearest` to the tool, or the object of the `node`.
+        choice: Number of the object, from 1; `nearest` to the tool; or `node` for the object of the node.
         fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
 
     Raises:
@@ -63,7 +63,7 @@ def object_bumped(
     Args:
         x: Allowed interval of x of the new position [m].
         y: Allowed interval of y of the new position [m].
-        choice: Number of the object from 1, `nearest` to the tool, or the object of the `node`.
+        choice: Number of the object, from 1; `nearest` to the tool; or `node` for the object of the node.
         fraction: Fraction of the motion of the arm after which the effect begins, 0 to 1; None: at once.
 
     Raises:

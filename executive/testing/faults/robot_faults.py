@@ -1,6 +1,6 @@
 """Faults of arm, tool, camera, localizer, table and operator.
 
-An effect that does not occur "once" lasts until the end of the fault.
+An effect whose docstring does not say "once" lasts until the end of its fault.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def seal_breaks(fraction: float | None = 0.5) -> Effect:
         fraction: Fraction of the motion after which the seal breaks, 0 to 1; None: at once, also at rest.
 
     Raises:
-        InputError: The fraction is not more than 0 and less than 1.
+        InputError: The fraction is not between 0 and 1, both excluded.
     """
     return Effect("seal_breaks", _break_seal, arguments=(validate_fraction(fraction),))
 
@@ -52,7 +52,7 @@ def arm_collides(obstacle: str = "something", fraction: float = 0.5) -> Effect:
         fraction: Fraction of the motion after which the arm collides, 0 to 1.
 
     Raises:
-        InputError: The fraction is not more than 0 and less than 1.
+        InputError: The fraction is not between 0 and 1, both excluded.
     """
     return Effect("arm_collides", _collide_arm, arguments=(obstacle, validate_fraction(fraction)))
 
@@ -116,8 +116,8 @@ def _break_seal_over_wrong_bin(occurrence: Occurrence) -> bool:
     context, held_object = occurrence.context, occurrence.context.world.held_object
     if held_object is None or context.motion_progress == 0.0:
         return False
-    right_bins = context.cell.routes.get(held_object.label, ())
-    wrong_bins = [bin for name, bin in context.cell.bins.items() if name not in right_bins]
+    permitted_bin_names = context.cell.routes.get(held_object.label, ())
+    wrong_bins = [bin for name, bin in context.cell.bins.items() if name not in permitted_bin_names]
     is_over_wrong_bin = any(bin.contains(held_object.position) for bin in wrong_bins)
     return is_over_wrong_bin and _break_seal(occurrence, 0.0)
 

@@ -42,7 +42,7 @@ class NodeActivations:
 
 @dataclass(frozen=True)
 class TimeSpan:
-    """Time span on the run's clock of a fault, from `start` (included) to `end` (excluded) [s]."""
+    """Time span of a fault on the run's clock, from `start` (included) to `end` (excluded) [s]."""
 
     start: float
     end: float
@@ -83,7 +83,7 @@ def with_probability(probability: float, pattern: str, effect: Effect, *, seed: 
         seed: Random seed, which determines the activations.
 
     Raises:
-        InputError: The probability is not in 0 to 1.
+        InputError: The probability is less than 0 or more than 1.
     """
     if not 0.0 <= probability <= 1.0:
         raise InputError(f"a probability must be 0 to 1, not {probability:g}")
