@@ -61,12 +61,12 @@ class Fallback(ControlNode):
         return min(map(get_min_time, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause: a child before `child` cannot fail."""
+        """Return the cause for which `child` never runs: an earlier child cannot fail."""
         del child
         return "an earlier child never fails"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the cause: all children failed, with the failures of the children before the last."""
+        """Return the cause of a failure: all children failed. The text contains the handled failures."""
         causes = ", ".join(f"{name} ({message})" for name, message in failure.last_messages.items())
         return f"all {len(self.do)} choices failed" + (f"; the others failed with {causes}" if causes else "")
 

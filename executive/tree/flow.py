@@ -1,4 +1,4 @@
-"""Abstract interpretation of a tree: states in which a node may start, and its possible ends."""
+"""Abstract interpretation of a tree: entry states and possible ends of its nodes."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class FlowState:
     """State of a run at a point in the tree, as far as the mission determines it.
 
     Attributes:
-        written_variables: Variables that every execution path to the point writes; None if unknown, which
-            allows nodes to read every variable.
+        written_variables: Variables that every execution path to the point writes; None if unknown: the
+            checker then permits nodes to read every variable.
         tool_states: All possible states of the tool; None if unknown.
     """
 
@@ -87,8 +87,8 @@ class FlowState:
     def apply_precondition(self, required_state: ToolState, path: str) -> FlowState:
         """Return the state at the start of the skill at `path`, which requires a state of the tool.
 
-        `required_state` ANY is no requirement. If the tool cannot be in the required state, the returned
-        state has the required state nevertheless, so that later skills cause no further findings.
+        If `required_state` is ANY, the state does not change. If the tool cannot be in the required state,
+        the result has the required state nevertheless, so that later skills cause no further findings.
         """
         if required_state is ANY or self.tool_states is None:
             return self
@@ -116,7 +116,7 @@ class FlowState:
         return self.with_tool_states(frozenset({PossibleToolState(declared_state, path)}))
 
     def find_tool_state(self, state: ToolState) -> PossibleToolState | None:
-        """Return a possible state of the tool that is `state` (EMPTY or HOLDING), or None."""
+        """Return one of the possible tool states whose `state` is the given EMPTY or HOLDING, or None."""
         candidates = (candidate for candidate in self.tool_states or () if candidate.state is state)
         # Sets have no order; `min` makes the findings reproducible.
         return min(candidates, key=lambda state: (state.cause, state.handled_failure), default=None)
@@ -164,7 +164,7 @@ class PossibleFailure:
 
 @dataclass(frozen=True)
 class Flow:
-    """Result of the abstract execution of a node from one state: its possible ends.
+    """Possible ends of a node that starts in one entry state, with the state after each end.
 
     Attributes:
         success: State after success; None if the node cannot succeed.
@@ -221,13 +221,13 @@ def join_states(states: Iterable[FlowState | None]) -> FlowState | None:
 
 
 def find_end_tool_states(flow: Flow, entry: FlowState, can_be_halted: bool) -> ToolStates:
-    """Return the possible states of the tool after a branch from `entry`, with halts if `can_be_halted`."""
+    """Return the possible tool states after a branch from `entry`, also after halts if `can_be_halted`."""
     halt_states = (flow.halted, entry) if can_be_halted else ()
     return (join_states((flow.success, *flow.failures.values(), *halt_states)) or entry).tool_states
 
 
 def combine_tool_states(entry: ToolStates, branch_ends: Iterable[ToolStates]) -> ToolStates:
-    """Return the possible states of the tool after parallel branches; at most one branch uses the tool.
+    """Return the possible tool states after parallel branches, of which at most one uses the tool.
 
     `entry` are the states before the branches; `branch_ends` are the states after each branch.
     """

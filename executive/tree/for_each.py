@@ -31,7 +31,7 @@ class ForEach(Loop):
 
     @property
     def detail(self) -> str:
-        """The variable and its list as a text."""
+        """The variable of the current element and the list, as a text."""
         if isinstance(self.in_, VariableName):
             return f"${self.each} in ${self.in_}"
         return f"${self.each} in [{', '.join(map(str, self.in_))}]"
@@ -93,7 +93,7 @@ class ForEach(Loop):
         return tuple(value)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; each iteration starts in the state after success of the body."""
+        """Return the possible ends; each iteration after the first starts in the state after success of the body."""
         if self.in_ == ():
             return Flow(state, {}, None)
         entry = state.with_variables([self.each])
@@ -113,7 +113,7 @@ class ForEach(Loop):
         return 0.0 if isinstance(self.in_, VariableName) else len(self.in_) * get_min_time(self.do)
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause: the list is empty."""
+        """Return the cause for which the body never runs: the list is empty."""
         del child
         return "the body runs 0 times"
 

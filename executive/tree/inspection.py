@@ -1,4 +1,4 @@
-"""Inputs and results of the methods of control nodes for the checker and for the diagnosis."""
+"""Arguments and results of the methods of control nodes that the checker and the diagnosis call."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class NodeAnalysis(Protocol):
 
     @property
     def is_halted_by_sibling(self) -> bool:
-        """True if the node is halted when a concurrent node has ended."""
+        """True if the node is halted when a concurrent node ends."""
 
     def get_flow(self, child: Child) -> Flow | None:
         """Return the possible ends of a child; None if the child never runs."""
@@ -51,21 +51,21 @@ class NodeAnalysis(Protocol):
         """Return the line of `reason` as a text, with the file if `reported_reason` is in another file."""
 
     def is_literal(self, key: str) -> bool:
-        """Return True if the value of a key is written at the node, not in a param or an argument."""
+        """Return True if the value of a key is written at the node itself, not in a param or an argument."""
 
     def get_min_time(self, child: Child) -> float:
         """Return a lower bound of the time in which a child can succeed [s]."""
 
     def list_skill_times(self, child: Child) -> Sequence[tuple[str, float]]:
-        """Return the name and the minimum time [s] of each skill in a child."""
+        """Return the name and the minimum time [s] of each skill in the subtree of a child."""
 
     def list_skills(self) -> Sequence[type[Skill] | None]:
-        """Return the skills in the node; None stands for a skill that is not installed."""
+        """Return the skills in the subtree of the node; None stands for a skill that is not installed."""
 
 
 @dataclass(frozen=True)
 class PropagatedFailure:
-    """A failure that ended a run, for a control node that passed the failure on or caused the failure.
+    """A failure that ended a run, as seen by a control node that caused the failure or passed it on.
 
     Attributes:
         child: The child that passed the failure on; None if the node itself caused the failure.

@@ -1,4 +1,4 @@
-"""Declarations of the keys of control nodes; parser, schema, checks and builder use the declarations."""
+"""Declarations of the keys of control nodes, for parser, schema, checks and builder of missions."""
 
 from __future__ import annotations
 
@@ -147,14 +147,14 @@ class KeyOwner:
         Raises:
             TypeError: A required value is missing, or an attribute in `values` belongs to no key.
         """
-        remaining = dict(values)
+        remaining_values = dict(values)
         for key in self.keys.values():
-            value = remaining.pop(key.attribute, key.default)
+            value = remaining_values.pop(key.attribute, key.default)
             if value is ...:
                 raise TypeError(f"{type(self).__name__} needs a value for {key.attribute}")
             setattr(self, key.attribute, tuple(value) if isinstance(value, list) else value)
-        if remaining:
-            raise TypeError(f"{type(self).__name__} has no key {', '.join(remaining)}")
+        if remaining_values:
+            raise TypeError(f"{type(self).__name__} has no key {', '.join(remaining_values)}")
 
 
 class KeySection(KeyOwner):

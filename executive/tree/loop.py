@@ -9,10 +9,10 @@ from executive.tree.node import ControlNode
 
 
 class Loop(ControlNode):
-    """Base class of loops, which decides whether the next iteration may run in the current tick.
+    """Base class of loops, with the rule when the next iteration may begin.
 
-    After an iteration within one tick, the next iteration begins in the next tick, so that the loop never
-    blocks the tick. After a longer iteration, the next iteration begins in the same tick.
+    After an iteration that took only one tick, the next iteration begins in the next tick, so that a loop
+    never blocks a tick. In the tick in which a longer iteration ends, the next iteration begins.
 
     Attributes:
         has_tick_passed: True if at least one tick has ended during the current iteration.
@@ -32,6 +32,6 @@ class Loop(ControlNode):
         return status
 
     def begin_iteration(self) -> bool:
-        """Begin the next iteration; return True if it may run in the current tick."""
+        """Begin the next iteration; return True if the iteration may run in the current tick."""
         may_run, self.has_tick_passed = self.has_tick_passed, False
         return may_run

@@ -117,7 +117,7 @@ class ControlNode(KeyOwner, TreeNode):
         return ", ".join(f"{key.name}: {value}" for key, value in values if value != key.default)
 
     def describe_trigger(self, child: Child) -> str:
-        """Return the failures after which a child runs: `on Grasp.missed`; "" for other children."""
+        """Return the failures that trigger a child: `on Grasp.missed`; "" if no failure triggers it."""
         del child
         return ""
 
@@ -166,7 +166,7 @@ class ControlNode(KeyOwner, TreeNode):
 
     @property
     def children_halted_by_sibling(self) -> tuple[Child, ...]:
-        """Children that the node halts after the end of another child; loops in them may be endless."""
+        """Children that the node halts after the end of another child; they may contain endless loops."""
         return ()
 
     # Methods for the diagnosis.
@@ -177,7 +177,7 @@ class ControlNode(KeyOwner, TreeNode):
         return ""
 
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int] | None:
-        """Return the number of the failed attempt and the maximum; None if the node has no attempts."""
+        """Return the number of the failed attempt and the maximum number; None if the node never retries."""
         del failure
         return None
 
@@ -187,7 +187,7 @@ class ControlNode(KeyOwner, TreeNode):
         yield from ()
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield (name in reports, child) for the children that run only after a failure or at the end."""
+        """Yield name in reports and node of each child that runs only after a failure or at the end."""
         yield from ()
 
     # Methods that subclasses call.
@@ -284,7 +284,7 @@ class ControlNode(KeyOwner, TreeNode):
 
 
 def _find_nodes(value: object) -> list[Child]:
-    """Return all nodes in the value of a key: a node, a list, a section or a constant."""
+    """Return all nodes in the value of a key, which is a node, a list, a section or a constant."""
     if isinstance(value, KeySection):
         return [node for key in value.keys.values() for node in _find_nodes(getattr(value, key.attribute))]
     if isinstance(value, tuple):

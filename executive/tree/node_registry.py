@@ -51,10 +51,10 @@ def _find_problem(keyword: str, node_class: object) -> str:
     for method in ("step", "compute_flow"):
         if getattr(node_class, method) is getattr(ControlNode, method):
             return f"has no method {method}"
-    # A behaviour of py_trees sets attributes in `__init__`, so that only an instance has all names.
+    # A behaviour of py_trees sets attributes in `__init__`, so that only an instance has all reserved names.
     instance = ControlNode(NodeContext("", cast("Clock", None), Blackboard()))
     for key in node_class.keys.values():
-        # `as` gives a node its label.
+        # The key `as` is reserved for the label of a node.
         if key.name == "as" or hasattr(instance, key.attribute):
             return f'cannot have the key "{key.name}": the name is reserved'
     return ""

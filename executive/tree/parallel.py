@@ -22,7 +22,7 @@ from executive.tree.keys import Children, key
 from executive.tree.node import ControlNode
 
 MAX_CHILDREN = 200
-"""Maximum number of children; the bound limits the duration of a check of all pairs of children."""
+"""Maximum number of children; the checker compares all pairs of children."""
 
 
 class Parallel(ControlNode):
@@ -33,8 +33,8 @@ class Parallel(ControlNode):
 
     * If enough children have succeeded, the node halts the running children and succeeds, even if other
       children failed in the same tick.
-    * If too many children have failed, the node fails with the first failure; of failures in the same tick,
-      the failure of the earlier child is the first. With `halt`, the node halts the running children at once;
+    * If too many children have failed, the node fails with the first failure; among failures in one tick,
+      the failure of the earliest child in `do`. With `halt`, the node halts the running children at once;
       without `halt`, the running children finish.
 
     With `wait_for: lead`, the first child is the lead: the node ends in the same tick as the lead, with the
@@ -50,7 +50,7 @@ class Parallel(ControlNode):
     )  # fmt: skip
     halt: bool = key(
         default=False,
-        doc="True to halt the others at once after a failure, instead of letting them finish.",
+        doc="True to halt the running children as soon as too many have failed; False to let them finish.",
     )
     do: Children = key(shorthand=True, max_count=MAX_CHILDREN, doc="Nodes to run at the same time.")
 
@@ -132,7 +132,7 @@ class Parallel(ControlNode):
             self.report_choice(choice, failure)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: combinations of the ends of all children, which start in one state."""
+        """Return the possible ends: combinations of the ends of all children, each started in `state`."""
         flows = [get_flow(child, state) for child in self.do]
         halted_ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         halted = join_states(flow.halted for flow in flows)
@@ -165,7 +165,7 @@ class Parallel(ControlNode):
         return success.with_tool_states(combine_tool_states(state.tool_states, ends))
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
-        """Return the minimum time of the lead; without a lead, of the last required success [s]."""
+        """Return the minimum time [s] until the lead succeeds or, without a lead, enough children succeed."""
         if self._has_lead:
             return get_min_time(self.do[0])
         return sorted(map(get_min_time, self.do))[self._required_count - 1]

@@ -57,7 +57,7 @@ class Repeat(Loop):
         return Status.SUCCESS
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; each iteration starts in the state after success of the body."""
+        """Return the possible ends; each iteration after the first starts in the state after success of the body."""
         if self.times == 0:
             return Flow(state, {}, None)
         body, entry = find_fixed_point(
@@ -73,7 +73,7 @@ class Repeat(Loop):
         return 0.0 if self.until else (self.times or 0) * get_min_time(self.do)
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause: the number of iterations is 0."""
+        """Return the cause for which the body never runs: the number of iterations is 0."""
         del child
         return "the body runs 0 times"
 

@@ -25,7 +25,7 @@ from executive.tree.loop import Loop
 
 
 class Backoff(KeySection):
-    """Delays before further attempts, which grow geometrically."""
+    """Geometrically growing delays before the second and all further attempts."""
 
     first: Seconds = key(gt=0, shorthand=True, doc="Delay before the second attempt [s].")
     factor: float = key(default=1.0, ge=1, doc="Ratio of each delay to the previous delay; 1 if not given.")
@@ -116,7 +116,7 @@ class Retry(Loop):
         return status
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; body and recovery run in turn until they add no new states."""
+        """Return the possible ends, by fixed-point iteration over body and recovery."""
 
         def can_retry(failure: PossibleFailure) -> bool:
             return not self.on or failure.may_match(self.on)
@@ -159,7 +159,7 @@ class Retry(Loop):
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause for which the recovery never runs; "" for the body."""
+        """Return the cause for which the recovery never runs, or "" if `child` is the body."""
         if child is not self.recover or (self.on and self.attempts > 1):
             return ""
         return "there is only one attempt" if self.attempts == 1 else "the body never fails"
@@ -182,8 +182,8 @@ class Retry(Loop):
     def count_attempts(self, failure: PropagatedFailure) -> tuple[int, int]:
         """Return the number of the failed attempt and the number of allowed attempts."""
         handled_count = sum(failure.handled_counts.values())
-        # The node handled the failures of all attempts except the last; if the recovery failed, the node
-        # handled the failures of all attempts and of the recovery.
+        # `handled_counts` lacks only the failure of the last attempt. After a failed recovery, however, it
+        # contains the failures of all attempts, and also the failure of the recovery.
         return handled_count + (-1 if self._has_recovery_failed(failure) else 1), self.attempts
 
     def advise(self, failure: PropagatedFailure) -> Iterator[Advice]:
@@ -195,7 +195,7 @@ class Retry(Loop):
             yield Advice(f"allow more than {attempts} attempt{'s' if attempts > 1 else ''}", "attempts")
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield the recovery."""
+        """Yield `recover` as the name and the node of the recovery, if there is a recovery."""
         if self.recover is not None:
             yield "recover", self.recover
 

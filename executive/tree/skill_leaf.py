@@ -57,7 +57,7 @@ class SkillLeaf(TreeNode):
 
     @property
     def detail(self) -> str:
-        """The constants, and the variables with other names than their ports, as a text for drawings."""
+        """The constants, and each variable whose name differs from its port, as a text for drawings."""
         texts = [self.skill_name] if self.label else []
         texts += [f"{name}: {_format_value(value)}" for name, value in self.wiring.constants.items()]
         for port, variable in {**self.wiring.inputs, **self.wiring.outputs}.items():

@@ -36,7 +36,7 @@ class SkillRun:
             if self._generator is None:
                 # A `run` without `yield` is a plain function: the skill succeeds when the function returns.
                 self._generator = iter(self._skill.run(self._cell) or ())
-            # `self` as the default marks the end of the generator, because a skill cannot yield its run.
+            # The default `self` marks the end of the generator: no skill can yield its own `SkillRun`.
             yielded = next(self._generator, self)
         except SkillFailed as failed:
             if failed.reason in self._skill.reasons:

@@ -86,7 +86,7 @@ class TryCatch(ControlNode):
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends.
 
-        Each handler starts after the failures that the handler catches; `finally` starts after all ends.
+        Each handler starts after the failures that it catches; `finally` starts after body and handlers.
         """
         body = get_flow(self.do, state)
         success, halted, failures = body.success, body.halted, dict(body.failures)

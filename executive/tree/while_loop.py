@@ -50,7 +50,7 @@ class While(Loop):
                     return Status.RUNNING
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; condition and body run in turn until they add no new states."""
+        """Return the possible ends, by fixed-point iteration over condition and body."""
 
         def compute_body_flow(condition: Flow) -> Flow:
             return get_flow(self.do, condition.success) if condition.success else Flow(None, {}, None)
@@ -70,11 +70,11 @@ class While(Loop):
             yield NodeFinding("", "endless", message, "Use repeat with times or until.")
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause: the condition cannot succeed."""
+        """Return the cause for which the body never runs: the condition cannot succeed."""
         del child
         return "the condition never succeeds"
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the cause: only a failure of the condition is a success."""
+        """Return the cause of a failure: the body, not the condition, failed."""
         del failure
         return "a failure of the body ends the loop"
