@@ -154,7 +154,7 @@ class ItemRecord:
         self.belief.repeat_count = self.contradiction_count = 0
 
     def update_position(self, position: Array, std: float, *, is_unmoved: bool) -> None:
-        """Set the position to a measurement or, if the item is unmoved, to the weighted mean of all positions.
+        """Set the position to a measurement or, if the item is unmoved, to the weighted mean of positions.
 
         Args:
             position: Measured position `(3,)` [m].

@@ -93,7 +93,7 @@ class ForEach(Loop):
         return tuple(value)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; each iteration after the first starts in the state after success of the body."""
+        """Return the possible ends; each further iteration starts in the state after success of the body."""
         if self.in_ == ():
             return Flow(state, {}, None)
         entry = state.with_variables([self.each])

@@ -163,7 +163,7 @@ class _TrialRun:
         return not names.isdisjoint(injected) or (bool(fault.skill_faults) and self._has_effect(fault))
 
     def _has_effect(self, fault: PlannedFault) -> bool:
-        """Return True if the fault let its node raise the bug or fail with the reason; True for other faults."""
+        """Return True if the fault let its node raise the bug or fail as planned; also for other faults."""
         node_ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
         node_ends = [end for end in node_ends if end.node == fault.location]
         if fault.is_bug:
