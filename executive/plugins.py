@@ -180,13 +180,13 @@ class Project:
         """
         groups = self.project_table.get("entry-points", {})
         entries = groups.get(group, {}) if isinstance(groups, dict) else groups
-        table = f'{self.file}: [project.entry-points."{group}"]'
+        location = f'{self.file}: [project.entry-points."{group}"]'
         if not isinstance(entries, dict):
-            raise InputError(f"{table} is not a table; write lines like {_EXAMPLE_LINE} below it")
+            raise InputError(f"{location} is not a table; write lines like {_EXAMPLE_LINE} below it")
         for name, value in entries.items():
             if not isinstance(value, str) or _CLASS_PATH.fullmatch(value) is None:
                 raise InputError(
-                    f'{table}: "{name}" is not the import path of a class: {value!r}; '
+                    f'{location}: "{name}" is not the import path of a class: {value!r}; '
                     f"write it as {_EXAMPLE_LINE}"
                 )
         return entries

@@ -43,7 +43,7 @@ class OutlineNode:
         detail: Summary of the node's settings in the mission.
         kind: `skill`, or the keyword of a control node.
         symbol, shape: Symbol and Graphviz shape of a control node in drawings; "" for a skill.
-        title: Label, or name of the skill or keyword.
+        title: Label of the node; for a node without label, name of the skill or keyword.
         slot: Key of the parent under which the node is written: `do`, `recover`, `catch 1`; "" in a list.
         when: Failures that activate a catch: `on Grasp.missed`; "" for other nodes.
         subtrees: Names of the subtrees with this node as root, the outermost first.

@@ -24,7 +24,7 @@ class VariableRead(NamedTuple):
     """A read of a variable by a node.
 
     Attributes:
-        node: The node.
+        node: Node that reads the variable.
         input_name: Name in messages: `Approach.target`, or the keyword of a control node.
         variable: Name of the variable.
         span: Position of the variable; position of the skill if the mission names no variable.

@@ -50,7 +50,7 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
 def _check_value(
     context: CheckContext, node: SkillNode, declaration: Param | Port, value: Literal
 ) -> Iterator[Finding]:
-    """Yield an error if a constant does not fit the param or port to which the mission assigns it."""
+    """Yield an error if the constant `value` does not fit the param or port of `declaration`."""
     name, code, hint = f"{node.skill}.{declaration.name}", "wrong-type", ""
     if isinstance(declaration, Param):
         code, problem = find_param_problem(declaration, value.value)

@@ -59,7 +59,7 @@ class LocatedName:
 
 @dataclass(frozen=True)
 class Setting:
-    """`name: value` below a skill, `with` or `returns`: the value, and the position of the name."""
+    """`name: value` below a skill, `with` or `returns`: the value, and the position of `name`."""
 
     name_span: Span
     value: Value
