@@ -23,10 +23,10 @@ def detect_and_record_drop(cell: Cell, item: Item) -> bool:
     if cell.tool.holding:
         return False
     if cell.ledger.find_held_item() == item:
-        position, velocity = cell.arm.tool_pose.position, cell.arm.tool_velocity
-        height = cell.classes[cell.ledger.get_label(item)].height
+        velocity, height = cell.arm.tool_velocity, cell.classes[cell.ledger.get_label(item)].height
         is_predictable = float(np.linalg.norm(velocity)) <= MAX_PREDICTABLE_SPEED
-        landing = predict_landing(position, velocity, height) if is_predictable else None
+        # The pose of the tool is a recorded input, so it is read only if it is needed.
+        landing = predict_landing(cell.arm.tool_pose.position, velocity, height) if is_predictable else None
         cell.ledger.record_drop(item, landing)
     return True
 

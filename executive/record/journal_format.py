@@ -113,6 +113,8 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
     events: list[TimedEvent] = []
     control_period = clock_offset = 0.0
     for line_number, line in enumerate(lines, start=1):
+        if line_number == 1 and (message := _describe_old_format(line)):
+            raise InputError(f"{file_name}: {message}")
         try:
             timed = decode_event(line)
             event = timed.event
@@ -126,8 +128,6 @@ def decode_events(lines: Iterable[bytes], file_name: str) -> list[TimedEvent]:
             elif isinstance(event, InputRead) and not event.exception:
                 check_input(event.name, event.value)
         except ValueError as error:
-            if line_number == 1 and (message := _describe_old_format(line)):
-                raise InputError(f"{file_name}: {message}") from error
             raise InputError(
                 f"{file_name}:{line_number}: this line is no event ({error}); the file was changed or "
                 "damaged after the run, because a run only appends to its journal; restore a copy of the file"
@@ -148,18 +148,22 @@ def _check_clock_offset(value: JsonValue) -> float:
 
 
 def _describe_old_format(line: bytes) -> str:
-    """Return a message if the first line of a journal is the start of a run in format 1, else ""."""
+    """Return a message if the first line of a journal is the start of a run in another format, else ""."""
     try:
         entry = from_json(line)
     except ValueError:
         return ""
-    if not isinstance(entry, dict) or entry.get("kind") != "run":
+    if not isinstance(entry, dict) or entry.get("kind") not in ("run", RunStarted.__name__):
+        return ""
+    # Journals of format 1 contain no format.
+    journal_format = 1 if entry["kind"] == "run" else entry.get("format")
+    if not isinstance(journal_format, int) or journal_format == JOURNAL_FORMAT:
         return ""
     versions = entry.get("versions")
     version = versions.get("executive", "0.1") if isinstance(versions, dict) else "0.1"
     return (
-        f"this journal has format 1, written by executive {version}; this version reads format "
-        f"{JOURNAL_FORMAT}; read the journal with executive {version}, or run the mission again"
+        f"this journal has format {journal_format}, written by executive {version}; this version reads "
+        f"format {JOURNAL_FORMAT}; read the journal with executive {version}, or run the mission again"
     )
 
 

@@ -13,6 +13,7 @@ from executive.cell.json_values import to_json
 from executive.cell.workcell import AUDIT_KEYS
 from executive.errors import ExecutiveError, explain_os_errors
 from executive.events import RunResumed, TimedEvent
+from executive.events.run_events import RunStatus
 from executive.exit_codes import ExitCode
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis import Diagnosis
@@ -95,7 +96,7 @@ class Result:
 
     version: int = RESULT_VERSION
     mission: str
-    status: str
+    status: RunStatus
     reason: str
     message: str
     node: str
@@ -140,7 +141,7 @@ def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result
         return result if (result.status, result.ticks) == (end.status, end.ticks) else None
     # If a full disk prevented the event of the end, the result is valid without this event.
     is_resumed = any(isinstance(timed.event, RunResumed) for timed in events)
-    return result if result.status in ExitCode.__members__ and not is_resumed else None
+    return None if is_resumed else result
 
 
 def list_requests(timeline: Timeline) -> list[str]:

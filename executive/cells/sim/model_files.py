@@ -65,7 +65,7 @@ def find_mesh(urdf: Path, mesh: ElementTree.Element) -> Path:
         InputError: The mesh is no file in the folder of the URDF, is too large, or has too many triangles.
     """
     path = find_model(str(urdf.parent / _normalize_name(urdf, mesh.get("filename", ""))))
-    _check_triangle_count(path)
+    _check_triangle_count(path, _count_triangles(path))
     return path
 
 
@@ -77,8 +77,8 @@ def _normalize_name(urdf: Path, name: str) -> str:
     return name
 
 
-def _check_triangle_count(path: Path) -> None:
-    """Raise `InputError` if a Wavefront or STL file is unreadable or exceeds `MAX_TRIANGLE_COUNT`."""
+def _count_triangles(path: Path) -> int:
+    """Return the number of triangles of a Wavefront or STL file; raise `InputError` if unreadable."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -86,12 +86,14 @@ def _check_triangle_count(path: Path) -> None:
     if path.suffix.lower() == ".stl":
         # A binary STL file has a header of 80 bytes, the number of triangles, and 50 bytes for each triangle.
         count = int.from_bytes(content[80:84], "little")
-        if len(content) != 84 + 50 * count:
-            count = content.count(b"endfacet")  # an STL text file
-    else:
-        # A line "f" of a Wavefront file lists the vertices of a polygon, two more than its triangles.
-        lines = (line.split() for line in content.splitlines())
-        count = sum(len(words) - 3 for words in lines if words[:1] == [b"f"])
+        return count if len(content) == 84 + 50 * count else content.count(b"endfacet")
+    # A line "f" of a Wavefront file lists the vertices of a polygon, two more than its triangles.
+    lines = (line.split() for line in content.splitlines())
+    return sum(max(len(words) - 3, 0) for words in lines if words[:1] == [b"f"])
+
+
+def _check_triangle_count(path: Path, count: int) -> None:
+    """Raise `InputError` if the number of triangles of a file exceeds `MAX_TRIANGLE_COUNT`."""
     if count > MAX_TRIANGLE_COUNT:
         raise InputError(
             f"the model {path.name} has more than {MAX_TRIANGLE_COUNT} triangles; simplify the mesh"
@@ -106,7 +108,6 @@ def read_wavefront(path: Path) -> tuple[Array, NDArray[np.intp]]:
     """
     vertices: list[list[float]] = []
     triangles: list[tuple[int, int, int]] = []
-    _check_triangle_count(path)
     try:
         for line in path.read_text(encoding="utf-8").splitlines():
             keyword, *words = line.split() or [""]
@@ -117,6 +118,7 @@ def read_wavefront(path: Path) -> tuple[Array, NDArray[np.intp]]:
                 numbers = [int(word.split("/")[0]) for word in words]
                 indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
                 triangles += [(indices[0], *pair) for pair in pairwise(indices[1:])]
+        _check_triangle_count(path, len(triangles))
         mesh = np.array(vertices, dtype=float), np.array(triangles, dtype=np.intp).reshape(-1, 3)
         _check_mesh(*mesh)
         return mesh

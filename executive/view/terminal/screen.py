@@ -91,9 +91,11 @@ class TerminalView:
 
     def _show(self) -> None:
         """Show the view, and start to read keys."""
-        self._live.start()
-        if self._key_reader is not None:
-            self._key_reader.start()
+        try:
+            self._live.start()
+        finally:
+            if self._key_reader is not None:
+                self._key_reader.start()
 
     def _hide(self) -> None:
         """Hide the view, and stop reading keys."""

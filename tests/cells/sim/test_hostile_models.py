@@ -109,6 +109,13 @@ def test_a_mesh_of_more_than_20000_triangles_is_refused(model: str, tmp_path: Pa
         load_mesh(ObjectConfig(**key, height=0.05, radius=0.03))
 
 
+@pytest.mark.parametrize("faces", ["f 1 2 3\n" * 20_001 + "f\n" * 9, "\u2028".join(["f 1 2 3"] * 20_001)])
+def test_empty_faces_and_other_line_breaks_hide_no_triangle(faces: str, tmp_path: Path) -> None:
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + faces, encoding="utf-8")
+    with pytest.raises(InputError, match=r"^the model m\.obj has more than 20000 triangles"):
+        load_mesh(ObjectConfig(mesh=str(tmp_path / "m.obj"), height=0.05, radius=0.03))
+
+
 def test_a_name_that_no_file_can_have_is_no_model() -> None:
     with pytest.raises(InputError, match=r"^there is no model uuu"):
         find_model("u" * 300)
