@@ -21,7 +21,7 @@ from executive.perception.evidence import describe_touch_contradiction, may_miss
 from executive.skill import EMPTY, In, Metres, Skill, param, port
 
 EARLY_CONTACT_MARGIN = 0.001
-"""Minimum height of a collision above the start of the guarded descent [m]."""
+"""Height above the start of the guarded descent from which a contact counts as a collision [m]."""
 
 
 class Approach(Skill):
@@ -29,14 +29,14 @@ class Approach(Skill):
 
     The arm makes one motion: fast to a position above the target, then a slow, guarded descent, because the
     camera does not measure the height of the surface exactly. The skill succeeds on contact near the expected
-    height. Repeated attempts touch different points of the target, on a spiral, or on the ring of an object
+    height. Repeated attempts touch different points of the target: on a spiral, or on the ring of an object
     with a hole. From the fourth attempt on, the descent ends 5 mm above the table, to distinguish a false
     detection from an object.
 
     A touch at a wrong height contradicts the class of the target, unless an earlier touch matched the class.
     The first touch that is too low is no contradiction either if its height matches no other class and the
     detections alone prove the class. A touch below the middle of the object, or more than `overtravel` too
-    low, missed the target. If an earlier touch matched the class, the skill then fails with `no_contact`.
+    low, missed the target; the skill then fails with `no_contact` if an earlier touch matched the class.
     """
 
     target: In[Target] = port(doc="the target to touch")
@@ -49,7 +49,7 @@ class Approach(Skill):
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the time of the guarded descent [s]; the arm may already be above the target."""
+        """Return the time of the guarded descent only [s], as the arm may already be above the target."""
         del values
         return min_times.descent_time
 

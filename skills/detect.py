@@ -17,15 +17,15 @@ class Detect(Skill):
 
     The output contains all detections that are not doubtful; it may be empty. A detection is doubtful if its
     confidence is below the threshold, or if its second class has more than half of this confidence.
-    If all detections on the table are doubtful, the skill fails with `unsure`, or, by the param `doubtful`,
+    If all detections on the table are doubtful, the skill fails with `unsure`, or, with `doubtful: pass`,
     succeeds with an empty output. If the arm hides part of the workspace, the skill fails with `hidden`, or,
-    by the param `hidden`, searches the visible part; the hidden part is then neither empty nor occupied.
+    with `hidden: pass`, detects objects in the visible part; the hidden part then counts as unknown.
     The skill fails with `crowded` if the detector reports more than 60 boxes of any confidence, and with
     `camera_moved` if the bins in the image are away from their expected positions.
     """
 
     detections: Out[Detections] = port(doc="the detections and their frame")
-    detector: str = param("", refers="detector", doc="a detector of the cell; empty: the first")
+    detector: str = param("", refers="detector", doc="a detector of the cell; empty: the first detector")
     view: str = param(
         "table", choices=("table", "full"), doc="`table`: the workspace; `full`: the whole image"
     )
@@ -43,7 +43,7 @@ class Detect(Skill):
         return min_times.get_answer_time(values["detector"])
 
     def run(self, cell: Cell) -> Steps:
-        """Capture a frame, request the detector to search it, and wait for the answer."""
+        """Capture a frame, send the frame to the detector, and wait for the answer."""
         camera = cell.camera
         if self.hidden == "fail" and not camera.sees_table():
             raise self.failure("hidden", f"the arm hides part of the workspace from camera {camera.name}")

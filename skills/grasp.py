@@ -31,7 +31,7 @@ class Grasp(Skill):
             yield from cell.clock.sleep(self.settle)
             is_sealed = cell.tool.holding
         finally:
-            # A halted skill must not leave an object in the tool, because the ledger has no held item.
+            # A halted skill must not leave an object in the tool, because the ledger has recorded no grasp.
             if not is_sealed:
                 cell.tool.open()
         if not is_sealed:

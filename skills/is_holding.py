@@ -12,8 +12,8 @@ from executive.skill import ANY, EMPTY, HOLDING, Out, Skill, port
 class IsHolding(Skill):
     """Check with the sensor of the tool whether the tool holds an item.
 
-    The skill records a drop if the ledger has an item in the tool, but the sensor detects no seal. A mission
-    can use this skill to decide how to continue after a timeout or a failure during a transit.
+    Unless sensor and ledger both report an item, the skill opens the tool and fails; it also records a drop
+    if only the ledger reports an item. After a failed transit, a mission can thus decide how to continue.
     """
 
     held: Out[Item] = port(refers="item", doc="the item in the tool")
@@ -24,7 +24,7 @@ class IsHolding(Skill):
     tool_left: ClassVar = {"empty": EMPTY}
 
     def run(self, cell: Cell) -> None:
-        """Compare the vacuum sensor with the ledger."""
+        """Compare the vacuum sensor with the ledger; unless both report an item, open the tool and fail."""
         item = cell.ledger.find_held_item()
         if cell.tool.holding and item is not None:
             self.held = item

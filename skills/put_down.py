@@ -34,7 +34,7 @@ class PutDown(Skill):
     waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:
-        """Transport the item to the free position, and release it."""
+        """Transport the item to a free position, and release the item."""
         object_class = cell.classes[cell.ledger.get_label(self.held)]
         goal = make_put_down_goal(cell, object_class, self.drop, self.held)
         top_height = float(cell.safe_place[2]) + object_class.height

@@ -15,7 +15,7 @@ from executive.skill import In, Out, Skill, SkillFailed, param, port
 class SelectTarget(Skill):
     """Select the next target to pick, and its bin.
 
-    The skill selects only open items with a route whose positions are still valid. Enough looks must agree
+    The skill selects only open items with a valid position and a class with a route. Enough looks must agree
     on the class of an item, given the error rates of the detector. Distances are measured from the tool, or
     from the destination of the arm while the arm moves.
     """

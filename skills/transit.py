@@ -30,7 +30,7 @@ class Transit(Skill):
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:
-        """Return the minimum time of a transport to the bin, or to the nearest bin if it is unknown [s]."""
+        """Return the minimum time of a transport to `bin` [s], or to the nearest bin if `bin` is unknown."""
         return min_times.get_transport_time(values.get("bin"))
 
     def run(self, cell: Cell) -> Steps:
