@@ -13,7 +13,7 @@ from executive.manipulation.obstacles import list_obstacles
 from executive.skill import Skill, SkillFailed
 
 MAX_PLANNING_ATTEMPTS = 3
-"""Maximum number of planning attempts for one motion; the ledger may change goal or task in each."""
+"""Maximum number of planning attempts for one motion; the ledger may change goal or task during each."""
 
 
 def wait_for_rest(arm: Arm) -> Steps:
@@ -102,8 +102,8 @@ def release_item(
 ) -> Steps:
     """Switch the vacuum off, and yield for `settle_time` [s] until the item lies still.
 
-    `record_release` records the new position of the item in the ledger; the function also calls it if the
-    skill is halted during the wait and the tool is empty.
+    `record_release` records the new position of the item in the ledger, even if the skill is halted
+    during the wait, provided that the tool is empty.
 
     Raises:
         SkillFailed: The item still hangs on the tool; the reason is `stuck`.

@@ -38,7 +38,7 @@ def predict_object_count(cell: Cell, bin_name: str, excluded_item: Item | None =
     """
     held_item = cell.ledger.find_held_item()
     is_counted = held_item not in (None, excluded_item)
-    # Without such an item, the destination is not read: each reading of the cell is a recorded input.
+    # Without a moving item, the destination is not read, because each reading of the cell is recorded.
     arriving_count = 1 if is_counted and cell.bins[bin_name].contains(cell.arm.destination) else 0
     return cell.ledger.count_objects_in(bin_name) + arriving_count
 
@@ -61,7 +61,7 @@ def compute_layer_height(bin: Bin, layer: int, max_object_height: float) -> floa
 
 
 def _list_bin_obstacles(cell: Cell, excluded_item: Item | None) -> Iterator[Obstacle]:
-    """Yield one obstacle per slot with objects: a cylinder up to the top layer, without `excluded_item`."""
+    """Yield a cylinder up to the top layer for each slot with objects; `excluded_item` is not counted."""
     radius = max(object_class.radius for object_class in cell.classes.values()) + MAX_ROLL_DISTANCE
     for bin_name, bin in cell.bins.items():
         object_count = predict_object_count(cell, bin_name, excluded_item)

@@ -134,14 +134,14 @@ def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DR
 def make_slot_goal(
     bin: Bin, object_count: int, height: float, max_object_height: float, drop_height: float = DROP_HEIGHT
 ) -> Goal:
-    """Return the goal of a transit over the next slot of a bin.
+    """Return the goal of a transit to a position above the next slot of a bin.
 
     Args:
         bin: The bin.
         object_count: Number of objects in the bin; a new layer begins if all slots are used.
         height: Height of the object in the tool [m].
         max_object_height: Height of the tallest class of objects, and thickness of each layer [m].
-        drop_height: Height of the object above the layer below or above the floor [m].
+        drop_height: Height of the object's underside above the layer below, or above the floor [m].
     """
     layer, slot_index = divmod(object_count, len(bin.slots))
     x, y = map(float, bin.slots[slot_index])
@@ -167,7 +167,7 @@ def make_put_down_goal(
 
 
 def _is_free(cell: Cell, position: tuple[float, float], min_distance: float, item: Item | None) -> bool:
-    """Return True if all bins, and all objects except `item`, are `min_distance` [m] from `position` [m]."""
+    """Return True if all bins, and all objects except `item`, are `min_distance` [m] away from `position`."""
     bins = cell.bins.values()
     return not any(bin.contains(np.array(position), min_distance + BIN_THICKNESS) for bin in bins) and all(
         math.dist(position, (obstacle.x, obstacle.y)) > min_distance + obstacle.radius
@@ -178,8 +178,8 @@ def _is_free(cell: Cell, position: tuple[float, float], min_distance: float, ite
 def _compute_attempt_offset(failed_attempts: int, ring_radius: float, spacing: float) -> tuple[float, float]:
     """Return the offset `(x, y)` [m] of the contact point from the centre of the object.
 
-    The contact point n of a solid object lies on a Vogel spiral, at the distance spacing * sqrt(n) and the
-    angle n * GOLDEN_ANGLE; that of a part with a hole lies on the circle with the radius `ring_radius` [m].
+    After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
+    spacing * sqrt(n) and the angle n * GOLDEN_ANGLE. On a part with a hole, the distance is `ring_radius`.
     """
     angle = failed_attempts * GOLDEN_ANGLE
     distance = ring_radius or spacing * math.sqrt(failed_attempts)
