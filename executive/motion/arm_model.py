@@ -22,7 +22,7 @@ class Solutions(NamedTuple):
     """Inverse-kinematics solutions of one tool pose in `N` branches.
 
     Attributes:
-        qs: Joint positions `(N, n)` [rad], even outside the joint range; NaN in rows without a solution.
+        qs: Joint positions `(N, n)` [rad], possibly outside the joint range; NaN in rows without a solution.
         branches: Branch of each row.
     """
 
@@ -56,7 +56,7 @@ class Kinematics(Protocol):
         """Return the branch of the joint positions `q` `(n,)` [rad]."""
 
     def solve(self, X_WT: Pose, branch: BranchKey) -> Array:
-        """Return the joint positions `(n,)` [rad] of a tool pose in one branch, even outside `joint_range`.
+        """Return the joint positions `(n,)` [rad] of a tool pose in one branch, maybe outside `joint_range`.
 
         Raises:
             Unreachable: The pose is too near to the arm or too far from the arm.

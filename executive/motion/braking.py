@@ -25,9 +25,9 @@ MAX_BRAKING_TIME = 0.5
 """Longest time from full speed to rest [s]."""
 _ROUNDING_ERROR = 1e-9  # fraction of a control period
 _BRAKING_TIMES = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
-"""Times from full speed to rest that are tried, the shortest first [s]."""
+"""Candidates for the time from full speed to rest, the shortest first [s]."""
 _RAMP_FRACTIONS = (1 / 2, 1 / 3)
-"""Durations of the rise, and of the fall, of the deceleration, as fractions of the braking time."""
+"""Durations of the two ramps of the deceleration, each as a fraction of the braking time."""
 
 
 class _BrakingProfile(NamedTuple):
@@ -42,7 +42,7 @@ def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits,
     """Return the path times `(N,)` [s] of the control steps after `start_time`, until the arm is at rest.
 
     The arm either brakes along the path or completes the motion. The result is the shortest candidate within
-    the stop limits of joint acceleration and jerk, or else the candidate that exceeds the limits least. The
+    the stop limits of joint acceleration and jerk; if none exists, the one that exceeds them least. The
     arm begins to brake at the path time `start_time` [s]; `period` is the control period [s].
     """
     best_times, min_peak_fraction = np.array([start_time]), math.inf

@@ -33,7 +33,7 @@ _MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for
 class CartesianLine:
     """A straight motion of the tool; implements `executive.motion.state.MotionPiece`.
 
-    A tool that moves at an end of the line has the maximum speed there from which it can stop on the line.
+    If the tool moves at one end of the line, its speed there is the highest from which it can stop on it.
 
     Args:
         waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line, `N` > 3.

@@ -63,7 +63,7 @@ class Iiwa14:
 
     Args:
         tool_length: Distance from the flange to the tool centre point [m].
-        joint_range: Range according to the data sheet, `n` = 7; the attribute also has the limit of joint 6.
+        joint_range: Range according to the data sheet, `n` = 7, before the limit of joint 6 is applied.
         min_link_distance: Minimum distance between links 5 and 7 [m], which limits joint 6, or None.
     """
 
@@ -136,7 +136,7 @@ class Iiwa14:
     def solve_all(self, X_WT: Pose, q_seed: ArrayLike, angle_step: float) -> Solutions:
         """Return the solutions of a tool pose for all flips and evenly spaced redundancy angles.
 
-        The first redundancy angle is that of `q_seed` `(7,)` [rad]. Without a solution, raise Unreachable.
+        The first redundancy angle is that of `q_seed` `(7,)` [rad]. If no solution exists, raise Unreachable.
         """
         offsets = np.radians(np.arange(0.0, 360.0, math.degrees(angle_step)))
         angles = self.compute_redundancy_angle(q_seed) + offsets

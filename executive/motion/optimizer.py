@@ -32,9 +32,9 @@ from executive.motion.transcription import (
 MAX_SLACK = 0.03
 """Constraints with a larger slack are left out of a quadratic program [m]."""
 INITIAL_TRUST_RADIUS = 0.3
-"""Maximum change of the accelerations in the first step, as a fraction of their limits."""
+"""Maximum change of the accelerations in the first optimization step, as a fraction of their limits."""
 TRUST_RADIUS_FACTOR = 0.9
-"""Factor on the maximum change of the accelerations after each step."""
+"""Factor on the maximum change of the accelerations after each optimization step."""
 INITIAL_DURATION_FRACTION = 0.8
 """Duration of the initial motion as a fraction of the duration of the motion that stops at corners."""
 JOINT_RANGE_MARGIN = 0.01
@@ -50,8 +50,8 @@ class OptimizationProblem:
         start, end: States at the start and at the end of the motion.
         connector: Planner of motions between two states within the joint limits.
         kinematics: Kinematics of the arm.
-        clearance: Distances from the obstacles.
-        discs: Tool and load.
+        clearance: Model of the distances from the obstacles.
+        discs: Tool and load as discs.
         payload: Acceleration limit due to the load, or None.
     """
 
@@ -83,7 +83,7 @@ class OptimizationProblem:
         changes = self.clearance.compute_slack_changes(tcps, axes, self.discs, (new_tcps, new_axes))
         gradients = changes / _FINITE_DIFFERENCE_STEP
         range_slack = self._compute_range_slack(qs)
-        # Where a range limit is nearest, the slack changes only with the joint at the limit.
+        # If a range limit determines the slack, the slack changes only with the joint at the limit.
         states = np.flatnonzero(range_slack.min(axis=1) <= slack)
         joints = np.argmin(range_slack[states], axis=1)
         middle = (self.kinematics.joint_range.lower + self.kinematics.joint_range.upper) / 2
@@ -92,7 +92,7 @@ class OptimizationProblem:
         return gradients
 
     def _compute_range_slack(self, qs: Array) -> Array:
-        """Return the distance of each joint from its limits, minus the margin `(N, n)` [rad]."""
+        """Return the distance of each joint from its limits, minus `JOINT_RANGE_MARGIN`, `(N, n)` [rad]."""
         return -self.kinematics.joint_range.shrink(JOINT_RANGE_MARGIN).compute_excess(qs)
 
 
@@ -169,7 +169,7 @@ class Optimizer:
 
 
 def _limit_velocity(state: JointState, limits: JointLimits) -> JointState:
-    """Return the state with its velocity clipped, so that a motion can pass it within the velocity limits.
+    """Return the state with its velocity clipped, so that a motion through it keeps the velocity limits.
 
     While an acceleration `a` falls to 0 with the maximum jerk `j`, it changes the velocity by `a² / 2 j`.
     """

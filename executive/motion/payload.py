@@ -46,7 +46,7 @@ class PayloadLimit:
         return max(self._max_specific_force - GRAVITY, MIN_LIFT_ACCELERATION)
 
     def find_acceleration_fraction(self, trajectory: Trajectory) -> float:
-        """Return the largest fraction of the accelerations, 0 to 1, that keeps the safety factor."""
+        """Return the largest factor, 0 to 1, on the accelerations with which the safety factor holds."""
         centres = self._locate_load(trajectory.samples.q)
         if len(centres) < 4:
             return 1.0
@@ -99,9 +99,9 @@ class PayloadLimit:
 
 
 def _find_acceleration_fractions(accelerations: Array, max_specific_force: float) -> Array:
-    """Return the largest `k`, 0 to 1, for which `|k a + g|` is within its maximum; `a`: `(N, 3)` [m/s²].
+    """Return the largest factors `k` `(N,)`, 0 to 1, that keep `|k a + g|` within its maximum [m/s²].
 
-    With the maximum `f`, `k` solves the quadratic equation `k² (a a) + 2 k (a g) + g g - f² = 0`.
+    With accelerations `a` `(N, 3)` and maximum `f`, `k` solves `k² (a a) + 2 k (a g) + g g - f² = 0`.
     """
     a_a = np.sum(accelerations**2, axis=1) + 1e-12
     a_g = GRAVITY * accelerations[:, 2]

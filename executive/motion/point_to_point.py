@@ -1,7 +1,7 @@
 """Time-optimal, jerk-limited motion of all joints between two states, by ruckig.
 
 Each joint has its own velocity profile, and all profiles have the duration of the slowest joint. The path
-between the states is not prescribed, so that the caller must check its joint positions.
+between the states is not prescribed, so that the caller must check the joint positions on the path.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class JointLimitError(ValueError):
 
 
 class PointToPoint:
-    """A motion from state to state; implements `executive.motion.state.MotionPiece`."""
+    """A motion between two joint states; implements `executive.motion.state.MotionPiece`."""
 
     def __init__(self, profile: Profile) -> None:
         self._profile = profile
@@ -87,7 +87,7 @@ class Connector:
 
 
 def _find_max_speeds(profile: Profile) -> Array:
-    """Return the largest speed of each joint `(n,)` [rad/s].
+    """Return the largest speed of each joint in a profile `(n,)` [rad/s].
 
     ruckig does not always check the extreme speed `v - a² / 2 j` in a phase with constant jerk `j`, in which
     the acceleration changes its sign.

@@ -240,7 +240,7 @@ class MotionSearch:
     def _solve_corner(
         self, position: tuple[float, float, float], branch: BranchKey, q_seed: Array
     ) -> JointState:
-        """Return the state of rest at a tool position [m], with the last joint of `q_seed` `(n,)` [rad]."""
+        """Return the state of rest at a tool position [m], with joint n as in `q_seed` `(n,)` [rad]."""
         q = self._kinematics.solve(make_tool_down_pose(position), branch)
         q[-1] = q_seed[-1]
         return JointState.at_rest(q)

@@ -28,7 +28,7 @@ class Trajectory:
     Attributes:
         duration: Time from the start to the final rest [s].
         start, end: Joint positions at the start and at the end, `(n,)` each [rad].
-        guarded_start_time: Time from which the tool may touch the target [s]; infinite if it must not.
+        guarded_start_time: Time from which the tool may touch the target [s]; infinite for no contact.
     """
 
     def __init__(self, pieces: Sequence[MotionPiece], guarded_start_time: float = math.inf) -> None:
@@ -41,12 +41,12 @@ class Trajectory:
         self._pieces = tuple(pieces)
         self._end_times = tuple(accumulate(piece.duration for piece in pieces))
         self.duration = self._end_times[-1]
-        first, self._last = pieces[0].state_at(0.0), pieces[-1].state_at(pieces[-1].duration)
-        self.start, self.end = first.q, self._last.q
+        start_state, self._end_state = pieces[0].state_at(0.0), pieces[-1].state_at(pieces[-1].duration)
+        self.start, self.end = start_state.q, self._end_state.q
         for number, (piece, next_piece) in enumerate(pairwise(pieces), start=1):
             states = piece.state_at(piece.duration), next_piece.state_at(0.0)
             _require_equal(*states, f"pieces {number} and {number + 1}")
-        for state, end_name in ((first, "start"), (self._last, "end")):
+        for state, end_name in ((start_state, "start"), (self._end_state, "end")):
             _require_equal(state, JointState.at_rest(state.q), f"rest and the {end_name} of a trajectory")
 
     def slow_down(self, speed_factor: float) -> Trajectory:
@@ -70,7 +70,7 @@ class Trajectory:
     def samples(self) -> JointState:
         """States at all control steps and at the end, each array of shape `(N, n)`."""
         states = sample_pieces(self._pieces, np.arange(0.0, self.duration, STEP, dtype=np.float64))
-        return JointState(*map(np.vstack, zip(states, self._last, strict=True)))
+        return JointState(*map(np.vstack, zip(states, self._end_state, strict=True)))
 
     def check_limits(self, limits: JointLimits) -> JointState:
         """Check the limits of every joint, and return the checked states (`samples`).
@@ -126,7 +126,7 @@ class _SlowPiece:
 
 
 def downsample_path(qs: Array, max_spacing: float) -> Array:
-    """Return some points of a path `(N, n)` [rad]; between two points, joints move by up to `max_spacing`."""
+    """Return points of a path `(N, n)` [rad], between which joints move by up to `max_spacing` [rad]."""
     indices = [0]
     for index in range(1, len(qs) - 1):
         if np.max(np.abs(qs[index + 1] - qs[indices[-1]])) > max_spacing:

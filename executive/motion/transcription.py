@@ -37,18 +37,18 @@ SAMPLE_FRACTIONS = np.arange(1, STEP_COUNT * SAMPLES_PER_STEP) / (STEP_COUNT * S
 USED_LIMIT_FRACTIONS = 0.98, 0.995, 0.995
 """Used fractions of the velocity, acceleration and jerk limits.
 
-Velocities are limited at the half steps; between two half steps, a velocity may rise by `j (h / 2)² / 8`.
+Velocities are limited at the half steps; between half steps, a velocity may rise by up to `j (h / 2)² / 8`.
 """
 VIOLATION_COST = 20.0
 """Cost of a violated constraint, as a duration per distance [s/m]."""
 EXTRA_DISTANCE = 1e-3
-"""Addition to the required distances in a program, because linearized distances have an error [m]."""
+"""Addition to the required distances in quadratic programs, because linearized distances have errors [m]."""
 SMOOTHNESS_WEIGHT = 1e-4
 """Weight of the squared accelerations (as fractions of their limits), which makes the solution unique [s]."""
 MIN_STEP_FACTOR = 0.8
-"""Minimum factor on the duration of the motion in one program."""
+"""Minimum factor on the duration of the motion in one quadratic program."""
 MAX_STEP_FACTOR = 1.6
-"""Maximum factor on the duration of the motion in one program."""
+"""Maximum factor on the duration of the motion in one quadratic program."""
 _VIOLATION_UNIT = 0.01  # [m]
 _UNBOUNDED = 1e30  # bound that daqp treats as infinite
 _STATUS_SOLVED, _EQUALITY_CONSTRAINT = 1, 5  # constants of daqp
@@ -132,7 +132,7 @@ class Transcription:
         self._bound[2, -jerk_count:] = np.repeat(max_jerk, STEP_COUNT)
 
     def compute_states(self, motion: DiscreteMotion) -> list[JointState]:
-        """Return the states at all half steps, including the start and the end."""
+        """Return the states of a motion at all half steps, including the start and the end."""
         h, start = motion.step, self._start
         y = motion.accelerations * h**2
         qd = start.qd + (self._grid.half_velocity @ y.T) / h
@@ -157,7 +157,7 @@ class Transcription:
     def shorten(
         self, last: DiscreteMotion, constraints: Sequence[LinearizedConstraints], trust_radius: float
     ) -> DiscreteMotion | None:
-        """Return the fastest motion near the last motion, with small violations, or None if there is none.
+        """Return the fastest motion near the last motion, with small violations; None without a solution.
 
         Args:
             last: Motion about which the constraints are linearized.
@@ -289,7 +289,7 @@ class _Grid(NamedTuple):
         half_velocity: Map to the velocities at the inner half steps `(2 STEP_COUNT - 1, STEP_COUNT + 1)`.
         sample_position: Map to the positions at `SAMPLE_FRACTIONS` `(M, STEP_COUNT + 1)`.
         sample_times: Times of the samples [steps] `(M,)`.
-        rows: Rows of all limits, of the negated limits, and of the final state; the last two columns, for
+        rows: Rows for all limits, for the negated limits, and for the final state; the last two columns, for
             step and violation, are 0.
     """
 
