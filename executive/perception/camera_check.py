@@ -18,7 +18,7 @@ MAX_OUTLINE_DISTANCE = 0.005
 """Maximum mean distance between the outlines of the bins and their expected positions [m].
 
 Measured with cameras at their declared poses: at most 0.6 mm (wrist camera) and 2.1 mm (fixed camera) in 264
-frames of eight cells with different lamps, shadows, tables and fill levels of the bins; at most 0.5 mm (wrist
+frames of eight cells with different light, shadows, tables and fill levels of the bins; at most 0.5 mm (wrist
 camera) and 2.2 mm (fixed camera) in the 639 frames of 81 complete runs.
 """
 MIN_SUPPORT = 0.65
@@ -79,7 +79,7 @@ def estimate_offset(frame: Frame, bins: Sequence[Bin]) -> CameraOffset | None:
         offset = _make_camera_offset(near_fit, frame, bins)
         if offset.outline_distance <= MAX_OUTLINE_DISTANCE:
             return offset
-    # The edges near the expected outlines may belong to other objects: other poses are tried too.
+    # The edges near the expected outlines may belong to other objects, so that other poses are tried too.
     fits = [fit for fit in (near_fit, *fitter.search()) if fit is not None]
     best_fit = max(fits, key=lambda fit: fit.support, default=None)
     min_support = max(MIN_SUPPORT, fitter.compute_support(np.zeros(6)) + MIN_SUPPORT_GAIN)

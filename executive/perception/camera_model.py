@@ -34,7 +34,7 @@ def compute_field_of_view(matrix: Array, height: int) -> float:
 
 
 def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) -> Pose:
-    """Return the pose of a camera at `position` whose optical axis passes through `target`.
+    """Return the pose of a camera at `position` `(3,)` [m] that looks at `target` `(3,)` [m].
 
     `up` `(3,)` is the direction to the top of the image; it need not be perpendicular to the optical axis.
 
@@ -58,8 +58,8 @@ def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) 
 def convert_from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Array, Pose]:
     """Return camera matrix `(3, 3)` [pixel] and pose `X_WC` of a camera calibrated with OpenCV.
 
-    `rvec` [rad] and `tvec` [m] of `cv2.solvePnP` transform points from W to C. The function is the inverse of
-    `Frame.to_opencv`.
+    `rvec` [rad] and `tvec` [m] of `cv2.solvePnP` transform points from the world to the camera. The function
+    is the inverse of `Frame.to_opencv`.
     """
     # scipy.spatial is imported here because the import takes 0.3 s, and few cells need it.
     from scipy.spatial.transform import Rotation
@@ -123,7 +123,7 @@ def intersect_plane(matrix: Array, X_WC: Pose, pixel: ArrayLike, z: float) -> Ar
 
 
 def compute_view_matrix(X_WC: Pose) -> tuple[float, ...]:
-    """Return the view matrix of OpenGL and PyBullet: 16 numbers in column-major order."""
+    """Return the view matrix of a camera for OpenGL and PyBullet: 16 numbers in column-major order."""
     X_CW = X_WC.inverse()
     view = np.eye(4)
     view[:3, :3], view[:3, 3] = X_CW.rotation, X_CW.position

@@ -26,7 +26,7 @@ MAX_TOUCH_HEIGHT_ERROR = 0.003
 OTHER_CLASS_TOLERANCE = 0.0025
 """Maximum difference between the height of a touch and the height of a class that was not assumed [m]."""
 TOP_TOLERANCE = 0.012
-"""Maximum difference between the height of a top in the depth image and an expected height [m].
+"""Maximum difference between the height of an object's top in the depth image and an expected height [m].
 
 In 480 scenes of the cell `depth` (60 crowded, 60 with unknown objects), the tops of 1894 correctly detected
 objects had a mean error of 2.1 mm and a maximum error of 10.1 mm. The tops of 20 of 26 unknown objects
@@ -41,7 +41,7 @@ tolerance at 1.8 m is 27 mm; 160 tops had errors of at most 18.3 mm there.
 SIZE_TOLERANCE = 0.15
 """Maximum relative difference between the size of a box and the sizes that its class allows."""
 SIZE_TOLERANCE_PX = 2.0
-"""Maximum additional difference between the sizes, for small boxes [pixel]."""
+"""Maximum additional difference between the size of a box and the sizes that its class allows [pixel]."""
 MIN_BORDER_DISTANCE = 2.0
 """Minimum distance of a completely visible box from the border of the searched region [pixel]."""
 
@@ -53,7 +53,7 @@ def describe_unknown_labels(counts: Mapping[str, int]) -> str:
 
 
 def describe_touch_contradiction(label: str, height: float, classes: Mapping[str, ObjectClass]) -> str:
-    """Return a sentence on the contradiction between a touch at `height` [m] and a class; "" without."""
+    """Return a sentence on the contradiction between a touch at `height` [m] and a class; "" if none."""
     if abs(_compute_height_error(label, height, classes)) <= MAX_TOUCH_HEIGHT_ERROR:
         return ""
     return (
@@ -63,7 +63,7 @@ def describe_touch_contradiction(label: str, height: float, classes: Mapping[str
 
 
 def find_classes_distinct_by_touch(config: CellConfig) -> frozenset[str]:
-    """Return the classes whose heights differ from all others by more than `MAX_TOUCH_HEIGHT_ERROR`."""
+    """Return the classes whose height differs from every other by more than `MAX_TOUCH_HEIGHT_ERROR`."""
     heights = {label: section.height for label, section in config.objects.items()}
     return frozenset(
         label
@@ -89,10 +89,10 @@ def _compute_height_error(label: str, height: float, classes: Mapping[str, Objec
 def describe_top_contradiction(
     detection: Detection, position: Array, frame: Frame, area: Box, classes: Mapping[str, ObjectClass]
 ) -> str:
-    """Return a sentence on the contradiction between the depth image and the detected class; "" without.
+    """Return a sentence on the contradiction between the depth image and the detected class; "" if none.
 
-    "" also for a truncated or occluded box, or too few depth values. In a stack of two objects, both boxes
-    show the upper object; the height of the stack is a possible height for both classes.
+    The result is also "" for a truncated or occluded box, or too few depth values. In a stack of two objects,
+    both boxes show the upper object; the height of the stack is a possible height for both classes.
 
     Args:
         detection: Box and detected class.
@@ -127,9 +127,9 @@ def _list_top_heights(label: str, classes: Mapping[str, ObjectClass]) -> list[fl
 def describe_size_contradiction(
     detection: Detection, position: Array, frame: Frame, area: Box, object_class: ObjectClass
 ) -> str:
-    """Return a sentence on the contradiction between the size of a box and its class; "" without.
+    """Return a sentence on the contradiction between the size of a box and its class; "" if none.
 
-    "" also for a truncated or occluded box. A cylinder with radius and height of the class encloses the
+    The result is also "" for a truncated or occluded box. A cylinder with the size of the class encloses the
     object. The longer side of the box is at most the longer side of the image of the cylinder, and at least
     the side of the square that is inscribed in the base of the cylinder.
 

@@ -58,22 +58,22 @@ class CellLocalizer:
             ) from None
 
     def localize(self, detections: Detections) -> list[Observation]:
-        """Return the observations of all doubtful detections, then of all found detections.
+        """Return the observations of all doubtful detections, then of all confident detections.
 
-        Doubtful detections that cannot be localized are omitted, unless there is no found detection.
+        A doubtful detection that cannot be localized is omitted if there is a confident detection.
 
         Raises:
-            NoDepth: A detection cannot be localized.
+            NoDepth: A detection cannot be localized and is not omitted.
         """
-        found = [self._observe(detections, detection) for detection in detections.confident]
+        confident = [self._observe(detections, detection) for detection in detections.confident]
         doubtful = []
         for detection in detections.doubtful:
             try:
                 doubtful.append(self._observe(detections, detection, is_doubtful=True))
             except NoDepth:
-                if not found:
+                if not confident:
                     raise
-        return [*doubtful, *found]
+        return [*doubtful, *confident]
 
     def _observe(
         self, detections: Detections, detection: Detection, *, is_doubtful: bool = False
@@ -86,7 +86,7 @@ class CellLocalizer:
         return Observation(detection, position, std, not (is_doubtful or contradiction), contradiction)
 
     def _describe_contradiction(self, detections: Detections, detection: Detection, position: Array) -> str:
-        """Return a sentence on the evidence against the detected class; "" without evidence, and in a bin."""
+        """Return a text with evidence against the detected class; "" if none, or for an object in a bin."""
         if any(bin.contains(position, BIN_THICKNESS) for bin in self.bins):
             return ""
         frame, area, object_class = detections.frame, detections.area, self.classes[detection.label]
@@ -116,13 +116,13 @@ def build_localizer(
 
 
 def _find_height_on_table(detection: Detection, frame: Frame, object_class: ObjectClass) -> float:
-    """Return the height of the centre [m] of an object of a class that stands on the table."""
+    """Return the height of the centre [m] of an object that stands on the table."""
     del detection, frame
     return object_class.height / 2
 
 
 def _find_height_by_depth(detection: Detection, frame: Frame, object_class: ObjectClass) -> float:
-    """Return the height of the centre [m], from the height of the top in the depth image.
+    """Return the height of the centre of an object [m], from the height of its top in the depth image.
 
     Raises:
         NoDepth: The frame has no depth image, or too few depth values in the box.
@@ -133,7 +133,7 @@ def _find_height_by_depth(detection: Detection, frame: Frame, object_class: Obje
 def _find_height_by_ray(
     cast_ray: RayTest, detection: Detection, frame: Frame, object_class: ObjectClass
 ) -> float:
-    """Return the height of the centre [m], from the hit of a simulated ray on the top of the object.
+    """Return the height of the centre of an object [m], from the hit of a simulated ray on its top.
 
     The ray test uses the current scene, not the scene at capture; a hardware cell has no ray test.
 

@@ -180,7 +180,7 @@ class OutlineFitter:
         return EdgeSamples(*(values[is_visible] for values in samples))
 
     def _find_edges(self, samples: EdgeSamples, max_distance: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the distances `(N,)` [pixel] along the normals to the edges, and a mask of found edges."""
+        """Return the distances `(N,)` [pixel] along the normals to edges; True for samples with an edge."""
         if not len(samples.pixels):
             return np.zeros(0), np.zeros(0, dtype=bool)
         normals = samples.normals[:, None, None]
@@ -208,7 +208,7 @@ def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Ar
     points, next_points, bin_indices = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, dtype=np.intp)]
     for index, bin in enumerate(bins):
         half_size = np.array([*(bin.size[:2] / 2 + BIN_THICKNESS), bin.size[2] / 2])
-        # The first four corners are the rim.
+        # The first four corners belong to the rim.
         signs = [(*xy, z) for z in (1, -1) for xy in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
         corners = bin.position + (0.0, 0.0, half_size[2]) + half_size * signs
         corners_C = X_WC.inverse().apply(corners)
@@ -219,8 +219,8 @@ def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Ar
         polygons: tuple[list[int], ...] = (silhouette, [0, 1, 2, 3])
         edges = {
             frozenset(edge)
-            for corner in polygons
-            for edge in zip(corner, [*corner[1:], corner[0]], strict=True)
+            for polygon in polygons
+            for edge in zip(polygon, [*polygon[1:], polygon[0]], strict=True)
         }
         for start, end in sorted(sorted(edge) for edge in edges):
             count = int(np.linalg.norm(pixels[end] - pixels[start]) / SAMPLE_SPACING)
@@ -252,10 +252,10 @@ def _is_sufficient(samples: EdgeSamples) -> bool:
 
 
 def _compute_jacobian(samples: EdgeSamples, matrix: Array) -> Array:
-    """Return the derivatives `(N, 6)` of positions along the normals with respect to the pose offset."""
+    """Return the derivatives `(N, 6)` of image positions along the normals by the pose offset."""
     x, y, z = samples.camera_points.T
     u, v = (samples.normals * matrix.diagonal()[:2]).T
-    # Derivative with respect to the point: for a normal n and a focal length f, of n·f·(x/z, y/z).
+    # Derivative of n·f·(x/z, y/z) by the point (x, y, z), with the normal n and the focal length f.
     gradient = np.column_stack([u / z, v / z, -(u * x + v * y) / z**2])
     # A camera that moves by (w, t) moves the point by -(w × p + t) in the camera frame.
     return np.column_stack([np.cross(gradient, samples.camera_points), -gradient])

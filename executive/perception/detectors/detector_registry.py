@@ -94,7 +94,7 @@ def find_detectable_labels(
 ) -> dict[str, tuple[str, ...] | None]:
     """Return the detectable labels of each detector of a cell file, by its name; None if unknown.
 
-    A kind of detector may have a static method `labels(config, base)` that returns them. No model is loaded.
+    A kind of detector may have a static method `labels(config, base)` for its labels. No model is loaded.
     """
     kinds = find_detector_kinds()
     labels: dict[str, tuple[str, ...] | None] = {}

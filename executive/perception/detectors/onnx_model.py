@@ -60,7 +60,7 @@ class OnnxModel:
         self.input_size = self._check_shapes(path)
 
     def detect(self, image: NDArray[np.uint8], min_confidence: float) -> list[Detection]:
-        """Return the detections of at least `min_confidence` in an RGB image `(H, W, 3)`, best first.
+        """Return the detections of at least `min_confidence` in an RGB image `(H, W, 3)`.
 
         Raises:
             Unavailable: onnxruntime failed.
@@ -107,12 +107,12 @@ class OnnxModel:
                 f"{path} is not an exported RF-DETR model: it has the inputs {', '.join(inputs)} and the "
                 f"outputs {', '.join(outputs)}; it needs the input input and the outputs dets and labels"
             )
-        size, classes = inputs["input"][-1], outputs["labels"][-1]
+        size, output_count = inputs["input"][-1], outputs["labels"][-1]
         if not isinstance(size, int):
             raise InputError(f"{path} has an input of variable size; export it with a fixed size")
-        if classes != len(self.labels) + 1:
+        if output_count != len(self.labels) + 1:
             raise InputError(
-                f"{path} has {classes - 1} classes, but there are {len(self.labels)} labels: "
+                f"{path} has {output_count - 1} classes, but there are {len(self.labels)} labels: "
                 f"{', '.join(self.labels)}; give one label per class, in the order of the model"
             )
         return size

@@ -1,4 +1,4 @@
-"""Search of frames in a thread, with answers that become available at reproducible times of the run."""
+"""Detection of objects in a thread, with answers that become available at reproducible times of the run."""
 
 from __future__ import annotations
 
@@ -61,10 +61,10 @@ class ChangedRequest:
 
 @dataclass(eq=False)
 class PendingSearch:
-    """Running search; implements `executive.cell.protocols.Request`.
+    """Running detection; implements `executive.cell.protocols.Request`.
 
     Attributes:
-        future: Detections of the thread, when the search has ended.
+        future: Detections, available when the thread has searched all regions.
         due_time: Time from which the answer is available [s].
         clock: Clock of the run.
         detector: Name of the detector.
@@ -108,7 +108,7 @@ class PendingSearch:
 
 
 class ThreadedDetector:
-    """Base class of detectors that search in their own thread; implements `ClosableDetector`.
+    """Base class of detectors that run in their own thread; implements `ClosableDetector`.
 
     Args:
         config: Section of the detector in the cell file.
@@ -121,7 +121,7 @@ class ThreadedDetector:
         self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
 
     def request(self, frame: Frame, view: str) -> PendingSearch:
-        """Start to search a view of a frame: `table` (the workspace) or `full` (the whole image)."""
+        """Start the detection in a view of a frame: `table` (the workspace) or `full` (the whole image)."""
         regions = self._list_regions(view, frame.image.shape[1::-1])
         future = self._thread.submit(lambda: self._search(frame.image, regions))
         clock, config = self._setting.clock, self._config

@@ -119,9 +119,9 @@ class RfdetrDetector(ThreadedDetector):
             return None
 
     def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
-        return search_regions(image, regions, self._find_in_crop, self._class_map)
+        return search_regions(image, regions, self._detect_in_crop, self._class_map)
 
-    def _find_in_crop(self, crop: NDArray[np.uint8]) -> list[Detection]:
+    def _detect_in_crop(self, crop: NDArray[np.uint8]) -> list[Detection]:
         """Return the detections in a crop of a frame, with boxes in pixels of the crop."""
         height, width = crop.shape[:2]
         size = self._model.input_size

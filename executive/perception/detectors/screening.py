@@ -21,17 +21,17 @@ MAX_BOXES = 60
 """Maximum number of boxes in one answer, including doubtful boxes and unknown labels. Shipped cells have at
 most 20 objects, and the time for the assignment of boxes to items grows more than linearly."""
 MAX_COORDINATE = 1e5
-"""Maximum absolute coordinate of a box [pixel]; images are smaller, and larger squares could overflow."""
+"""Maximum absolute coordinate of a box [pixel]; images are smaller; larger squared values could overflow."""
 MAX_LABEL_LENGTH = 100
 """Maximum number of characters of a label, which appears in messages and on the terminal."""
 MAX_SECOND_CLASS_RATIO = 0.5
-"""Maximum confidence of the second class of a confident detection, as a fraction of its confidence."""
+"""Maximum confidence of the second class of a confident detection, as a fraction of the first confidence."""
 
 
 def screen_answer(answer: Answer, frame: Frame, view: str, labels: Collection[str]) -> Answer:
     """Return an answer with its detections divided into `confident`, `doubtful` and `unknown`.
 
-    Boxes that the arm occludes, and detections with unknown labels below the threshold, are omitted.
+    Boxes that the arm occludes, and unknown labels with a confidence below the threshold, are omitted.
 
     Args:
         answer: Answer with all detections in `confident`.
@@ -83,7 +83,7 @@ class ScreenedDetector:
     labels: Collection[str]
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Start to search a view of a frame: `table` (the workspace) or `full` (the whole image)."""
+        """Start the detection in a view of a frame: `table` (the workspace) or `full` (the whole image)."""
         request = self.detector.request(frame, view)
         return ChangedRequest(
             request, lambda answer: screen_answer(answer, frame, view, self.labels), self.name
@@ -96,7 +96,7 @@ def screen_detectors(detectors: Mapping[str, Detector], labels: Collection[str])
 
 
 def _is_confident(detection: Detection, threshold: float) -> bool:
-    """Return True if a detection reaches the threshold, and its second class has a low confidence."""
+    """Return True if a detection reaches the threshold and has a low confidence of its second class."""
     confidence = detection.confidence
     return confidence >= threshold and detection.second_confidence <= MAX_SECOND_CLASS_RATIO * confidence
 

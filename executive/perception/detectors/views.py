@@ -1,4 +1,4 @@
-"""Regions of an image for the search by a detector, and merging of the detections in all regions."""
+"""Regions of an image that a detector searches, and merging of the detections in all regions."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Region = tuple[int, int, int, int]
 """Left, top, right and bottom side [pixel] of a region of an image."""
 
 TILE_OVERLAP = 0.25
-"""Minimum overlap of neighbouring tiles, as a fraction of their side; objects are smaller."""
+"""Minimum overlap of neighbouring tiles, as a fraction of their side; larger than every object."""
 MAX_TRUNCATION_DISTANCE = 0.01
 """Maximum distance of a truncated box from the border of its region, as a fraction of the region width."""
 MIN_DUPLICATE_IOU = 0.7
-"""Minimum intersection over union of two boxes of one object; boxes of touching objects have less."""
+"""Minimum intersection over union of two boxes of one object; boxes of touching objects overlap less."""
 MIN_TILE_IOU = 0.5
 """Minimum intersection over union of the boxes of one object in two tiles."""
 MIN_CONTAINED_FRACTION = 0.7
@@ -45,7 +45,7 @@ def list_regions(view: str, table_view: Region, size: tuple[int, int]) -> list[R
     """Return the regions of an image to search for a view.
 
     Args:
-        view: `table`, the region `table_view`, or `full`, tiles of the same size that cover the image.
+        view: `table` for the region `table_view`; `full` for tiles of this size that cover the image.
         table_view: Square region that shows the workspace.
         size: Width and height of the image [pixel].
 
@@ -111,7 +111,7 @@ def remove_duplicates(detections: Sequence[Detection]) -> list[Detection]:
         return list(detections)
     from supervision import box_non_max_suppression
 
-    # The negative index replaces the confidence, because of equally confident boxes the first must remain.
+    # The negative index replaces the confidence: the first of several equally confident boxes must remain.
     scored_boxes = np.array([(*detection.box, -index) for index, detection in enumerate(detections)])
     is_unique = box_non_max_suppression(scored_boxes, MIN_DUPLICATE_IOU)
     return [detection for detection, is_kept in zip(detections, is_unique, strict=True) if is_kept]
@@ -141,7 +141,7 @@ def _is_truncated(detection: RegionDetection, size: tuple[int, int]) -> bool:
 
 
 def _list_tile_starts(length: int, side: int) -> list[int]:
-    """Return the first pixel of each tile; evenly spaced tiles of width `side` cover `length` pixels."""
+    """Return the first pixels of evenly spaced tiles of width `side` that together cover `length` pixels."""
     if length <= side:
         return [0]
     count = math.ceil((length - TILE_OVERLAP * side) / (side * (1 - TILE_OVERLAP)))

@@ -68,7 +68,7 @@ class FrameRange(Section):
 
 
 def compute_frame_statistics(frame: Frame, table: TableConfig) -> FrameStatistics | None:
-    """Return the statistics of the workspace; None if it is not completely in the image, or occluded."""
+    """Return the statistics of the workspace; None if a corner is not in view or few pixels are visible."""
     height, width = frame.image.shape[:2]
     corners = np.array([(x, y, 0.0) for x in table.x for y in table.y])
     mask = compute_hull_mask(corners, frame.matrix, frame.X_WC, (width, height))

@@ -50,7 +50,7 @@ class Measurement(Section):
     detector: str
     """Name of the detector in the cell."""
     fingerprint: dict[str, str]
-    """Values of the properties that affect the error rates, by name (see `fingerprint.py`)."""
+    """Values of the properties that affect the error rates, by the name of the property."""
     command: str
     """Command line of the measurement."""
     seconds: float

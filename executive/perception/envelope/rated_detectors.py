@@ -1,4 +1,4 @@
-"""Detectors of a cell with measured error rates, or with assumed error rates without a measurement."""
+"""Detectors of a cell with measured error rates, or with assumed error rates if there is no measurement."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class RatedDetector:
         detector: The detector.
         envelope: Error rates of the detector, and the measured conditions.
         config: The cell file, which declares the workspace.
-        name: Name of the detector.
+        name: Name of the detector in the cell file.
     """
 
     detector: ClosableDetector
@@ -54,7 +54,7 @@ class RatedDetector:
     name: str
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
-        """Start to search a frame; outside the measured conditions, the answer has assumed error rates."""
+        """Start the detection; outside the measured conditions, the answer has assumed error rates."""
         error_rates, frame_range = self.envelope.error_rates, self.envelope.frame_range
         statistics = compute_frame_statistics(frame, self.config.table) if frame_range else None
         if frame_range and statistics and (difference := frame_range.describe_difference(statistics)):
@@ -122,7 +122,7 @@ def find_envelopes(config: CellConfig, base: Path, folders: Sequence[Path]) -> d
 
 
 def describe_measurement_command(config: CellConfig) -> str:
-    """Return the advice to measure a detector, with the command: a clause for messages."""
+    """Return a clause for messages: the advice to measure a detector, with the command."""
     return f"measure it with `executive evaluate --cell {config.cell}` (about {MEASUREMENT_MINUTES} min)"
 
 

@@ -53,7 +53,7 @@ def main() -> None:
     logging.getLogger("backoff").setLevel(logging.DEBUG)
     write(ready=True)
     while True:
-        _write_answer(infer, images.get(), write)
+        _process_image(infer, images.get(), write)
 
 
 def _open_output() -> WriteMessage:
@@ -109,8 +109,8 @@ def _run_workflow(client: InferenceHTTPClient, settings: dict[str, Any], image: 
     return outputs[settings["workflow_output"]]
 
 
-def _write_answer(infer: InferenceFunction, image: NDArray[np.uint8], write: WriteMessage) -> None:
-    """Send an image to the server, and write its answer, or the reason why there is none."""
+def _process_image(infer: InferenceFunction, image: NDArray[np.uint8], write: WriteMessage) -> None:
+    """Send an image to the server, and write the answer or the failure."""
     try:
         answer = infer(image)
         if isinstance(answer, dict):

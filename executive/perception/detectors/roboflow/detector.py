@@ -89,10 +89,10 @@ class RoboflowDetector(ThreadedDetector):
         self._process.wait_until_ready()
         deadline = time.monotonic() + self._options.deadline
         return search_regions(
-            image, regions, lambda crop: self._find_in_crop(crop, deadline), self._options.class_map
+            image, regions, lambda crop: self._detect_in_crop(crop, deadline), self._options.class_map
         )
 
-    def _find_in_crop(self, crop: NDArray[np.uint8], deadline: float) -> list[Detection]:
+    def _detect_in_crop(self, crop: NDArray[np.uint8], deadline: float) -> list[Detection]:
         """Return the detections of the server in a crop of a frame, with boxes in pixels of the crop."""
         try:
             message = self._process.request(crop, deadline)
