@@ -124,7 +124,7 @@ class InputLog:
         """Return the interruption at the end of the log.
 
         The resumed run does not keep control steps in which the arm only braked, after a halt or during an
-        interrupted resumption. It keeps all steps of a run that ended as INCOMPLETE.
+        interrupted resumption. All steps are kept of a run that ended as INCOMPLETE.
 
         Args:
             step_count: Number of control steps that the cell has executed.

@@ -89,7 +89,7 @@ def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
         observations = cell.localizer.localize(detections)
     except (Unavailable, NoDepth):
         return frame
-    # The look of a displaced camera is ignored; a skill of the mission reports the displacement later.
+    # A look of a displaced camera is ignored; a skill of the mission reports the displacement later.
     if not cell.camera.describe_displacement(frame):
         cell.ledger.observe(detections, observations)
     return frame

@@ -61,17 +61,17 @@ def find_failure_path(
     nodes = find_nodes_on_path(tree, origin)
     skill_or_label, _, reason = failure.rpartition(".")
     # Above a node with a label, the mission may use this label in the name of the failure.
-    sources = {skill_or_label}
+    source_names = {skill_or_label}
     failure_path: list[FailurePathNode] = []
     for index in reversed(range(len(nodes))):
         node = nodes[index]
         child = nodes[index + 1] if index + 1 < len(nodes) else None
         subtree = next((each.name for each in reversed(nodes[:index]) if isinstance(each, UseNode)), "")
         control_node = make_inspection_instance(node) if isinstance(node, InnerNode) else None
-        reasons = frozenset(Reason(source, reason) for source in sources)
+        reasons = frozenset(Reason(source, reason) for source in source_names)
         propagated = _make_propagated_failure(timeline, node.path, control_node, child, reasons)
         failure_path.append(FailurePathNode(node, subtree, control_node, propagated))
-        sources |= {node.label} if node.label else set()
+        source_names |= {node.label} if node.label else set()
     return tuple(reversed(failure_path))
 
 
