@@ -15,8 +15,8 @@ def load_cells(
 ) -> dict[str, CellConfig]:
     """Return the configurations of cells by cell name.
 
-    `paths_or_names` contains paths of cell files and names of shipped cells. `overrides` contains values by
-    the names of keys of the cells, `cell.KEY.KEY`.
+    `paths_or_names` contains paths of cell files and names of shipped cells. `overrides` contains values for
+    keys of the cells, by key name `cell.KEY.KEY`.
 
     Raises:
         InputError: A cell does not exist, two cells have the same name, or a file is invalid.
@@ -37,7 +37,7 @@ def find_cell(path_or_name: str) -> Path:
     """Return the path of a cell file, or the path of the shipped cell file with this name.
 
     Raises:
-        InputError: Neither a file nor a shipped cell exists.
+        InputError: There is neither a cell file with this path nor a shipped cell with this name.
     """
     from executive.errors import InputError
     from executive.mission.findings import suggest_choice

@@ -17,10 +17,10 @@ from executive.cli.streams import keep_stdout_clean
 @seed_option
 @click.option(
     "--format", "dataset_format", type=click.Choice(["coco", "yolo"]), default="coco",
-    help="Format of the dataset, the same format that Roboflow exports.",
+    help="Format of the dataset: COCO or YOLO, as exported by Roboflow.",
 )  # fmt: skip
 @workers_option
-@click.option("--valid", type=click.FloatRange(0, 1), default=0.1, help="Fraction kept for validation.")
+@click.option("--valid", type=click.FloatRange(0, 1), default=0.1, help="Fraction of images for validation.")
 def command(
     cells: tuple[str, ...], out: Path, images: int, seed: int, dataset_format: str, workers: int, valid: float
 ) -> None:

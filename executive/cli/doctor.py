@@ -1,8 +1,8 @@
 """`executive doctor`: checks of this installation, with a fix for each problem.
 
 Each check imports its packages itself, so that a missing package affects only this check. The module is also
-a program, `python -m executive.cli.doctor tiny|egl`, that prints the median rendering time of a frame: a
-failing EGL driver may crash the process in which it runs.
+a program, `python -m executive.cli.doctor tiny|egl`, that prints the median rendering time of a frame.
+Its separate process protects the command from crashes of an EGL driver.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MIN_PYTHON, MAX_PYTHON = (3, 10), (3, 11)
 EXTRAS = {"view": "watch a run in the browser", "train": "train a detector of your own"}
 """Purpose of each extra of this project (an optional group of packages), by the name of the extra."""
 FRAME_COUNT = 5
-"""Number of timed frames; the first frame of a process is not timed."""
+"""Number of timed frames; the slower first frame of a process is not timed."""
 FRAME_SIZE = (640, 480)
 """Width and height of a frame [pixel]."""
 RENDER_TIMEOUT = 30.0
@@ -146,9 +146,9 @@ def check_plugins() -> Iterator[CheckResult]:
 
 
 def check_renderer() -> Iterator[CheckResult]:
-    """Measure the time of TinyRenderer for a frame, and check PyBullet's EGL plugin."""
-    time, problem = measure_frame_time("tiny")
-    ok_message = f"TinyRenderer, on the CPU: {time:.0f} ms for 640x480 pixels of the cell overhead"
+    """Measure the time in which TinyRenderer renders a frame, and check PyBullet's EGL plugin."""
+    frame_time, problem = measure_frame_time("tiny")
+    ok_message = f"TinyRenderer, on the CPU: {frame_time:.0f} ms for 640x480 pixels of the cell overhead"
     message, fix = f"TinyRenderer renders no frame: {problem}", "run `uv sync --reinstall-package pybullet`"
     yield _make_result(not problem, "renderer", ok_message, "problem", message, fix)
     _, egl_problem = measure_frame_time("egl")
@@ -158,7 +158,7 @@ def check_renderer() -> Iterator[CheckResult]:
 
 
 def check_roboflow() -> Iterator[CheckResult]:
-    """Check whether a key for Roboflow is set, without showing the key, and whether its server answers."""
+    """Check whether an API key is set, without showing the key, and whether Roboflow's server answers."""
     from executive.perception.detectors.roboflow.key import KEY_VARIABLE, ApiKey
     from executive.perception.detectors.roboflow.server_options import HOSTED_URL
 
@@ -179,7 +179,7 @@ def _make_result(
 
 
 def measure_frame_time(renderer: str) -> tuple[float, str]:
-    """Render with `tiny` or `egl` in a subprocess; return time per frame [ms] and error message or ""."""
+    """Render with `tiny` or `egl` in a subprocess; return the time per frame [ms], and an error or ""."""
     arguments = build_command("executive.cli.doctor", renderer)
     try:
         process = subprocess.run(

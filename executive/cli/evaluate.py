@@ -22,7 +22,7 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 )  # fmt: skip
 @click.option(
     "--detector", "detector_name", metavar="NAME",
-    help="Name of the detector in --cell; by default the first.",
+    help="Name of the detector in --cell; by default the first detector.",
 )  # fmt: skip
 @click.option(
     "--dataset", type=options.FOLDER, metavar="FOLDER",
@@ -30,11 +30,11 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 )  # fmt: skip
 @click.option(
     "--weights", type=options.FILE, metavar="ONNX",
-    help="Exported RF-DETR to measure instead of the detector of a cell.",
+    help="Exported RF-DETR model (ONNX) to evaluate instead of the detector of a cell.",
 )  # fmt: skip
 @click.option(
     "--labels", type=options.FILE, metavar="FILE",
-    help="Class names of --weights, one per line; by default NAME.labels.txt or labels.txt in its folder.",
+    help="Class names of --weights, one per line; by default NAME.labels.txt or labels.txt beside NAME.onnx.",
 )  # fmt: skip
 @click.option("--images", type=options.COUNT, default=200, help="Number of scenes to render per cell.")
 @options.seed_option
@@ -44,17 +44,17 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 )  # fmt: skip
 @click.option(
     "--varied", is_flag=True,
-    help="Vary the scenes as widely as for training; by default they are initial scenes of runs.",
+    help="Vary the scenes as widely as for training; by default, render initial scenes of runs.",
 )  # fmt: skip
 @click.option(
     "--view", type=click.Choice(["table", "full"]), default="table",
-    help="Region of the frame to search.",
+    help="Region of the frame in which objects are detected.",
 )  # fmt: skip
 @options.scene_option
 @options.overrides_option
 @click.option(
     "--out", type=options.FILE, metavar="FILE",
-    help="File for the measurement; by default CELL.measured.json beside the cell file. Runs read it.",
+    help="File for the error rates that runs read; by default CELL.measured.json beside the cell file.",
 )  # fmt: skip
 @options.workers_option
 @click.option("--sheet", type=options.FILE, metavar="FILE.png", help="Image file for the worst mistakes.")
@@ -69,11 +69,11 @@ def command(
 
     The detector belongs to a cell (--cell), or is a model file (--weights) or the shipped model. The images
     come from --dataset, or are rendered scenes of the cell (by default of the shipped cell overhead). The
-    error rates of the detector of a cell are stored for runs. With --threshold, --varied, --scene or
-    --view full, and with --set without --out, the error rates are only printed.
+    error rates of the detector of a cell are stored for runs, except with --weights, --threshold, --varied,
+    --scene, --view full, or with --set without --out.
     """
     unknown_key = next((key for key in overrides if not key.startswith("cell.")), "")
-    is_image = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES
+    has_image_suffix = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES
     options.check_usage(
         (detector_name and weights, "--detector and --weights exclude each other; give one of them"),
         (detector_name and dataset and not cells, f"--detector {detector_name} needs --cell"),
@@ -84,7 +84,7 @@ def command(
         (varied and view != "table", f"--view {view} and --varied exclude each other; give one of them"),
         (out and len(cells) != 1, f"--out {out} needs exactly one --cell"),
         (unknown_key, f"--set {unknown_key} is not a key of a cell; write cell.KEY.KEY=VALUE"),
-        (not is_image, f'the name of --sheet "{sheet}" must end in {", ".join(IMAGE_SUFFIXES)}'),
+        (not has_image_suffix, f'the name of --sheet "{sheet}" must end in {", ".join(IMAGE_SUFFIXES)}'),
     )
     results: dict[str, Any] = {}
     # Only a measurement under the conditions of a run predicts the error rates in runs.

@@ -1,4 +1,4 @@
-"""`executive faults`: inject faults into runs of a mission, and judge the ends of the runs."""
+"""`executive faults`: inject faults into runs of a mission, and judge how the runs end."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def command(
     """Inject each possible fault into a run of a mission.
 
     MISSION is a file or the name of a shipped mission. Its tree determines the faults: every reason of every
-    node, bugs in every skill, and faults of detectors, objects and the tool. A failure that a cell fault
-    causes is not injected into its node again, so that fewer faults are injected than --list prints.
+    node, bugs in every skill, and faults of detectors, objects and the tool. A node failure that a
+    cell fault causes is not injected again, so that fewer faults are injected than --list prints.
     Exit code 1 if a run does not handle its fault: the run loses an object within reach, misplaces an object,
     does not end correctly, or has a ledger that differs from the world.
     """

@@ -30,11 +30,11 @@ COMMANDS = (
     "run", "check", "tree", "skills", "schema", "dataset", "train", "evaluate", "sweep", "faults",
     "replay", "report", "film", "doctor", "init",
 )  # fmt: skip
-"""Names of all commands in the order of `--help`; each command is in the module with its name."""
+"""Names of all commands in the order of `--help`; the module of a command has the name of the command."""
 
 
 class CommandGroup(click.Group):
-    """Command group that imports only the requested command and ends with the documented exit codes."""
+    """Command group that imports only the requested command and exits with the documented exit codes."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
@@ -42,7 +42,7 @@ class CommandGroup(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command with this name, or None."""
+        """Return the command with the name `cmd_name`; None if there is no such command."""
         del ctx
         if cmd_name not in COMMANDS:
             return None
@@ -63,7 +63,7 @@ class CommandGroup(click.Group):
         complete_var: str | None = None, standalone_mode: bool = True, **extra: Any,
     ) -> Any:  # fmt: skip
         """Run a command and exit with its exit code; tracebacks are printed only with `--debug`."""
-        del standalone_mode  # The group is always the main program.
+        del standalone_mode  # This group always runs as a main program.
         args = list(sys.argv[1:] if args is None else args)
         with use_tolerant_streams():
             try:

@@ -13,8 +13,8 @@ def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[s
     """Return the values of options `--set KEY=VALUE` by key, and reject a key that occurs twice."""
     overrides: dict[str, str] = {}
     for value in values:
-        key, equals, text = value.partition("=")
-        if not key or not equals:
+        key, separator, text = value.partition("=")
+        if not key or not separator:
             message = f'"{value}" is not of the form KEY=VALUE, for example attempts=5'
             raise click.BadParameter(message, ctx, param)
         if key in overrides:
@@ -24,7 +24,7 @@ def _parse_overrides(ctx: click.Context, param: click.Parameter, values: tuple[s
 
 
 class PathType(click.Path):
-    """Path type that rejects a broken link, and an empty path, which would mean the working directory."""
+    """Path type that rejects broken links and empty paths; an empty path would mean the working directory."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path, or raise a usage error."""

@@ -22,9 +22,9 @@ LINE_PERIOD = 10.0
 def show_progress(
     description: str, *, quiet: bool = False, print_lines: bool = False
 ) -> Iterator[Callable[[int, int], None]]:
-    """Show a progress bar with the remaining time if stderr is a terminal; yield its update function.
+    """Show a progress bar with the remaining time if stderr is a terminal; yield the update function.
 
-    The arguments of the function are the number of completed parts and the number of all parts.
+    The arguments of the update function are the numbers of completed parts and of all parts of the work.
 
     Args:
         description: Name of the work, beside the bar.
@@ -59,7 +59,7 @@ def _make_line_printer(description: str) -> Callable[[int, int], None]:
 
 
 def report_polygons(folder: Path) -> None:
-    """Print a note if labelled images contain polygons, because only bounding boxes are used."""
+    """Print a note if labels in a dataset folder are polygons, of which only the bounding boxes are used."""
     from executive.training.samples import Samples
 
     if count := Samples(folder).polygon_count:

@@ -18,7 +18,7 @@ def command(run: str, runs: Path, as_json: bool) -> None:
     """Write the report of a recorded run.
 
     RUN is a run directory or `latest`. Prints the path of the report. Every run writes its report when it
-    ends; this command writes it again, or for the first time if the run was killed.
+    ends; this command writes the report again, or for the first time if the run was killed.
     """
     with keep_stdout_clean():
         from executive.record.run_directory import find_run

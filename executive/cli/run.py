@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 @click.option("--realtime", is_flag=True, help="Run in real time instead of as fast as possible.")
 @click.option(
     "--request", "requests", metavar="CLASS", multiple=True,
-    help="Class that the operator requests, in this order; repeatable.",
+    help="Class that the operator requests; repeat the option for further requests, in their order.",
 )  # fmt: skip
 @click.pass_context
 def command(
@@ -56,8 +56,8 @@ def command(
 
     MISSION is a file or the name of a shipped mission.
     """
-    sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
-    has_mission_options = any(source is not click.core.ParameterSource.DEFAULT for source in sources)
+    option_sources = map(ctx.get_parameter_source, ("mission", "seed", "overrides", "requests", "scene"))
+    has_mission_options = any(source is not click.core.ParameterSource.DEFAULT for source in option_sources)
     has_keyboard = sys.stdin is not None and sys.stdin.isatty()
     pauses_forever = paused and not has_page and (quiet or not has_keyboard)
     options.check_usage(
@@ -67,7 +67,7 @@ def command(
             "--resume takes mission, seed, params, requests and scene from the run; omit them",
         ),
         (pauses_forever, "--paused needs --view or a keyboard in a terminal to continue the run"),
-        # Without this check, the simulator would end the process.
+        # The simulator would end the process if it could not open its window.
         (gui and not os.environ.get("DISPLAY"), "--gui needs a display, but DISPLAY is not set; omit --gui"),
     )
     with keep_stdout_clean():
@@ -91,12 +91,12 @@ def command(
             )  # fmt: skip
             if mission is None:
                 assert resume is not None
-                result, start = _resume(resume, run_options, runs, record)
-                repeat_arguments = start.file, start.seed, start.overrides
+                result, start_event = _resume(resume, run_options, runs, record)
+                repeat_arguments = start_event.file, start_event.seed, start_event.overrides
             else:
                 result = _run_mission(mission, overrides, run_options, runs, record)
                 repeat_arguments = mission, seed, overrides
-            # The operator may have made requests during the run, which the repeating command contains.
+            # The command that repeats the run also contains requests that the operator made during the run.
             all_requests, used_scene = requests or result.requests, RunDirectory(Path(result.run)).scene
             repeat_command = format_repeat_command(*repeat_arguments, all_requests, used_scene)
             report, report_problem = try_write_report(result.run)
@@ -129,21 +129,21 @@ def _run_mission(
     from executive.record.recorded_run import record_run
 
     skills = load_skills()
-    loaded = load_mission(mission, skills, overrides, load_cell_kind)
-    for warning in loaded.warnings if record.views else ():
+    loaded_mission = load_mission(mission, skills, overrides, load_cell_kind)
+    for warning in loaded_mission.warnings if record.views else ():
         click.echo(str(warning), err=True)
     if run_options.scene is not None:
         from executive.cells.sim.scene_file import load_scene
 
         # Only simulated cells read the scene file, but its errors are reported for every cell.
-        load_scene(run_options.scene, loaded.cell_config)
-    return record_run(loaded, skills, run_options, runs, record)
+        load_scene(run_options.scene, loaded_mission.cell_config)
+    return record_run(loaded_mission, skills, run_options, runs, record)
 
 
 def _resume(
     name: str, run_options: RunOptions, runs: Path, record: RecordOptions
 ) -> tuple[Result, RunStarted]:
-    """Resume an interrupted run; return its result and the event of its start."""
+    """Resume an interrupted run; return the result and the start event of the run."""
     from executive.plugins import load_skills
     from executive.record.journal import find_run_start, read_journal
     from executive.record.resume import resume_run
@@ -156,7 +156,7 @@ def _resume(
 
 @contextlib.contextmanager
 def _serve_page(is_enabled: bool) -> Iterator[LivePage | None]:
-    """Serve the live page of the run in this context, and print its address; yield None if not enabled."""
+    """Serve the live page of a run in this context and print the page address; yield None if not enabled."""
     if not is_enabled:
         yield None
         return
@@ -171,7 +171,7 @@ def _serve_page(is_enabled: bool) -> Iterator[LivePage | None]:
 
 
 def _make_terminal_view() -> LineView | TerminalView:
-    """Return a view that redraws stderr if it is a terminal, else a view that prints lines."""
+    """Return a view that redraws the terminal; if stderr is no terminal, return a view that prints lines."""
     from rich.console import Console
 
     from executive.view.terminal.lines import LineView

@@ -29,7 +29,7 @@ Declaration = Mapping[str, Any]
 
 @click.command(name="skills")
 @click.argument("name", required=False)
-@click.option("--conform", is_flag=True, help="Check that NAME, or every skill, conforms to the rules.")
+@click.option("--conform", is_flag=True, help="Check that NAME, or every skill, conforms to the skill rules.")
 @json_option
 @click.pass_context
 def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) -> None:
@@ -82,7 +82,7 @@ def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
     """Return the declarations of a skill as JSON values."""
     from pydantic_core import to_json
 
-    before, after = skill.tool_state
+    state_before, state_after = skill.tool_state
     values = {
         "name": name,
         "doc": inspect.getdoc(skill) or "",
@@ -92,20 +92,20 @@ def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
         "uses": skill.uses,
         "senses": skill.senses,
         "moves": skill.moves,
-        "tool": {"before": before, "after": after, "left": skill.tool_left},
+        "tool": {"before": state_before, "after": state_after, "left": skill.tool_left},
     }
     return cast(Declaration, json.loads(to_json(values, inf_nan_mode="strings", fallback=str)))
 
 
 def _declare_entry(entry: Param | Port) -> dict[str, Any]:
-    """Return the declaration of a param or port; its bounds `ge` and `le` are called `min` and `max`."""
+    """Return the declaration of a param or port; the keys of the bounds `ge` and `le` are `min` and `max`."""
     values = {**vars(entry), "type": _format_type(entry.type), "required": entry.is_required}
     values["default"] = None if entry.default is ... else entry.default
     return {{"ge": "min", "le": "max"}.get(name, name): value for name, value in values.items()}
 
 
 def _format_type(annotation: Any) -> str:
-    """Return the name of a type without the names of the modules of `typing` and `executive.cell`."""
+    """Return the name of a type without the module names `typing` and `executive.cell.*`."""
     is_class = isinstance(annotation, type) and not get_args(annotation)
     name = annotation.__name__ if is_class else str(annotation)
     return re.sub(r"\b(typing|executive\.cell\.\w+)\.", "", name)

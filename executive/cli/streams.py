@@ -29,7 +29,7 @@ class TolerantStream(io.TextIOBase):
 
     def __init__(self, stream: TextIO | None, *, escapes: bool = True) -> None:
         if isinstance(stream, io.TextIOWrapper):
-            # The default is an error for a character that the encoding lacks.
+            # By default, a character that the encoding lacks would cause an error.
             stream.reconfigure(errors="backslashreplace")
         self._stream = stream
         self._escapes = escapes
@@ -37,11 +37,11 @@ class TolerantStream(io.TextIOBase):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """Name of the character encoding."""
+        """Name of the character encoding of the stream."""
         return "utf-8" if self._stream is None else self._stream.encoding
 
     def write(self, text: str) -> int:
-        """Write `text`; drop it if the stream is closed or a write has failed."""
+        """Write `text`; drop the text if the stream is closed or a write has failed."""
         if self._stream is None:
             self.error = "it is closed"
         elif not self.error:
@@ -52,7 +52,7 @@ class TolerantStream(io.TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Flush the buffer; do nothing if the stream is closed or a write has failed."""
+        """Flush the buffer of the stream; do nothing if the stream is closed or a write has failed."""
         if self._stream is not None and not self.error:
             try:
                 self._stream.flush()
@@ -72,7 +72,7 @@ class TolerantStream(io.TextIOBase):
         return super().fileno() if self._stream is None else self._stream.fileno()
 
     def _stop_writing(self, stream: TextIO, error: OSError) -> None:
-        """Store the error, and connect the stream to the null device."""
+        """Store the error of a write, and connect the stream to the null device."""
         self.error = error.strerror or str(error)
         # Python flushes the stream again at the end of the process; an error would change the exit code.
         with contextlib.suppress(OSError), open(os.devnull, "w") as null_file:
@@ -88,7 +88,7 @@ def open_unescaped_stderr() -> TextIO:
 
 @contextlib.contextmanager
 def use_tolerant_streams() -> Iterator[None]:
-    """Make stdout and stderr tolerant in this context; then report a write error of stdout."""
+    """Make stdout and stderr tolerant in this context; at its end, report a write error of stdout."""
     _open_closed_descriptors()
     with (
         contextlib.redirect_stdout(TolerantStream(sys.stdout)) as stdout,

@@ -45,9 +45,9 @@ def command(
 ) -> None:  # fmt: skip
     """Run a mission once for every seed, and summarize the runs.
 
-    MISSION is a file or the name of a shipped mission. Exit code 1 if a run did not succeed, or if ledger and
-    audit disagree. Ctrl-C halts the current runs; then the results of the complete runs are printed. A second
-    Ctrl-C quits immediately.
+    MISSION is a file or the name of a shipped mission. Exit code 1 if a run did not succeed, or recorded
+    an object outcome that differs from the simulated world. Ctrl-C halts the current runs; then the results
+    of the complete runs are printed. A second Ctrl-C quits immediately.
     """
     with keep_stdout_clean():
         from executive.campaign.sweep import SweepJob, run_sweep, summarize_results
@@ -58,11 +58,11 @@ def command(
         from executive.record.run_directory import check_runs_folder
 
         # The mission and the folder are checked here, so that an error is not reported for every seed.
-        loaded = load_mission(mission, load_skills(), overrides, load_cell_kind)
+        loaded_mission = load_mission(mission, load_skills(), overrides, load_cell_kind)
         if scene is not None:
             from executive.cells.sim.scene_file import load_scene
 
-            load_scene(scene, loaded.cell_config)
+            load_scene(scene, loaded_mission.cell_config)
         check_runs_folder(runs)
         with show_progress(mission) as progress:
             jobs = [SweepJob(mission, seed, overrides, runs, frames, scene) for seed in seeds]
@@ -104,14 +104,14 @@ def _describe_summary(summary: dict[str, Any]) -> str:
         lines.append(f"robot time per object {time_per_object:.2f} s; {planned_ahead}, {waiting_time}")
     lines.append(f"ledger and audit disagree in {len(summary['disagreements'])} runs")
     for entry in summary["disagreements"]:
-        items = ", ".join(f"{name} {count}" for name, count in entry["items"].items())
-        audit = ", ".join(f"{name} {count}" for name, count in entry["audit"].items())
-        lines.append(f"  seed {entry['seed']}: ledger: {items}; audit: {audit}; {entry['run']}")
+        ledger_text = ", ".join(f"{name} {count}" for name, count in entry["items"].items())
+        audit_text = ", ".join(f"{name} {count}" for name, count in entry["audit"].items())
+        lines.append(f"  seed {entry['seed']}: ledger: {ledger_text}; audit: {audit_text}; {entry['run']}")
     if summary["failures"]:
         lines.append(f"{len(summary['failures'])} runs did not succeed:")
     keys = ("status", "reason", "node", "message")
     for entry in summary["failures"]:
-        # A run whose process crashed, or could not create a run directory, has no directory.
+        # `run` is empty if the process crashed or could not create a run directory.
         directory_text = entry["run"] and f"; {entry['run']}"
         lines.append(f"  seed {entry['seed']}: {describe_end(*map(entry.get, keys))}{directory_text}")
     return "\n".join(lines)

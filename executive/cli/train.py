@@ -19,8 +19,8 @@ from executive.cli.streams import keep_stdout_clean
 )  # fmt: skip
 @click.option("--out", type=FOLDER, required=True, help="Folder for model, checkpoints and metrics.")
 @click.option(
-    "--from", "start", type=FILE, metavar="MODEL",
-    help="Model of an earlier training to fine-tune, .onnx or .pth; by default random weights.",
+    "--from", "model", type=FILE, metavar="MODEL",
+    help="Model file (.onnx or .pth) to fine-tune; by default, training starts from random weights.",
 )  # fmt: skip
 @click.option(
     "--rate", type=click.FloatRange(min=0, min_open=True),
@@ -28,7 +28,7 @@ from executive.cli.streams import keep_stdout_clean
 )  # fmt: skip
 @click.option("--epochs", type=COUNT, default=20, help="Number of passes over the dataset.")
 @seed_option
-def command(dataset: Path, out: Path, start: Path | None, rate: float | None, epochs: int, seed: int) -> None:
+def command(dataset: Path, out: Path, model: Path | None, rate: float | None, epochs: int, seed: int) -> None:
     """Train the small RF-DETR detector.
 
     Needs the extra `train`: uv sync --extra train (a download of about 3 GB on Linux).
@@ -41,7 +41,7 @@ def command(dataset: Path, out: Path, start: Path | None, rate: float | None, ep
         for split in list_splits(dataset):
             report_polygons(split)
         with show_progress("training") as report_batch:
-            settings = Settings(start, rate, epochs, seed)
+            settings = Settings(model, rate, epochs, seed)
             train(dataset, out, settings, _make_epoch_printer(epochs), report_batch)
         click.echo(
             "add these lines to the cell file, with paths relative to the folder of the cell file:\n\n"

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 @mission_argument
 @overrides_option
 @click.option(
-    "--ports", is_flag=True, help="Print the inputs (? if possibly unset) and outputs of every skill."
+    "--ports", is_flag=True, help="Print the inputs (with ? if possibly unset) and outputs of every skill."
 )
 @click.option(
     "--reasons", is_flag=True,
     help="Print the failure reasons of every skill, and the reasons that every catch handles.",
 )  # fmt: skip
-@click.option("--fold", is_flag=True, help="Expand every subtree only where it is used first.")
+@click.option("--fold", is_flag=True, help="Expand each subtree only at its first use.")
 @click.option("--svg", "as_svg", is_flag=True, help="Print the tree as an SVG image.")
 @click.option("--dot", "as_dot", is_flag=True, help="Print the tree in the DOT language of Graphviz.")
 @json_option
@@ -75,8 +75,8 @@ def _load_outline(mission: str, overrides: dict[str, str]) -> tuple[str, Sequenc
     from executive.tree.blackboard import Blackboard
 
     skills = load_skills()
-    loaded = load_mission(mission, skills, overrides)
-    # The tree is built but not run, which requires only the clock of a cell.
+    loaded_mission = load_mission(mission, skills, overrides)
+    # Building the tree without running it requires only the clock of a cell.
     placeholder_cell = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
-    tree = build_tree(loaded, skills, placeholder_cell, Blackboard(), discard_event)
-    return loaded.mission.name, make_outline(tree)
+    tree = build_tree(loaded_mission, skills, placeholder_cell, Blackboard(), discard_event)
+    return loaded_mission.mission.name, make_outline(tree)

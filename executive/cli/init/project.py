@@ -29,7 +29,7 @@ _NAME_ADVICE = "give another name with --name"
 
 
 def write_project(folder: Path, package: str) -> list[str]:
-    """Create a project in an empty or new folder; return the paths of the files in this folder.
+    """Create a project in an empty or new folder; return the file paths, relative to the folder.
 
     Raises:
         InputError: The folder is not empty, is a file, or cannot be written.
@@ -66,7 +66,7 @@ def _require_empty(folder: Path) -> None:
 
 
 def _map_path(file: Path, package: str) -> str:
-    """Return the path in a project for the path of a template file."""
+    """Return the path of a project file, relative to the project, for the path of a template file."""
     parts = file.relative_to(TEMPLATE).with_suffix("").parts
     return str(PurePosixPath(*(package if part == PACKAGE else part for part in parts)))
 
