@@ -18,11 +18,11 @@ _CHARACTERS_BY_WIDTH = {
     1.0: "mW%@",
 }
 """Characters by their width in DejaVu Sans, the widest common sans-serif font [fraction of the font size]."""
-_RELATIVE_WIDTHS = {
+_WIDTH_BY_CHARACTER = {
     character: width for width, characters in _CHARACTERS_BY_WIDTH.items() for character in characters
 }
 _DEFAULT_WIDTH, _EAST_ASIAN_WIDTH = 0.64, 1.05
-"""Widths of other characters, and of wide East Asian characters [fraction of the font size]."""
+"""Widths of unlisted characters, and of wide East Asian characters [fraction of the font size]."""
 _BOLD_FACTOR = 1.12
 """Ratio of the widths of a bold and a regular character."""
 
@@ -32,7 +32,7 @@ def estimate_text_width(text: str, font_size: float, *, bold: bool = False) -> f
     widths = (
         _EAST_ASIAN_WIDTH
         if unicodedata.east_asian_width(character) in ("W", "F")
-        else _RELATIVE_WIDTHS.get(character, _DEFAULT_WIDTH)
+        else _WIDTH_BY_CHARACTER.get(character, _DEFAULT_WIDTH)
         for character in text
     )
     return sum(widths) * font_size * (_BOLD_FACTOR if bold else 1.0)
@@ -41,7 +41,7 @@ def estimate_text_width(text: str, font_size: float, *, bold: bool = False) -> f
 def wrap_and_truncate(text: str, max_length: int, max_lines: int = 1) -> tuple[str, ...]:
     """Return a text as at most `max_lines` lines of at most `max_length` characters.
 
-    Lines are broken after commas if possible. An ellipsis `…` replaces the text after the last line.
+    Lines are broken after commas if possible. An ellipsis `…` replaces text beyond the last line.
     """
     lines: list[str] = []
     for clause in " ".join(text.split()).replace(", ", ",\n").splitlines():

@@ -1,4 +1,4 @@
-"""Film of a recorded run: the simulated world, and beside it the decisions of the tree."""
+"""Film of a recorded run: the simulated world at the left, the decisions of the tree at the right."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ PALETTE_FRAME_COUNT = 8
 _IGNORED_BITS = 3
 """Number of low bits of a colour channel that are ignored, so that similar colours are counted together."""
 _STATUS_COLOUR_WEIGHT = 60
-"""Weight of each status colour in the palette; the weight of another colour depends on its pixels."""
+"""Weight of each status colour in the palette; other colours are weighted by their number of pixels."""
 
 
 def write_mp4(path: Path, frames: Iterable[Image.Image], frame_rate: float) -> None:
@@ -90,13 +90,13 @@ class FilmFormat:
 
 
 MP4 = FilmFormat(".mp4", 25.0, 1.0, write_mp4)
-"""Video at full resolution."""
+"""MP4 video at full resolution."""
 GIF = FilmFormat(".gif", 10.0, 2.0, write_gif)
-"""Animated image at lower resolution; GIF rounds the duration of a frame to a multiple of 0.01 s."""
+"""Animated GIF at lower resolution; the format rounds the duration of a frame to a multiple of 0.01 s."""
 
 
 def choose_format(file: Path | None, is_gif: bool) -> FilmFormat:
-    """Return the format that the suffix of a file requires; without a file, GIF if `is_gif`, else MP4.
+    """Return the film format for the suffix of a file; without a file, GIF if `is_gif`, otherwise MP4.
 
     Raises:
         InputError: The suffix of the file is unknown or contradicts `is_gif`.
@@ -114,7 +114,7 @@ def choose_format(file: Path | None, is_gif: bool) -> FilmFormat:
 
 @contextmanager
 def prepare_file(path: Path, *, force: bool) -> Iterator[Path]:
-    """Yield a temporary file for a film, and move it to `path` at the end unless an exception occurs.
+    """Yield a temporary file for a film, and move the file to `path` at the end unless an exception occurs.
 
     Raises:
         InputError: `path` exists and `force` is False, or the file cannot be written.

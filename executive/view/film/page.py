@@ -109,7 +109,7 @@ def describe_result(result: Result | RunEnded | None) -> tuple[str, str, str]:
 
 
 def _draw_header(frame: Image.Image, title: str, subtitle: str, time: float, duration: float) -> None:
-    """Draw title and subtitle, the time [s] in the run, and a bar with the progress of the run."""
+    """Draw title and subtitle, the elapsed time [s] of the run, and a bar with the progress of the run."""
     draw = ImageDraw.Draw(frame)
     title_font, subtitle_font = style.load_font(_TITLE_FONT_SIZE), style.load_font(_SUBTITLE_FONT_SIZE)
     max_width = PANEL_RIGHT - PANEL_LEFT - title_font.getlength(f"{duration:.1f} s") - 24

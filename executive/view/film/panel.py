@@ -68,8 +68,8 @@ def select_nodes(nodes: Sequence[OutlineNode], state: FilmRunState, max_count: i
     def get_priority(index: int) -> tuple[bool, bool, int]:
         path = shown_nodes[index].path
         activation = state.timeline.find_current_activation(path)
-        has_ran = activation is not None and activation.status in style.STATUS_COLOURS
-        return path in active_paths, has_ran, -index
+        has_run = activation is not None and activation.status in style.STATUS_COLOURS
+        return path in active_paths, has_run, -index
 
     kept_indices = sorted(sorted(range(len(shown_nodes)), key=get_priority, reverse=True)[:max_count])
     return [shown_nodes[index] for index in kept_indices]

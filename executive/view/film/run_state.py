@@ -53,7 +53,7 @@ class FilmRunState:
 
     @property
     def failure_text(self) -> str:
-        """Text about a failure within the last `FAILURE_DISPLAY_TIME`; "" if there is none."""
+        """Text about a failure, halt or resumption within the last `FAILURE_DISPLAY_TIME`; else ""."""
         return self._incident_text if self.time < self._incident_time + FAILURE_DISPLAY_TIME else ""
 
     @property
@@ -88,7 +88,7 @@ def _get_end_key(activation: Activation | None) -> tuple[int, str]:
 
 
 def _describe_incident(timed_event: TimedEvent) -> str:
-    """Return a text about the failure of a skill with an item, a halt, a fault or a resumption; else ""."""
+    """Return a text about a failed skill with an item, a halt, a fault or a resumption; else ""."""
     match timed_event.event:
         case NodeEnded(status="FAILURE", skill=skill, item=item) as event if skill and item:
             return f"{get_skill_name(event.node)}.{event.reason}: {event.message}"

@@ -28,7 +28,7 @@ _CROSS_MARK = [[(0.17, 0.17), (0.83, 0.83)], [(0.83, 0.17), (0.17, 0.83)]]
 
 @lru_cache(maxsize=32)
 def load_font(size: float) -> ImageFont.FreeTypeFont:
-    """Return the built-in font of Pillow with a size [pixel]."""
+    """Return the built-in font of Pillow in the size `size` [pixel]."""
     default_font = ImageFont.load_default(size)
     assert isinstance(default_font, ImageFont.FreeTypeFont), "Pillow's wheels draw with FreeType"
     return default_font
@@ -58,7 +58,7 @@ def wrap_text(text: str, font_size: float, max_width: float, max_lines: int) -> 
 
 
 def draw_mark(image: Image.Image, status: str, centre: tuple[float, float], size: int) -> None:
-    """Draw a status mark: a triangle for RUNNING, a check mark for SUCCESS, a cross for FAILURE, else a dot.
+    """Draw a status mark: triangle for RUNNING, check mark for SUCCESS, cross for FAILURE, dot for any other.
 
     `centre` is the position of the mark, `size` the width and height of the mark [pixel].
     """

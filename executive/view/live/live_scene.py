@@ -50,7 +50,7 @@ class LiveScene:
             self._add_shape(f"{parent}/{number}", shape)
 
     def set_body_poses(self, poses: Mapping[str, Sequence[float]]) -> None:
-        """Set the poses of bodies by name: position [m] and quaternion (w, x, y, z); hide other bodies."""
+        """Set poses of bodies by name: position [m], quaternion (w, x, y, z); hide bodies without a pose."""
         with self._server.atomic():
             for name, frame in self._bodies.items():
                 pose = poses.get(name)
@@ -59,22 +59,22 @@ class LiveScene:
                 if pose is not None:
                     frame.position, frame.wxyz = np.array(pose[:3]), np.array(pose[3:])
 
-    def _add_shape(self, name: str, shape: Shape) -> None:
-        """Add a shape to the scene; the parent of the shape is the first part of its path `name`."""
+    def _add_shape(self, path: str, shape: Shape) -> None:
+        """Add a shape to the scene at `path`; the path without its last part is the path of the parent."""
         scene, colour = self._server.scene, shape.colour
         radius, height = shape.size[0] / 2, shape.size[2]
         quaternion = np.roll(shape.X_BS.quaternion, 1)  # (x, y, z, w) becomes (w, x, y, z).
         pose_arguments: dict[str, Any] = {"position": shape.X_BS.position, "wxyz": quaternion}
         if shape.kind == "box":
-            scene.add_box(name, color=colour, dimensions=shape.size, **pose_arguments)
+            scene.add_box(path, color=colour, dimensions=shape.size, **pose_arguments)
         elif shape.kind == "cylinder":
-            scene.add_cylinder(name, radius=radius, height=height, color=colour, **pose_arguments)
+            scene.add_cylinder(path, radius=radius, height=height, color=colour, **pose_arguments)
         elif shape.kind == "sphere":
-            scene.add_icosphere(name, radius=radius, color=colour, **pose_arguments)
+            scene.add_icosphere(path, radius=radius, color=colour, **pose_arguments)
         else:
             mesh = trimesh.load_mesh(shape.file, process=False, skip_materials=True)
             vertices = np.asarray(mesh.vertices) * shape.size
-            scene.add_mesh_simple(name, vertices, np.asarray(mesh.faces), color=colour, **pose_arguments)
+            scene.add_mesh_simple(path, vertices, np.asarray(mesh.faces), color=colour, **pose_arguments)
 
 
 @contextlib.contextmanager
@@ -94,5 +94,5 @@ def _serve_on_unix_socket(socket_path: Path) -> Iterator[None]:
 
 
 def _make_scene_path(body: str) -> str:
-    """Return the path of a body in the scene; spaces and slashes in its name are replaced."""
+    """Return the path of a body in the scene; spaces and slashes in the name of the body are replaced."""
     return "/bodies/" + body.replace(" ", "_").replace("/", "_")

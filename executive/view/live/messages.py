@@ -25,7 +25,7 @@ class RunOutcome:
 
 @dataclass(frozen=True)
 class PageChange:
-    """Change of the page without an event of the run; unchanged values are None.
+    """Change of the page that no event of the run describes; None for unchanged values.
 
     Attributes:
         clock: Current time on the clock of the run [s].

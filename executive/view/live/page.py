@@ -38,7 +38,7 @@ BATCH_PERIOD = 0.03
 SHUTDOWN_TIMEOUT = 3.0
 """Maximum time to wait for the end of the server process [s]."""
 MAX_QUEUED_MESSAGES = 32
-"""Length of the queue from which images (about 1 MB each) and poses are dropped."""
+"""Length of the message queue at which images (about 1 MB each) and poses are dropped."""
 REQUIRED_PACKAGES = ("aiohttp", "trimesh", "viser")
 """Optional dependencies of the project that the live page needs."""
 
@@ -102,7 +102,7 @@ class LivePage:
         self._run = run
         with self._catch_errors():
             self._visuals = run.workcell.visuals()
-        # The page writes the counts of a node into the empty line of its result.
+        # The page writes the counts of a node into the empty line of the node.
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(messages.SceneChange(shapes=shapes))
@@ -215,7 +215,7 @@ class LivePage:
         self._browser_count, self._is_closed = 0, True
 
     def _run_command(self, command: messages.PageCommand) -> None:
-        """Run a command; most command names are the names of methods of `RunControl`."""
+        """Run a command of a browser; most command names are the names of methods of `RunControl`."""
         control = None if self._run is None else self._run.control
         if command.name == "browsers":
             self._browser_count = command.browser_count

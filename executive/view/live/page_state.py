@@ -19,7 +19,7 @@ OCCLUSION_DARKENING = 0.45
 """Fraction by which the brightness of pixels that the arm occludes is reduced: 0 not at all, 1 to black."""
 
 JsonObject = dict[str, object]
-"""JSON object, by key."""
+"""Values of a JSON object, by key."""
 
 
 class PageState:
@@ -35,7 +35,7 @@ class PageState:
         self._timeline = Timeline(has_history=False)
 
     def apply(self, message: Message) -> None:
-        """Update the state by a message of the run."""
+        """Update the state of the page for a message of the run."""
         match message:
             case events.TimedEvent():
                 self._timeline(message)
@@ -70,7 +70,7 @@ class PageState:
                 self._set_values(choices=None, has_ended=True)
 
     def _describe_node(self, path: str) -> JsonObject:
-        """Return the status of a node, its last failure, its item, and the number of its ends by status."""
+        """Return the status, last failure and item of a node, and the number of times it ended by status."""
         activation = self._timeline.activation_by_path[path]
         end_counts = self._timeline.end_counts.get(path, Counter())
         statuses = {"done": "SUCCESS", "failed": "FAILURE", "halted": "INVALID"}
@@ -93,7 +93,7 @@ class PageState:
 
 def _encode_camera_image(camera_image: CameraImage) -> JsonObject:
     """Return the detections in a frame and its image as JPEG, darkened where the arm occludes the scene."""
-    frame, search = camera_image.frame, camera_image.search
+    frame, detection_event = camera_image.frame, camera_image.search
     import cv2
 
     image = cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR)
@@ -105,6 +105,6 @@ def _encode_camera_image(camera_image: CameraImage) -> JsonObject:
     return {
         "source": "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode(),
         "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
-        "detector": search.detector, "stamp": frame.stamp,
-        "detections": [vars(detection) for detection in search.confident],
+        "detector": detection_event.detector, "stamp": frame.stamp,
+        "detections": [vars(detection) for detection in detection_event.confident],
     }  # fmt: skip

@@ -26,12 +26,12 @@ def main() -> None:
     """Serve the page on the socket whose descriptor is the command-line argument, until stdin ends."""
     listener = socket.socket(fileno=int(sys.argv[1]))
     # The run reads commands from stdout, so text that libraries print is redirected to stderr.
-    commands = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    command_stream = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
 
     def write_command(command: PageCommand) -> None:
-        commands.write(json.dumps(asdict(command)) + "\n")
-        commands.flush()
+        command_stream.write(json.dumps(asdict(command)) + "\n")
+        command_stream.flush()
 
     with tempfile.TemporaryDirectory(prefix="executive-") as folder:
         asyncio.run(_serve(listener, Path(folder) / "scene", write_command))
@@ -42,7 +42,7 @@ def main() -> None:
 async def _serve(
     listener: socket.socket, scene_socket: Path, write_command: Callable[[PageCommand], None]
 ) -> None:
-    """Serve the page, and apply the pickled batches of messages from stdin; the first contains the token."""
+    """Serve the page, and apply pickled batches of messages from stdin; the first batch has the token."""
     loop, input_ended = asyncio.get_running_loop(), asyncio.Event()
     (token, port), *first_messages = pickle.load(sys.stdin.buffer)
     page_state, scene_proxy = PageState(), SceneProxy(scene_socket)

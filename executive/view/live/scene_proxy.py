@@ -28,7 +28,7 @@ Connection = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
 
 class SceneProxy:
-    """Forwards requests to the Unix socket of the scene server; stores shapes and poses until its start."""
+    """Forwards requests to the socket of the scene server; stores shapes and poses before its start."""
 
     def __init__(self, socket_path: Path) -> None:
         self._socket_path = socket_path
@@ -38,7 +38,7 @@ class SceneProxy:
         self._start_lock = asyncio.Lock()
 
     def set_shapes(self, shapes: Sequence[Shape]) -> None:
-        """Set the shapes of the scene; the scene server starts after this call."""
+        """Set the shapes of the scene; the next or a waiting request of a browser starts the scene server."""
         self._shapes.set_result(shapes)
 
     def set_body_poses(self, poses: Mapping[str, Sequence[float]]) -> None:
@@ -80,12 +80,12 @@ class SceneProxy:
         async with self._start_lock:
             if self._scene is None:
                 # The start takes 1.5 s (imports and meshes), which would block other requests.
-                self._scene = await asyncio.to_thread(_make_scene, self._socket_path, shapes)
+                self._scene = await asyncio.to_thread(_start_scene_server, self._socket_path, shapes)
                 self._scene.set_body_poses(self._body_poses)
         return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path=str(self._socket_path)))
 
 
-def _make_scene(socket_path: Path, shapes: Sequence[Shape]) -> LiveScene:
+def _start_scene_server(socket_path: Path, shapes: Sequence[Shape]) -> LiveScene:
     """Import viser and start the scene server."""
     from executive.view.live.live_scene import LiveScene
 

@@ -53,7 +53,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Answers requests from the page whose path starts with the token.
+    """Web server that answers the requests of the page; their paths start with the token.
 
     `send_command` receives the commands of browsers, and reports about the browsers.
     """
@@ -67,7 +67,7 @@ class Server:
         self._token = token
         # The name `localhost` could lead to another server, at [::1].
         self._host = f"127.0.0.1:{port}"
-        # Value: True if the browser renders on the CPU.
+        # The value is True for a browser that renders on the CPU.
         self._browsers: dict[web.WebSocketResponse, bool] = {}
         self.app = web.Application(middlewares=[self._check_access])
         self.app.router.add_get("/{token}/live", self._serve_browser)

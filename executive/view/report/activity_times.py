@@ -13,7 +13,7 @@ from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 
 LOOK = "look"
-"""Activity: search for the next item with an empty tool."""
+"""Activity: detection of the next item while the tool is empty."""
 RETRY = "retry"
 """Activity: failed attempts to handle an item, and the looks before the next attempt."""
 WAITING = "waiting"
@@ -43,14 +43,14 @@ class ActivityTimes:
 def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> ActivityTimes:
     """Return the time by item and activity, from the start of a run to the last event of its timeline.
 
-    If several skills run, the time belongs to the skill that started first and works on an item. Time without
+    If several skills run, the time belongs to the first started skill that works on an item. Time without
     such a skill belongs to the item that is selected next. `timeline` must have a history.
     """
     skills = {node.path: node for node in nodes if node.kind == "skill"}
     activations = [activation for activation in timeline.activations if activation.node in skills]
     selections = timeline.selection_times
     times: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
-    # Dictionaries without values are used as ordered sets.
+    # The dictionary without values is used as an ordered set.
     skill_activities: dict[str, None] = {}
     retries = _find_retries(activations, skills, selections)
     for start, end, running in _split_time(activations, timeline.clock):
@@ -78,11 +78,11 @@ def _split_time(activations: Sequence[Activation], end_time: float) -> Iterator[
     """Yield the intervals between successive starts and ends of skills, from 0 to `end_time` [s]."""
     times = {0.0, end_time, *(activation.start for activation in activations)}
     times |= {activation.end for activation in activations}
-    waiting = deque(sorted(activations, key=lambda activation: activation.start))
+    later_activations = deque(sorted(activations, key=lambda activation: activation.start))
     running: list[Activation] = []
     for start, end in pairwise(sorted(times)):
-        while waiting and waiting[0].start <= start:
-            running.append(waiting.popleft())
+        while later_activations and later_activations[0].start <= start:
+            running.append(later_activations.popleft())
         running = [activation for activation in running if activation.end > start]
         yield start, end, running
 

@@ -16,15 +16,15 @@ MIN_AXIS_LENGTH, MAX_AXIS_LENGTH = 900.0, 6000.0
 PIXELS_PER_SECOND = 45.0
 """Scale of the time axis between its minimum and maximum length [pixel/s]."""
 MIN_GAP, MIN_BAR_WIDTH = 1.0, 3.0
-"""Activations share a bar if their gap is below `MIN_GAP` and their bar is below `MIN_BAR_WIDTH` [pixel]."""
+"""Activations closer than `MIN_GAP` share a bar that is narrower than `MIN_BAR_WIDTH` [pixel]."""
 MAX_BAR_COUNT = 8000
 """Maximum number of bars in addition to one bar per lane; a bar takes about 250 bytes."""
 _LEVEL_INDENT, _FONT_SIZE, _NAME_MARGIN = 9.0, 11.0, 12.0
-"""Indentation of a name per tree level, font size, and margin between names and bars [pixel]."""
+"""Indentation of a name per tree level, font size of names, and margin between names and bars [pixel]."""
 _MAX_NAME_LENGTH = 34
 """Maximum length of the name of a lane [characters]."""
 _TICK_PERIODS = (0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600)
-"""Allowed periods of the ticks of the time axis [s]; longer periods are multiples of the last."""
+"""Allowed periods of the ticks of the time axis [s]; longer periods are multiples of the longest."""
 _MIN_TICK_DISTANCE = 55.0
 """Minimum distance between two ticks of the time axis [pixel]."""
 _STATUSES_BY_SEVERITY = ("FAILURE", "RUNNING", "INVALID", "SUCCESS")
@@ -33,7 +33,7 @@ _STATUSES_BY_SEVERITY = ("FAILURE", "RUNNING", "INVALID", "SUCCESS")
 
 @dataclass(frozen=True)
 class Bar:
-    """Bar of a lane.
+    """Bar of a lane, for one or more activations.
 
     Attributes:
         start, end: Times at the left and the right end of the bar [s].
@@ -49,10 +49,10 @@ class Bar:
 
 @dataclass(frozen=True)
 class Lane:
-    """Lane of a node.
+    """Lane of a node in the drawing.
 
     Attributes:
-        node: The node.
+        node: Node to which the lane belongs.
         name: Truncated name of the node.
         name_x: The x of the left end of the name [pixel].
         bars: Bars of the activations, in the order of time.
@@ -103,9 +103,9 @@ def _choose_tick_times(end_time: float, scale: float) -> list[float]:
 def _group_by_bar(
     activations_by_path: Mapping[str, Sequence[Activation]], scale: float
 ) -> dict[str, list[list[Activation]]]:
-    """Return the activations of each bar by path, in at most `MAX_BAR_COUNT` bars plus one per lane.
+    """Return groups of activations, one per bar, by node path; at most `MAX_BAR_COUNT` plus one per lane.
 
-    If there are too many bars at the scale `scale` of the drawing [pixel/s], a smaller scale is tried.
+    If there are too many bars at the scale `scale` of the drawing [pixel/s], the scale is halved repeatedly.
     """
     while True:
         groups_by_path = {
@@ -133,12 +133,12 @@ def _group_close_activations(activations: Sequence[Activation], scale: float) ->
 
 def _make_bar(node: OutlineNode, group: Sequence[Activation]) -> Bar:
     """Return the bar of a group of activations of a node."""
-    first, end_time = group[0], group[-1].end
+    earliest, end_time = group[0], group[-1].end
     has_one_item = len({activation.item for activation in group}) == 1
-    item_text = f" of {first.item}" if first.item and has_one_item else ""
-    status_text = first.status if len(group) == 1 else format_counts(group)
+    item_text = f" of {earliest.item}" if earliest.item and has_one_item else ""
+    status_text = earliest.status if len(group) == 1 else format_counts(group)
     heading = f"{node.name}{item_text}: {status_text}"
-    times_text = f"{first.start:.2f} s to {end_time:.2f} s ({end_time - first.start:.2f} s)"
+    times_text = f"{earliest.start:.2f} s to {end_time:.2f} s ({end_time - earliest.start:.2f} s)"
     tooltip = "\n".join(filter(None, (heading, times_text, find_last_failure(group))))
     worst_status = min((activation.status for activation in group), key=_STATUSES_BY_SEVERITY.index)
-    return Bar(first.start, end_time, worst_status.lower(), tooltip)
+    return Bar(earliest.start, end_time, worst_status.lower(), tooltip)

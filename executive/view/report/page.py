@@ -30,7 +30,7 @@ ACTIVITY_COLOURS = {LOOK: "#56B4E9", RETRY: "#D55E00", WAITING: "#9aa5b4"}
 
 
 def try_write_report(run: str) -> tuple[str, str]:
-    """Write the report of the run in the directory `run`; return the file, and an error message or "".
+    """Write the report of the run in the directory `run`; return file and error message, of which one is "".
 
     The function raises no exception, because an error of the report must not change the result of the run.
     """
@@ -60,7 +60,7 @@ def write_report(path: Path) -> Path:
 
 
 def render_report(data: ReportData) -> str:
-    """Return the report as HTML; texts of missions and skills are escaped."""
+    """Return the report of a run as HTML; texts of missions and skills are escaped."""
     result, params = data.result, data.start.params
     diagnosis = None if result is None else result.diagnosis
     item_names = [item.item for item in data.items]
@@ -87,16 +87,16 @@ def render_report(data: ReportData) -> str:
         colours=_choose_colours(data.activity_times.activities),
         total_times={item: sum(row.values()) for item, row in data.activity_times.times_by_item.items()},
         tree=Markup(draw_svg(data.nodes, data.start.mission, _make_node_results(data))),
-        lanes=Markup(draw_lanes(data.timeline, data.nodes)),
+        timeline=Markup(draw_lanes(data.timeline, data.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
-        look_pictures=[
+        scan_pictures=[
             picture for picture in data.pictures if picture.reason and picture.item not in item_names
         ],
     )
 
 
 def _describe_end(data: ReportData) -> str:
-    """Return a text about the end of the run: its verdict, its message, or the number of placed objects."""
+    """Return a text about the end of the run: the verdict, the message, or the number of placed objects."""
     result, end = data.result, data.end
     if end is None:
         return "The journal has no end: the run was killed, or is still running."
@@ -121,7 +121,7 @@ def _choose_colours(activities: Sequence[str]) -> dict[str, str]:
 
 
 def _make_node_results(data: ReportData) -> dict[str, NodeResult]:
-    """Return the result of each node that ran, by its path."""
+    """Return the result of each node that ran, by node path."""
     results = {}
     for path, activations in group_by_node(data.timeline.activations).items():
         lines = tuple(filter(None, (format_counts(activations), find_last_failure(activations))))

@@ -24,13 +24,13 @@ class ReportData:
     """Data for the report of a run.
 
     Args:
-        path: The run directory.
+        path: Run directory.
 
     Attributes:
-        path: The run directory.
+        path: Run directory.
         start: Event of the start of the run.
         result: Content of `result.json`; None if the file is missing or belongs to another run.
-        end: The result, or else the event of the end of the run; None for an interrupted run.
+        end: Result; without a result, the event of the end of the run; None for an interrupted run.
         status: `SUCCESS`, `INCOMPLETE`, `FAILURE`, `FAULT`, `HALTED` or `INTERRUPTED`.
         nodes: Nodes of the tree.
         timeline: Timeline of the run.

@@ -40,7 +40,7 @@ def _list_lines_and_tables(detector: str, evaluation: Evaluation) -> Iterator[Re
         yield _make_confusion_table(evaluation)
     yield _make_error_table(evaluation)
     if evaluation.reliability is not None:
-        yield "  error rates for the ledger (fractions and counts: upper 95 % confidence bound):"
+        yield "  upper 95 % confidence bounds of the error rates, for the ledger:"
         yield "  " + ", ".join(f"{name} {value:g}" for name, value in evaluation.reliability.rates)
         yield ""
 
@@ -57,7 +57,7 @@ def _make_confusion_table(evaluation: Evaluation) -> Table:
     """Return a table with the number of objects by true class (rows) and detected class (columns)."""
     table = _make_table("true \\ detected", *next(iter(evaluation.confusion.values())))
     for true_class, counts in evaluation.confusion.items():
-        # An object that is neither present nor detected is not counted.
+        # True negatives are not counted in object detection.
         cells = (
             "" if true_class == detected_class == NO_OBJECT else str(count)
             for detected_class, count in counts.items()

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from operator import itemgetter
 
 OCCASIONS = ("first", "middle", "late", "lasting")
-"""Values of `Trial.when`; each has a column in the table of verdicts."""
+"""Values of `Trial.when`; each value has a column in the table of verdicts."""
 
 
 @dataclass(frozen=True)
@@ -16,8 +16,8 @@ class Trial:
     """One run with injected faults.
 
     Attributes:
-        fault_numbers: Numbers of the injected faults. The last fault is under test; it occurs only after all
-            other faults.
+        fault_numbers: Numbers of the injected faults. The last fault is under test, and occurs only after
+            all other faults.
         descriptions: Description of each fault.
         name: Name of the skill, or of the part of the cell, that the last fault affects.
         place: File and line of the affected node in the mission, or "".
@@ -105,11 +105,11 @@ class FaultCampaignResults:
         cell: Kind of the cell, and source of the detections, as text.
         seed: Seed of the random numbers.
         robot_time: Duration of a run without faults on its clock [s].
-        listed: Number of single faults that can be injected in the mission.
+        listed: Number of single faults that can be injected into the mission.
         trials: All trials, in the order of the faults.
         branches: All branches that run only after a failure or at the end, in the order of the tree.
         complete: False if the user ended the campaign before its last run.
-        pairs: True if two faults are injected in each run.
+        pairs: True if two faults are injected into each run.
     """
 
     mission: str
@@ -134,7 +134,7 @@ class FaultCampaignResults:
 
 
 def results_to_json(results: FaultCampaignResults) -> dict[str, object]:
-    """Return the results as JSON values; times in s."""
+    """Return the results of a campaign as JSON values by key; times are in s."""
     names = ("mission", "cell", "seed", "listed", "pairs", "complete")
     return {
         **{name: getattr(results, name) for name in names},
@@ -150,7 +150,7 @@ def results_to_json(results: FaultCampaignResults) -> dict[str, object]:
 
 
 def trial_to_json(trial: Trial) -> dict[str, object]:
-    """Return one trial as JSON values; time in s."""
+    """Return a trial as JSON values by key; times are in s."""
     values = asdict(trial)
     for name in ("fault_numbers", "descriptions", "name", "is_halted_by_user", "entered_paths", "robot_time"):
         del values[name]
@@ -199,7 +199,7 @@ def _list_table_lines(trials: Sequence[Trial]) -> Iterator[str]:
     for trial in trials:
         trials_by_row[(trial.name, trial.place, trial.what)][trial.when].append(trial)
     rows: list[tuple[str, ...]] = [("node", "place", "fault", *OCCASIONS)]
-    # The order of the faults of one node is kept.
+    # The sort is stable, so the faults of a node keep their order.
     for name, place, what in sorted(trials_by_row, key=itemgetter(0, 1)):
         trials_by_occasion = trials_by_row[name, place, what]
         verdicts = (_summarize_verdicts(trials_by_occasion[occasion]) for occasion in OCCASIONS)
@@ -207,7 +207,7 @@ def _list_table_lines(trials: Sequence[Trial]) -> Iterator[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     previous_node = ("", "")
     for name, place, *texts in rows:
-        # Name and place of a node are only in the first row of the node.
+        # Only the first row of a node shows the name and the place of the node.
         node = (name, place) if (name, place) != previous_node else ("", "")
         previous_node = name, place
         padded = (text.ljust(width) for text, width in zip((*node, *texts), widths, strict=True))
@@ -215,7 +215,7 @@ def _list_table_lines(trials: Sequence[Trial]) -> Iterator[str]:
 
 
 def _summarize_verdicts(trials: Sequence[Trial]) -> str:
-    """Return the common verdict of trials, or the number of `ok` and the most important other verdict."""
+    """Return the verdict that trials share, or the number of `ok` and the most important other verdict."""
     if not trials:
         return ""
     # A trial whose fault did not occur counts only if the fault occurred in no trial.

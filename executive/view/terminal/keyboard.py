@@ -1,4 +1,4 @@
-"""Keys that control a run from its terminal: pause, continue, and one step."""
+"""Keys that control a run from the terminal: pause, continue, and one step."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class KeyReader:
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Start the thread, unless it is running; Ctrl-C sends a signal while the thread is running."""
+        """Start the thread unless it is running; Ctrl-C still sends a signal while the thread reads keys."""
         if self._thread is not None:
             return
         self._saved_attributes = termios.tcgetattr(self._descriptor)

@@ -19,7 +19,7 @@ STATUS_TEXTS = {"SUCCESS": "done", "FAILURE": "failed", "INVALID": "halted"}
 class LineView:
     """Writes a line when a skill starts or ends, a control node decides, or the state of an item changes.
 
-    Starts and ends of control nodes are not written, because the lines of their skills imply them.
+    Starts and ends of control nodes follow from the lines about their skills, and are not written.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -35,7 +35,7 @@ class LineView:
         self._skill_names_by_path = find_skill_names(nodes)
 
     def __call__(self, timed: events.TimedEvent) -> None:
-        """Write the line of an event, if it has one."""
+        """Write the line about an event, if the event has a line."""
         if text := self._describe_event(timed.event):
             self._stream.write(f"{timed.clock:9.2f} s  {text}\n")
             self._stream.flush()
@@ -72,7 +72,7 @@ class LineView:
         return ""
 
     def _describe_skill(self, event: events.NodeStarted | events.NodeEnded) -> str:
-        """Return the name of the skill of an event, with its item."""
+        """Return the name of the skill of an event, with the item of the event."""
         return self._skill_names_by_path[event.node] + (f" [{event.item}]" if event.item else "")
 
     def _describe_change(self, change: events.ItemChanged) -> str:

@@ -106,7 +106,7 @@ class TerminalView:
                 self._key_reader.stop()
 
     def _render_tree(self) -> RenderableType:
-        """Return a drawing of the running nodes and their children; the whole tree may be too large."""
+        """Return a drawing of the running nodes and their children; all nodes may need too much space."""
         running_paths = {activation.node for activation in self.timeline.find_running_activations()}
         shown_nodes = select_active_nodes(self._nodes, running_paths)
         lines = Text()
@@ -120,7 +120,7 @@ class TerminalView:
         return lines
 
     def _render_items(self) -> RenderableType:
-        """Return a table of the items."""
+        """Return a table of the items of the run."""
         table = Table(box=None, header_style="dim", padding=(0, 1))
         for column in ("item", "class", "state", "bin"):
             table.add_column(column)

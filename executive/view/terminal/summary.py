@@ -19,7 +19,7 @@ def format_repeat_command(
 ) -> str:  # fmt: skip
     """Return the command line that repeats a run exactly.
 
-    `overrides` contains the params from the command line by name, `requests` the requests of the operator.
+    `overrides` contains the params from the command line by name; `requests` are made by the operator.
     """
     arguments = ["executive", "run", mission, "--seed", str(seed)]
     for key, value in overrides.items():
@@ -31,8 +31,8 @@ def format_repeat_command(
 
 
 def describe_end(status: str, reason: str, node: str, message: str) -> str:
-    """Return a line with status, reason, path of the node, and message; empty arguments are omitted."""
-    # The reason of a fault or a halt repeats the status.
+    """Return a line about the end of a run: status, reason, node path and message, without empty parts."""
+    # The reason of a fault or a halt repeats the status, and is omitted.
     reason_text = f" {reason}" if reason and reason.upper() != status else ""
     node_text = f" at {node}" if node else ""
     message_text = f": {message}" if message else ""
@@ -52,7 +52,7 @@ def format_summary(
     outcomes = [f"  {outcome}: {', '.join(names)}" for outcome, names in groups]
     if labels_text := describe_unknown_labels(result.unknown_labels):
         outcomes.append(f"  {labels_text}")
-    outcomes += [f"  assumed error rates: {reason}" for reason in result.assumption_reasons]
+    outcomes += [f"  detector error rates are assumed: {reason}" for reason in result.assumption_reasons]
     warning = wrap_lines(describe_disagreement(result), "", "  ", max_lines=3)
     if result.diagnosis is not None:
         diagnosis = format_diagnosis(result.diagnosis, result.run, repeat_command, report_file)
@@ -88,5 +88,5 @@ def group_items_by_outcome(items: Iterable[ItemChanged]) -> dict[str, list[str]]
             details = ": ".join(filter(None, (describe_place_on_table(item), item.reason)))
             outcomes[item.state].append(f"{item.item} ({details})" if details else item.item)
     if phantom_count:
-        outcomes["phantom"].append(f"{phantom_count} seen by mistake")
+        outcomes["phantom"].append(f"{phantom_count} detected by mistake")
     return dict(outcomes)

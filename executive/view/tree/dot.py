@@ -26,7 +26,7 @@ def format_dot(nodes: Sequence[OutlineNode], name: str) -> str:
 def _format_branch(
     index: int, nodes: Sequence[OutlineNode], child_indices: Sequence[Sequence[int]]
 ) -> list[str]:
-    """Return the statements for the node with an index and for its descendants."""
+    """Return the statements for the node with the index `index` and for its descendants."""
     node = nodes[index]
     statements = [_format_node(node)]
     for child in child_indices[index]:

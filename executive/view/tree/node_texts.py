@@ -20,7 +20,7 @@ class NodeTexts:
     Attributes:
         symbol: Symbol before the title of a control node; "" for a skill.
         title: Name of the node, truncated to `MAX_LINE_LENGTH`.
-        lines: Settings of the node in the mission, after the failures that start it if it is a catch.
+        lines: Settings of the node in the mission; for a catch, first the failures that start the catch.
         tooltip: All information about the node, with one line per topic.
     """
 

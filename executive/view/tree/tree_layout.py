@@ -43,7 +43,7 @@ class NodeSize:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Rectangle in the picture [pixel]; `x`, `y` is its left top corner, and y points down."""
+    """Rectangle in the picture [pixel]; `x` and `y` are its top left corner, and y points down."""
 
     x: float
     y: float
@@ -121,7 +121,7 @@ def _place_columns(depths: Sequence[int], sizes: Sequence[NodeSize]) -> tuple[li
 
 
 def _compute_bands(children: ChildIndices, sizes: Sequence[NodeSize]) -> tuple[list[float], list[float]]:
-    """Return for each node the height of its band, and the distance from the top of the band to its middle.
+    """Return by node the height of its band, and the distance from the top of the band to the box middle.
 
     Children follow their parents in the lists, so the bands are computed from the last node to the first.
     """

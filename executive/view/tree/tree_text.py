@@ -75,9 +75,9 @@ def find_skill_names(nodes: Sequence[OutlineNode]) -> dict[str, str]:
 
 
 def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
-    """Return the nodes of a tree, with a single node for each subtree that occurred earlier in the tree."""
+    """Return the nodes of a tree, with a single node in place of each repetition of a subtree."""
     folded_nodes: list[OutlineNode] = []
-    first_uses: dict[str, list[tuple[int, str, str]]] = {}
+    content_by_subtree: dict[str, list[tuple[int, str, str]]] = {}
     index = 0
     while index < len(nodes):
         node = nodes[index]
@@ -85,14 +85,14 @@ def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
         while end < len(nodes) and nodes[end].depth > node.depth:
             end += 1
         content = [(below.depth - node.depth, below.title, below.detail) for below in nodes[index:end]]
-        repeated_subtree = next((subtree for subtree in node.subtrees if subtree in first_uses), None)
+        repeated_subtree = next((subtree for subtree in node.subtrees if subtree in content_by_subtree), None)
         if repeated_subtree is None:
-            first_uses |= dict.fromkeys(node.subtrees, content)
+            content_by_subtree |= dict.fromkeys(node.subtrees, content)
             folded_nodes.append(node)
             index += 1
         else:
             # Two uses of a subtree may have different params, and therefore different titles and details.
-            is_equal = first_uses[repeated_subtree] == content
+            is_equal = content_by_subtree[repeated_subtree] == content
             detail = "as above" if is_equal else "as above, other params"
             folded_nodes.append(_make_use_node(node, repeated_subtree, detail))
             index = end
@@ -113,7 +113,7 @@ def select_active_nodes(nodes: Sequence[OutlineNode], running_paths: Collection[
 
 
 def _wrap_line(text: str, first_indent: str, indent: str) -> list[str]:
-    """Return a text as lines of limited length, with an indent for the first line and one for other lines."""
+    """Return the lines of a wrapped text; `first_indent` precedes the first line, `indent` all others."""
     return textwrap.wrap(
         text, max(MAX_LINE_LENGTH, len(indent) + _MIN_TEXT_LENGTH), initial_indent=first_indent,
         subsequent_indent=f"{indent}  ", break_long_words=False, break_on_hyphens=False,
@@ -131,7 +131,7 @@ def _list_details(node: OutlineNode, shows_ports: bool, shows_reasons: bool) -> 
 
 
 def _describe_connections(verb: str, connections: Sequence[Connection], arrow: str) -> str:
-    """Return a text with the variables of connections, and with ports that have another name."""
+    """Return a text with the variables of connections, and the ports whose name differs from the variable."""
     texts = []
     for connection in connections:
         variable = f"${connection.variable}" + ("" if connection.required else "?")
@@ -141,7 +141,7 @@ def _describe_connections(verb: str, connections: Sequence[Connection], arrow: s
 
 
 def _make_use_node(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
-    """Return a node with the name of a subtree, in place of the first node `node` of the subtree."""
+    """Return a node that stands for a whole subtree; it replaces `node`, the first node of the subtree."""
     outer_subtrees = node.subtrees[: node.subtrees.index(subtree)]
     return OutlineNode(
         node.path, node.name, node.depth, detail, USE_KEYWORD, subtree, node.slot, node.when, outer_subtrees,
