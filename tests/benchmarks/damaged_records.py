@@ -102,7 +102,7 @@ def measure(
     """Damage records of a run of MISSION, and read, replay, resume and film them."""
     runs.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(prefix=".damaged-", dir=runs) as folder:
-        base = Path(folder)
+        base = Path(folder).resolve()  # The children have another working directory.
         snapshots, problem = ForkRunner(RESUME_TIMEOUT).call(lambda: _record_whole(subject, base / "whole"))
         if snapshots is None:
             raise InputError(f"the run cannot be recorded: {problem}")
