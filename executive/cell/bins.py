@@ -29,5 +29,5 @@ class Bin:
     slots: Array
 
     def contains(self, position: Array, margin: float = 0.0) -> bool:
-        """Return True if `position` `(3,)` [m] is above the floor, enlarged by `margin` [m] on each side."""
+        """Return True if x and y of `position` `(3,)` [m] are in the floor area, enlarged by `margin` [m]."""
         return bool(np.all(np.abs(position[:2] - self.position[:2]) <= self.size[:2] / 2 + margin))

@@ -14,7 +14,7 @@ from executive.ledger.records import ItemRecords
 
 
 class Recovery:
-    """Recovery of items on the table and in the bins after actions of the tool that the journal lacks.
+    """Recovery of the items that the tool may have moved in actions that are missing in the journal.
 
     Args:
         records: All items.
@@ -27,9 +27,10 @@ class Recovery:
         """Number of visible objects of each class, by bin, in each look that shows the whole bin."""
 
     def add_look(self, look: Detections, bin_names: Mapping[Observation, str | None]) -> None:
-        """Count the objects in each bin whose whole floor is visible in a look at the whole image.
+        """Count the objects in each bin whose floor is completely visible.
 
-        `bin_names` contains, for each observed object, the name of the bin in which the object lies, or None.
+        `look` contains the detections in the whole image. `bin_names` contains the bin of each observed
+        object, or None.
         """
         for name in self._bins.bins:
             if self._bins.is_floor_visible(name, look):
@@ -40,7 +41,7 @@ class Recovery:
     def record_bin_contents(self, change_count: int) -> None:
         """Record a placed or rejected item for each unknown object in a bin.
 
-        `change_count` is the number of changes of the table so far.
+        `change_count` is the number of actions so far that may have moved objects on the table.
         """
         for label, bin_name in self._find_unknown_objects():
             untracked_items = (item for item in self._records if item.is_untracked and item.label == label)
@@ -58,8 +59,9 @@ class Recovery:
     def _find_unknown_objects(self) -> Iterator[tuple[str, str]]:
         """Yield class and bin name of each object in a bin that is not an item of the ledger.
 
-        The number of visible objects is the median over the looks. If known items were detected with wrong
-        classes, too many objects seem unknown; therefore, objects of permitted classes come first.
+        The number of visible objects of a class is the median over the looks. The limit of unknown objects in
+        a bin is the number of visible objects minus the number of tracked items. Classes that belong in the
+        bin use up this limit first, so that an item that was detected with a wrong class is not rejected.
         """
         for bin_name, look_counts in self._counts_by_bin.items():
             labels = set().union(*look_counts)

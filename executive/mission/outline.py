@@ -38,7 +38,7 @@ class OutlineNode:
 
     Attributes:
         path: Unique path from the root.
-        name: Name of the node, after the key of the parent if the path contains one: `recover: look`.
+        name: Name of the node, with the key of the parent if the path contains the key: `recover: look`.
         depth: Number of ancestors.
         detail: Summary of the node's settings in the mission.
         kind: `skill`, or the keyword of a control node.
@@ -139,7 +139,7 @@ def _format_name(relative_path: str) -> str:
     slot, _, name = relative_path.rpartition("/")
     name = _INDEX_PATTERN.sub("", name)
     slot = slot.replace("/", " ")
-    # The path of a list without label in the second catch ends with "catch/2".
+    # A list without label has no name: its path in the second catch ends with the index, "catch/2".
     return f"{slot} {name}" if name.isdigit() else f"{slot}: {name}" if slot else name
 
 
@@ -148,8 +148,8 @@ def _find_slot(
 ) -> str:
     """Return the key of the parent under which a node is written, or "".
 
-    The key is the relative path without the names of the node and of its subtrees. Paths omit some keys; an
-    omitted key is the key under which the parent has the node as a child.
+    The key is the relative path without the names of the node and of its subtrees. If the path omits the key,
+    the key is found by comparing the node with the children of the parent.
     """
     parts = [_INDEX_PATTERN.sub("", part) for part in relative_path.split("/")]
     if parts[-1] == title:

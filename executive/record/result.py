@@ -139,7 +139,7 @@ def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result
     end = find_run_end(events)
     if end is not None:
         return result if (result.status, result.ticks) == (end.status, end.ticks) else None
-    # If a full disk prevented the event of the end, the result is valid without this event.
+    # A full disk may prevent the journal from storing the end; then only the result contains the end.
     is_resumed = any(isinstance(timed.event, RunResumed) for timed in events)
     return None if is_resumed else result
 

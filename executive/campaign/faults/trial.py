@@ -140,7 +140,7 @@ class _TrialRun:
             self._events.append(timed)
 
     def _stop_run_for_halt_error(self) -> None:
-        """Stop the run at the tick at which a skill that raises an error when halted must be halted."""
+        """Halt the run while a skill runs whose injected bug raises an error during a halt."""
         for skill_fault in self._skill_faults:
             start_tick = self._recorder.start_ticks.get(skill_fault.node)
             if skill_fault.kind != "raises when halted" or start_tick is None:
@@ -163,7 +163,7 @@ class _TrialRun:
         return not names.isdisjoint(injected) or (bool(fault.skill_faults) and self._has_effect(fault))
 
     def _has_effect(self, fault: PlannedFault) -> bool:
-        """Return True if the fault let its node raise the bug or fail as planned; also for other faults."""
+        """Return True if the node of the fault ended as planned, by this fault or by another fault."""
         node_ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
         node_ends = [end for end in node_ends if end.node == fault.location]
         if fault.is_bug:
