@@ -63,7 +63,7 @@ class Param:
         ge: Minimum value, or None.
         le: Maximum value, or None.
         choices: Allowed values, or None for any value.
-        refers: Kind of the name (`bin`, `detector`, `pose`, `class`) if the value is a name; otherwise "".
+        refers_to: Kind of the name (`bin`, `detector`, `pose`, `class`) if the value is a name; otherwise "".
         doc: Description of the param.
     """
 
@@ -74,7 +74,7 @@ class Param:
     ge: float | None
     le: float | None
     choices: tuple[Any, ...] | None
-    refers: str
+    refers_to: str
     doc: str
 
     @property
@@ -92,7 +92,7 @@ class Port:
         type: Python type of the value.
         direction: IN or OUT.
         default: Value of an input whose variable is unwritten; `...` if the variable must be written.
-        refers: Kind of the name (`item`, `bin`, `class`) if the value is a name; otherwise "".
+        refers_to: Kind of the name (`item`, `bin`, `class`) if the value is a name; otherwise "".
         doc: Description of the port.
     """
 
@@ -100,7 +100,7 @@ class Port:
     type: Any
     direction: Direction
     default: Any
-    refers: str
+    refers_to: str
     doc: str
 
     @property
@@ -115,17 +115,17 @@ def param(
     ge: float | None = None,
     le: float | None = None,
     choices: tuple[Any, ...] | None = None,
-    refers: str = "",
+    refers_to: str = "",
     doc: str = "",
 ) -> Any:
     """Declare a param of a skill; `Param` describes the arguments."""
     # `Skill.__init_subclass__` sets name, type and unit.
-    return Param("", None, "", default, ge, le, choices, refers, doc)
+    return Param("", None, "", default, ge, le, choices, refers_to, doc)
 
 
-def port(*, default: Any = ..., refers: str = "", doc: str = "") -> Any:
+def port(*, default: Any = ..., refers_to: str = "", doc: str = "") -> Any:
     """Declare a port of a skill; `Port` describes the arguments."""
-    return param(default, refers=refers, doc=doc)
+    return param(default, refers_to=refers_to, doc=doc)
 
 
 class SkillFailed(Exception):
@@ -148,8 +148,8 @@ class Skill:
         senses: True if the skill gets new information: an image, or a request of the operator.
         moves: True if the skill moves the arm.
         tool_state: Required state of the tool (ANY: no requirement); state after success (ANY: unchanged).
-        tool_left: State of the tool after a failure, by reason, and after a halt, by the key `halt`; ANY if
-            unknown. Ends without a key leave the state unchanged.
+        tool_state_after_failure: State of the tool after a failure, by reason, and after a halt, by the key
+            `halt`; ANY if unknown. A failure or halt without a key leaves the state unchanged.
         waits: Name of the param that contains the minimum time until success [s], or "".
     """
 
@@ -160,7 +160,7 @@ class Skill:
     senses: ClassVar[bool] = False
     moves: ClassVar[bool] = False
     tool_state: ClassVar[tuple[ToolState, ToolState]] = (ANY, ANY)
-    tool_left: ClassVar[Mapping[str, ToolState]] = {}
+    tool_state_after_failure: ClassVar[Mapping[str, ToolState]] = {}
     waits: ClassVar[str] = ""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -181,8 +181,8 @@ class Skill:
             declaration = cls.__dict__.get(name)
             direction = next((value for value in metadata if isinstance(value, Direction)), None)
             if direction is not None:
-                options = declaration if isinstance(declaration, Param) else port()
-                ports[name] = Port(name, value_type, direction, options.default, options.refers, options.doc)
+                entry = declaration if isinstance(declaration, Param) else port()
+                ports[name] = Port(name, value_type, direction, entry.default, entry.refers_to, entry.doc)
             elif isinstance(declaration, Param):
                 unit = next((value for value in metadata if isinstance(value, str)), "")
                 params[name] = replace(declaration, name=name, type=value_type, unit=unit)

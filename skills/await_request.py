@@ -11,7 +11,7 @@ from executive.skill import Out, Skill, port
 class AwaitRequest(Skill):
     """Ask the operator which class to pick next; the clock of the run stops until the operator answers."""
 
-    wanted: Out[str] = port(refers="class", doc="the requested class")
+    wanted: Out[str] = port(refers_to="class", doc="the requested class")
     reasons: ClassVar = ("rescan", "quit")
     senses: ClassVar = True
 

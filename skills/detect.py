@@ -25,7 +25,7 @@ class Detect(Skill):
     """
 
     detections: Out[Detections] = port(doc="the detections and their frame")
-    detector: str = param("", refers="detector", doc="a detector of the cell; empty: the first detector")
+    detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
     view: str = param(
         "table", choices=("table", "full"), doc="`table`: the workspace; `full`: the whole image"
     )

@@ -16,7 +16,7 @@ class Grasp(Skill):
     """
 
     target: In[Target] = port(doc="the target that the tool touches")
-    held: Out[Item] = port(refers="item", doc="the item in the tool")
+    held: Out[Item] = port(refers_to="item", doc="the item in the tool")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
     reasons: ClassVar = ("missed",)
     uses: ClassVar = ("tool",)

@@ -16,12 +16,12 @@ class IsHolding(Skill):
     if only the ledger reports an item. After a failed transit, a mission can thus decide how to continue.
     """
 
-    held: Out[Item] = port(refers="item", doc="the item in the tool")
+    held: Out[Item] = port(refers_to="item", doc="the item in the tool")
     reasons: ClassVar = ("empty",)
     uses: ClassVar = ("tool",)
     senses: ClassVar = True
     tool_state: ClassVar = (ANY, HOLDING)
-    tool_left: ClassVar = {"empty": EMPTY}
+    tool_state_after_failure: ClassVar = {"empty": EMPTY}
 
     def run(self, cell: Cell) -> None:
         """Compare the vacuum sensor with the ledger; unless both report an item, open the tool and fail."""

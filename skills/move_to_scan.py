@@ -19,7 +19,7 @@ class MoveToScan(Skill):
 
     pose: str = param(
         "auto",
-        refers="pose",
+        refers_to="pose",
         choices=("auto", "next"),
         doc="an arm pose of the cell; `auto`: the first scan pose, if needed; `next`: the next scan pose",
     )

@@ -23,14 +23,14 @@ class PutDown(Skill):
     reads the sensor of the tool during the whole motion.
     """
 
-    held: In[Item] = port(refers="item", doc="the item in the tool")
+    held: In[Item] = port(refers_to="item", doc="the item in the tool")
     drop: Metres = param(0.005, ge=0, le=0.05, doc="height of the item's underside above the table")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
     reasons: ClassVar = ("unreachable", "blocked", "dropped", "stuck")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
     tool_state: ClassVar = (HOLDING, EMPTY)
-    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
     waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:

@@ -15,7 +15,7 @@ class RejectTarget(Skill):
     Before the item has `after` failed attempts, the skill succeeds without an effect.
     """
 
-    item: In[Item] = port(refers="item", doc="the item to reject")
+    item: In[Item] = port(refers_to="item", doc="the item to reject")
     why: str = param("could not be picked", doc="reason in the report")
     after: int = param(0, ge=0, doc="minimum number of failed attempts before the rejection")
     reasons: ClassVar = ()

@@ -16,14 +16,14 @@ class Release(Skill):
     The skill fails with `dropped` if the item fell before its release.
     """
 
-    held: In[Item] = port(refers="item", doc="the item in the tool")
-    bin: In[str] = port(refers="bin", doc="the bin under the tool")
-    placed: Out[Item] = port(refers="item", doc="the item in the bin")
+    held: In[Item] = port(refers_to="item", doc="the item in the tool")
+    bin: In[str] = port(refers_to="bin", doc="the bin under the tool")
+    placed: Out[Item] = port(refers_to="item", doc="the item in the bin")
     settle: Seconds = param(0.10, ge=0, le=2, doc="time to wait before reading the sensor")
     reasons: ClassVar = ("stuck", "dropped")
     uses: ClassVar = ("tool",)
     tool_state: ClassVar = (HOLDING, EMPTY)
-    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
     waits: ClassVar = "settle"
 
     def run(self, cell: Cell) -> Steps:

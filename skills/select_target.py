@@ -21,11 +21,11 @@ class SelectTarget(Skill):
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
-    same: In[Item | None] = port(default=None, refers="item", doc="only this item")
-    wanted: In[str | None] = port(default=None, refers="class", doc="only this class")
+    same: In[Item | None] = port(default=None, refers_to="item", doc="only this item")
+    wanted: In[str | None] = port(default=None, refers_to="class", doc="only this class")
     target: Out[Target] = port(doc="the chosen target")
-    item: Out[Item] = port(refers="item", doc="the item of the target")
-    bin: Out[str] = port(refers="bin", doc="the bin with the fewest used slots among the bins of the class")
+    item: Out[Item] = port(refers_to="item", doc="the item of the target")
+    bin: Out[str] = port(refers_to="bin", doc="the bin of the class with the fewest used slots")
     prefer: str = param(
         "nearest", choices=("nearest", "surest"), doc="`nearest` to the tool, or the `surest` detection"
     )

@@ -19,14 +19,14 @@ class Transit(Skill):
     seal holds with a safety factor of two. The skill reads the vacuum sensor during the whole motion.
     """
 
-    held: In[Item] = port(refers="item", doc="the item in the tool")
-    bin: In[str] = port(refers="bin", doc="the bin for the item")
+    held: In[Item] = port(refers_to="item", doc="the item in the tool")
+    bin: In[str] = port(refers_to="bin", doc="the bin for the item")
     drop: Metres = param(DROP_HEIGHT, ge=0.005, le=0.1, doc="height of the item's underside above the slot")
     reasons: ClassVar = ("unreachable", "blocked", "dropped")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
     tool_state: ClassVar = (HOLDING, HOLDING)
-    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
 
     @classmethod
     def min_time(cls, min_times: MinTimes, values: Mapping[str, Any]) -> float:

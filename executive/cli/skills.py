@@ -92,16 +92,17 @@ def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
         "uses": skill.uses,
         "senses": skill.senses,
         "moves": skill.moves,
-        "tool": {"before": state_before, "after": state_after, "left": skill.tool_left},
+        "tool": {"before": state_before, "after": state_after, "left": skill.tool_state_after_failure},
     }
     return cast(Declaration, json.loads(to_json(values, inf_nan_mode="strings", fallback=str)))
 
 
 def _declare_entry(entry: Param | Port) -> dict[str, Any]:
-    """Return the declaration of a param or port; the keys of the bounds `ge` and `le` are `min` and `max`."""
+    """Return the declaration of a param or port as JSON values, with the keys `min`, `max` and `refers`."""
     values = {**vars(entry), "type": _format_type(entry.type), "required": entry.is_required}
     values["default"] = None if entry.default is ... else entry.default
-    return {{"ge": "min", "le": "max"}.get(name, name): value for name, value in values.items()}
+    keys = {"ge": "min", "le": "max", "refers_to": "refers"}
+    return {keys.get(name, name): value for name, value in values.items()}
 
 
 def _format_type(annotation: Any) -> str:

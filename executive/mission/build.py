@@ -13,7 +13,7 @@ from executive.mission.load import LoadedMission
 from executive.mission.model.conversion import convert_value
 from executive.mission.model.grammar import SEQUENCE_KEYWORD
 from executive.mission.model.instance import make_instance
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_literals, find_wires
 from executive.skill import Direction, Param, Port, Skill
 from executive.tree.blackboard import Blackboard
@@ -72,7 +72,7 @@ class TreeBuilder:
                 return self._build_skill_leaf(context, node)
             case InnerNode():
                 return make_instance(node, context, self.build_node)
-            case UseNode(body=Node() as subtree_root):
+            case SubtreeNode(body=Node() as subtree_root):
                 body = self.build_node(subtree_root)
                 # A node has one label, so the label of the `use` belongs to a sequence around the subtree.
                 root = self.node_classes[SEQUENCE_KEYWORD](context, do=(body,)) if node.label else body

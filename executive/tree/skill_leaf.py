@@ -52,7 +52,7 @@ class SkillLeaf(TreeNode):
         self._item = ""
         # A required port holds the item on which the skill acts; an optional port only limits a choice.
         self._item_ports = tuple(
-            name for name, port in skill.ports.items() if port.refers == "item" and port.default is ...
+            name for name, port in skill.ports.items() if port.refers_to == "item" and port.default is ...
         )
 
     @property

@@ -26,11 +26,11 @@ class PlaceNeatly(Skill):
     Succeeds when the tool is empty.
     """
 
-    held: In[str] = port(refers="item", doc="what to put down")
+    held: In[str] = port(refers_to="item", doc="what to put down")
     beside: In[list[str] | None] = port(default=None, doc="what it goes beside")
     placed: Out[str] = port(doc="what was put down")
     gap: Metres = param(0.01, ge=0, le=0.05, doc="between two items")
-    bin: str = param(refers="bin")
+    bin: str = param(refers_to="bin")
     order: str = param("rows", choices=("rows", "columns"), doc="word " * 30)
     speed: Speed = param(Speed.SLOW)
     limit: float = param(float("inf"))
@@ -39,7 +39,7 @@ class PlaceNeatly(Skill):
     senses: ClassVar = True
     moves: ClassVar = True
     tool_state: ClassVar = (HOLDING, EMPTY)
-    tool_left: ClassVar = {"halt": ANY}
+    tool_state_after_failure: ClassVar = {"halt": ANY}
 
 
 class Rest(Skill):

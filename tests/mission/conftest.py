@@ -20,9 +20,9 @@ class Look(Skill):
     """See something."""
 
     view: str = param("table", choices=("table", "full"))
-    detector: str = param("", refers="detector")
-    pose: str = param("auto", refers="pose", choices=("auto", "next"))
-    classes: tuple[str, ...] = param((), refers="class")
+    detector: str = param("", refers_to="detector")
+    pose: str = param("auto", refers_to="pose", choices=("auto", "next"))
+    classes: tuple[str, ...] = param((), refers_to="class")
     seen: Out[list[int]]
     reasons: ClassVar = ("unsure", "hidden")
     senses: ClassVar = True
@@ -51,7 +51,7 @@ class Drop(Skill):
     """Put something into a bin."""
 
     held: In[str]
-    bin: str = param(refers="bin", doc="where it goes")
+    bin: str = param(refers_to="bin", doc="where it goes")
     reasons: ClassVar = ("stuck",)
 
     def run(self, cell: Any) -> Any:

@@ -108,7 +108,7 @@ class Carry(Chance):
 
     reasons: ClassVar = ("blocked", "dropped")
     tool_state: ClassVar = (HOLDING, HOLDING)
-    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
     moves: ClassVar = True
 
     def run(self, cell: Any) -> Any:

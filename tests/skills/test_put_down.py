@@ -79,8 +79,8 @@ def test_what_does_not_come_off_is_stuck(fake: FakeCell, held: str, monkeypatch:
 
 def test_the_check_knows_that_the_tool_is_empty_after_a_drop_alone() -> None:
     assert "dropped" in PutDown.reasons
-    assert PutDown.tool_left["dropped"] is EMPTY
-    assert not {"unreachable", "blocked", "stuck"} & PutDown.tool_left.keys()
+    assert PutDown.tool_state_after_failure["dropped"] is EMPTY
+    assert not {"unreachable", "blocked", "stuck"} & PutDown.tool_state_after_failure.keys()
 
 
 @pytest.fixture

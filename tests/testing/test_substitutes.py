@@ -36,7 +36,7 @@ def test_a_substitute_is_declared_as_the_skill_is_and_named_after_it(name: str) 
     substitute = SUBSTITUTES[name]
     assert substitute.__name__ == name
     assert issubclass(substitute, Grasp)
-    for declared in ("params", "ports", "reasons", "uses", "tool_state", "tool_left"):
+    for declared in ("params", "ports", "reasons", "uses", "tool_state", "tool_state_after_failure"):
         assert getattr(substitute, declared) == getattr(Grasp, declared)
 
 

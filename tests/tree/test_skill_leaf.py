@@ -196,9 +196,9 @@ class Sort(Skill):
     """Finds what goes into a box."""
 
     colour: In[str]
-    box: In[str] = port(refers="item")
-    unlike: In[str | None] = port(default=None, refers="item")
-    found: Out[str] = port(refers="item")
+    box: In[str] = port(refers_to="item")
+    unlike: In[str | None] = port(default=None, refers_to="item")
+    found: Out[str] = port(refers_to="item")
 
     def run(self, cell: Any) -> Iterator[None]:
         yield

@@ -16,7 +16,7 @@ from executive.campaign.mission_under_test import MissionUnderTest
 from executive.campaign.pool import run_jobs
 from executive.errors import InputError
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
-from executive.mission.model.nodes import InnerNode, Node, UseNode
+from executive.mission.model.nodes import InnerNode, Node, SubtreeNode
 from executive.mission.source import Span
 from executive.view.results.fault_results import Branch, FaultCampaignResults, Trial
 
@@ -190,6 +190,6 @@ def _walk_branches(tree: Node) -> Iterator[tuple[Span, str, Node]]:
 
 def _find_path(node: Node) -> str:
     """Return the path of a node in the built tree, which contains no node for a use without a label."""
-    while isinstance(node, UseNode) and not node.label and node.body is not None:
+    while isinstance(node, SubtreeNode) and not node.label and node.body is not None:
         node = node.body
     return node.path

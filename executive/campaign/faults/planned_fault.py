@@ -109,7 +109,7 @@ def _make_failing(skill: type[Skill], reason: str) -> type[Skill]:
     """
 
     def run(self: Skill, cell: Cell) -> Steps:
-        if skill.tool_left.get(reason) is EMPTY:
+        if skill.tool_state_after_failure.get(reason) is EMPTY:
             cell.tool.open()
             if cell.tool.holding:
                 yield from skill.run(self, cell) or ()

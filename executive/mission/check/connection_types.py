@@ -27,14 +27,14 @@ class Writer:
         name: Name in messages: `Localize.targets`, or the keyword of a control node.
         span: Position of the node.
         type: Type of the written values.
-        refers: Kind of the written names, for example `bin` or `item`; "" if the output writes no names.
+        refers_to: Kind of the written names, for example `bin` or `item`; "" if the output writes no names.
         values: Written constants with their positions; None if the values are unknown before the run.
     """
 
     name: str
     span: Span
     type: object
-    refers: str
+    refers_to: str
     values: tuple[tuple[object, Span], ...] | None = None
 
     def describe(self, span: Span) -> str:
@@ -51,7 +51,7 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
     skill_writers: dict[str, list[Writer]] = {}
     for node in context.tree.walk():
         for wire in context.find_wires(node, Direction.OUT):
-            writer = Writer(str(wire), node.span, wire.port.type, wire.port.refers)
+            writer = Writer(str(wire), node.span, wire.port.type, wire.port.refers_to)
             skill_writers.setdefault(wire.variable, []).append(writer)
 
     def check_below(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
@@ -121,7 +121,7 @@ class ElementLoop:
             ]
             yield Writer(self.keyword, self.span, Any, "", tuple(values))
         elif (element_type := find_element_type(list_writer.type)) is not None:
-            yield Writer(self.keyword, self.span, element_type, list_writer.refers)
+            yield Writer(self.keyword, self.span, element_type, list_writer.refers_to)
 
 
 def _find_element_loops(node: Node) -> Iterator[ElementLoop]:
@@ -134,23 +134,23 @@ def _find_element_loops(node: Node) -> Iterator[ElementLoop]:
 def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iterator[Finding]:
     """Yield an error for each value or type of a writer that does not fit the input `wire`."""
     port = wire.port
-    port_type = f"the name of {_add_article(port.refers)}" if port.refers else describe_type(port.type)
+    port_type = f"the name of {_add_article(port.refers_to)}" if port.refers_to else describe_type(port.type)
     for value, span in writer.values or ():
-        names = context.cell_names_by_kind.get(port.refers)
+        names = context.cell_names_by_kind.get(port.refers_to)
         if find_input_problem(value, port):
             message = f"{wire} takes {port_type}, but ${wire.variable} gets {describe_value(value)} here"
             hint = f"{wire} reads ${wire.variable} in {wire.span.describe_place(span.source)}."
             yield make_error(span, "port-type", message, hint)
         elif names is not None and isinstance(value, str) and value not in names:
-            message = f'the cell has no {port.refers} "{value}" for {wire}'
+            message = f'the cell has no {port.refers_to} "{value}" for {wire}'
             hint = suggest_choice(value, names, "Allowed names")
-            yield make_error(span, f"unknown-{port.refers}", message, hint)
+            yield make_error(span, f"unknown-{port.refers_to}", message, hint)
     if writer.values is not None:
         return
     if not is_assignable(writer.type, port.type):
         written_type = describe_type(writer.type)
-    elif port.refers and writer.refers != port.refers:
-        written_type = f"the name of {_add_article(writer.refers)}" if writer.refers else "any text"
+    elif port.refers_to and writer.refers_to != port.refers_to:
+        written_type = f"the name of {_add_article(writer.refers_to)}" if writer.refers_to else "any text"
     else:
         return
     message = f"{wire} takes {port_type}, but ${wire.variable} holds {written_type}"

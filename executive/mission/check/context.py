@@ -12,7 +12,7 @@ from executive.cell.protocols import MinTimes
 from executive.mission.findings import suggest_choice
 from executive.mission.flow.analysis import FlowAnalysis
 from executive.mission.model.mission import Mission
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.values import Reference
 from executive.mission.model.wiring import Wire, find_wires, find_written_variables
 from executive.mission.source import Span
@@ -98,13 +98,13 @@ class CheckContext:
         }
 
     @cached_property
-    def library_uses_by_path(self) -> Mapping[str, UseNode]:
+    def library_uses_by_path(self) -> Mapping[str, SubtreeNode]:
         """For each node of a library, by path, the `use` in the mission file that includes the node."""
-        uses: dict[str, UseNode] = {}
+        uses: dict[str, SubtreeNode] = {}
 
-        def add_uses_below(node: Node, use: UseNode | None) -> None:
+        def add_uses_below(node: Node, use: SubtreeNode | None) -> None:
             if node.span.source is mission_source:
-                use = node if isinstance(node, UseNode) else None
+                use = node if isinstance(node, SubtreeNode) else None
             elif use is not None:
                 uses[node.path] = use
             for child in node.children:

@@ -8,7 +8,7 @@ from executive.cell.protocols import MinTimes
 from executive.mission.check.context import CheckContext
 from executive.mission.model.conversion import WrongType, convert_value
 from executive.mission.model.instance import get_mission_node, has_valid_constants, make_inspection_instance
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_literals
 from executive.skill import HOLDING, Param, Port
 
@@ -18,7 +18,7 @@ def compute_min_time(context: CheckContext, node: Node) -> float:
     match node:
         case SkillNode():
             return _compute_min_time_of_skill(context, node)
-        case UseNode(body=Node() as body):
+        case SubtreeNode(body=Node() as body):
             return compute_min_time(context, body)
         case InnerNode() if has_valid_constants(node):
             instance = make_inspection_instance(node)

@@ -10,7 +10,7 @@ from executive.mission.check.context import CheckContext, VariableRead
 from executive.mission.findings import Finding, make_error
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_type_name
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_control_node_inputs, find_control_node_outputs
 from executive.mission.source import Span
 from executive.skill import Direction
@@ -92,7 +92,7 @@ def _list_concurrent_branches(context: CheckContext) -> Iterator[list[Node]]:
 
 def _find_first_leaf(node: Node) -> Node:
     """Return the first node without children, usually a skill, that the execution of a node reaches."""
-    if isinstance(node, UseNode):
+    if isinstance(node, SubtreeNode):
         return _find_first_leaf(node.body) if node.body else node
     first_child = make_inspection_instance(node).first_child if isinstance(node, InnerNode) else None
     return _find_first_leaf(get_mission_node(first_child)) if first_child else node

@@ -70,18 +70,18 @@ def _find_unknown_names(
     context: CheckContext, node: SkillNode, declaration: Param | Port, value: Literal
 ) -> Iterator[Finding]:
     """Yield an error for each constant that names a bin, class, pose or detector that the cell lacks."""
-    if declaration.refers not in context.cell_names_by_kind or value.value == declaration.default:
+    if declaration.refers_to not in context.cell_names_by_kind or value.value == declaration.default:
         return
     choices = declaration.choices if isinstance(declaration, Param) else None
-    allowed_names = [*context.cell_names_by_kind[declaration.refers], *(choices or ())]
+    allowed_names = [*context.cell_names_by_kind[declaration.refers_to], *(choices or ())]
     is_list = isinstance(value.value, list)
     for index, name in enumerate(value.value if isinstance(value.value, list) else [value.value]):
         if isinstance(name, str) and name not in allowed_names:
-            message = f'the cell has no {declaration.refers} "{name}" for {node.skill}.{declaration.name}'
+            message = f'the cell has no {declaration.refers_to} "{name}" for {node.skill}.{declaration.name}'
             choices_hint = suggest_choice(name, allowed_names, "Allowed names")
             hint = context.make_variable_hint(name) or choices_hint
             span = value.get_element_span(index) if is_list else value.span
-            yield make_error(span, f"unknown-{declaration.refers}", message, hint)
+            yield make_error(span, f"unknown-{declaration.refers_to}", message, hint)
 
 
 def find_param_problem(param: Param, value: object) -> tuple[str, str]:
@@ -97,7 +97,7 @@ def find_param_problem(param: Param, value: object) -> tuple[str, str]:
     if number is not None and param.le is not None and number > param.le:
         return "out-of-range", f"must be at most {param.le:g}{unit}, not {describe_value(value)}"
     # If a param refers to names of the cell, `choices` allows more values; `_find_unknown_names` checks both.
-    if param.choices is not None and not param.refers and converted not in param.choices:
+    if param.choices is not None and not param.refers_to and converted not in param.choices:
         allowed = " or ".join(
             f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in param.choices
         )
@@ -143,5 +143,5 @@ def _find_named_classes(context: CheckContext) -> Iterator[tuple[str, Span]]:
     for node, skill in context.iterate_installed_skills():
         for name, value in find_literals(node):
             declaration = skill.params.get(name) or skill.ports.get(name)
-            if declaration is not None and declaration.refers == "class" and isinstance(value.value, str):
+            if declaration is not None and declaration.refers_to == "class" and isinstance(value.value, str):
                 yield value.value, value.span

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from executive.mission.check.context import CheckContext, VariableRead
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.model.node_paths import get_type_name
-from executive.mission.model.nodes import Node, UseNode
+from executive.mission.model.nodes import Node, SubtreeNode
 from executive.mission.model.values import Reference
 from executive.mission.model.wiring import (
     find_control_node_inputs,
@@ -77,7 +77,7 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
             if wire.is_explicit and wire.variable not in read_variables:
                 message = f"{wire} writes ${wire.variable}, which no node reads"
                 yield make_warning(wire.span, "unread", message)
-        if not isinstance(node, UseNode):
+        if not isinstance(node, SubtreeNode):
             continue
         for setting in node.returns.values():
             name = setting.value.name if isinstance(setting.value, Reference) else ""
@@ -109,7 +109,7 @@ def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
 def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every variable below `returns` that the subtree may not write before it succeeds."""
     for use in context.tree.walk():
-        if not isinstance(use, UseNode) or use.body is None:
+        if not isinstance(use, SubtreeNode) or use.body is None:
             continue
         subtree = context.mission.subtrees[use.name]
         end_state = context.flow_analysis.body_end_states.get(use.path)

@@ -13,7 +13,7 @@ from typing import TypeVar, cast
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.node_paths import get_type_name
-from executive.mission.model.nodes import Node, SectionNode, SkillNode, UnknownNode, UseNode
+from executive.mission.model.nodes import Node, SectionNode, SkillNode, SubtreeNode, UnknownNode
 from executive.mission.model.values import LocatedName, Reference, Setting, Value
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
 from executive.mission.source import Span
@@ -54,7 +54,7 @@ def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> ExpandedMissi
     tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)
     unused_subtrees = []
     subtree_nodes = [node for subtree in mission.subtrees.values() for node in subtree.body.walk()]
-    names_in_subtrees = {node.name for node in subtree_nodes if isinstance(node, UseNode)}
+    names_in_subtrees = {node.name for node in subtree_nodes if isinstance(node, SubtreeNode)}
     for subtree in mission.subtrees.values():
         if subtree.name in expander.used_names or subtree.library or isinstance(subtree.body, UnknownNode):
             continue
@@ -133,7 +133,7 @@ class _Expander:
 
         self.findings += self._find_shadowed_names(node, values)
         expanded = _map_parts(node, expand_part)
-        return self._expand_use(expanded, callers, depth) if isinstance(expanded, UseNode) else expanded
+        return self._expand_use(expanded, callers, depth) if isinstance(expanded, SubtreeNode) else expanded
 
     def _find_shadowed_names(self, node: Node, values: ValuesByName) -> Iterator[Finding]:
         """Yield an error for every output variable of a node that has the name of a param or argument."""
@@ -166,7 +166,7 @@ class _Expander:
         origin = f"${reference.name} in {reference.span.describe_place(value.span.source)}"
         return replace(value, origin=origin, reference_span=reference.span)
 
-    def _expand_use(self, use: UseNode, callers: tuple[str, ...], depth: int) -> Node:
+    def _expand_use(self, use: SubtreeNode, callers: tuple[str, ...], depth: int) -> Node:
         """Return the use with its expanded body; without body if the use has errors."""
         self.used_names.add(use.name)
         subtree = self.mission.subtrees.get(use.name)
@@ -198,7 +198,7 @@ class _Expander:
         body = self._rename_variables(use, body, returns)
         return replace(use, body=body, returned_variables=tuple(returns.values()))
 
-    def _rename_variables(self, use: UseNode, body: Node, returns: Mapping[str, str]) -> Node:
+    def _rename_variables(self, use: SubtreeNode, body: Node, returns: Mapping[str, str]) -> Node:
         """Return the body with unique names of local variables; returned variables get the caller's names."""
         use_number = self._use_counts[use.name]
         prefix = f"{use.name}." if use_number == 1 else f"{use.name}-{use_number}."
@@ -215,7 +215,7 @@ class _Expander:
             if isinstance(part, Reference | LocatedName):
                 return replace(part, name=rename(part.name))
             part = _map_parts(part, rename_part)
-            if isinstance(part, UseNode):
+            if isinstance(part, SubtreeNode):
                 return replace(part, returned_variables=tuple(map(rename, part.returned_variables)))
             if isinstance(part, SkillNode) and part.skill in self.skills:
                 ports = self.skills[part.skill].ports
@@ -225,7 +225,7 @@ class _Expander:
 
         return cast("Node", rename_part(body))
 
-    def _map_returned_variables(self, use: UseNode, subtree: Subtree) -> dict[str, str]:
+    def _map_returned_variables(self, use: SubtreeNode, subtree: Subtree) -> dict[str, str]:
         """Return the variables of the caller by the names of the returned variables in the subtree."""
         returned_names = subtree.returns or {}
         variables = {name: name for name in returned_names}
@@ -241,7 +241,7 @@ class _Expander:
                 self.findings.append(make_error(setting.value.span, "wrong-type", message))
         return variables
 
-    def _collect_arguments(self, use: UseNode, subtree: Subtree) -> dict[str, Value] | None:
+    def _collect_arguments(self, use: SubtreeNode, subtree: Subtree) -> dict[str, Value] | None:
         """Return the value of every argument of the subtree, or None if a value is missing."""
         for name, setting in use.arguments.items():
             if name not in subtree.arguments:

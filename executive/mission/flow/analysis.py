@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from executive.mission.findings import find_similar_word
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, UseNode
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_wires
 from executive.skill import Direction, Skill
 from executive.tree.flow import (
@@ -24,7 +24,7 @@ from executive.tree.keys import Child
 from executive.tree.node import ControlNode
 
 HALT_KEY = "halt"
-"""Key of `Skill.tool_left` for the state of the tool after a halt."""
+"""Key of `Skill.tool_state_after_failure` for the state of the tool after a halt."""
 
 
 class FlowAnalysis:
@@ -74,7 +74,7 @@ class FlowAnalysis:
                 return self._instances[node.path].compute_flow(self._analyse_child, state)
             case SkillNode():
                 return self._compute_skill_flow(node, state)
-            case UseNode(body=Node() as body):
+            case SubtreeNode(body=Node() as body):
                 return self._compute_use_flow(node, body, state)
         for child in node.children:
             self._analyse(child, UNKNOWN_STATE)
@@ -94,7 +94,7 @@ class FlowAnalysis:
         success = final_state.with_variables(outputs).apply_success(postcondition, node.path)
 
         def compute_end_state(reason: str) -> FlowState:
-            return final_state.apply_failure(skill.tool_left.get(reason), node.path)
+            return final_state.apply_failure(skill.tool_state_after_failure.get(reason), node.path)
 
         failures = {
             PossibleFailure(node.skill, reason, node.path): compute_end_state(reason)
@@ -102,7 +102,7 @@ class FlowAnalysis:
         }
         return Flow(success, failures, compute_end_state(HALT_KEY))
 
-    def _compute_use_flow(self, node: UseNode, body: Node, state: FlowState) -> Flow:
+    def _compute_use_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:
         flow = self._analyse(body, state)
         # One use may be entered in several states, for example in a loop.
         end_states = (self.body_end_states.get(node.path), flow.success)

@@ -48,7 +48,7 @@ def find_input_problem(value: object, port: Port) -> str:
     if value is None and is_assignable(type(None), port.type):
         return ""
     # Items are created during a run, so a file cannot contain an item.
-    if not is_plain_type(port.type) or port.refers == "item":
+    if not is_plain_type(port.type) or port.refers_to == "item":
         return f"must be a variable, for example ${port.name}, not {describe_value(value)}"
     try:
         convert_value(value, port.type)

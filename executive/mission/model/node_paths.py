@@ -15,8 +15,8 @@ from executive.mission.model.nodes import (
     Node,
     SectionNode,
     SkillNode,
+    SubtreeNode,
     UnknownNode,
-    UseNode,
     iterate_keys,
 )
 from executive.tree.keys import KeyKind
@@ -37,7 +37,7 @@ def get_type_name(node: Node) -> str:
     match node:
         case SkillNode():
             return node.skill
-        case UseNode():
+        case SubtreeNode():
             return node.name
         case InnerNode():
             return node.declaring_class.keyword
@@ -56,7 +56,7 @@ def _assign_path(node: Node, parent_path: str, slot: str, name: str | None = Non
     match node:
         case InnerNode():
             return replace(node, path=path, values=_assign_value_paths(node, path))
-        case UseNode(body=Node() as body):
+        case SubtreeNode(body=Node() as body):
             return replace(node, path=path, body=_assign_path(body, path, "do" if node.label else ""))
         case UnknownNode():
             return replace(node, path=path, parts=_assign_list_paths(node.parts, path))
@@ -96,7 +96,7 @@ def _assign_list_paths(nodes: tuple[Node, ...], parent_path: str) -> tuple[Node,
 
     def get_unique_name(index: int, node: Node) -> str:
         name = get_path_name(node)
-        has_own_name = bool(node.label) or isinstance(node, SkillNode | UseNode)
+        has_own_name = bool(node.label) or isinstance(node, SkillNode | SubtreeNode)
         return name if has_own_name and counts[name] == 1 else f"{index}:{name}"
 
     names = [get_unique_name(index, node) for index, node in enumerate(nodes, 1)]

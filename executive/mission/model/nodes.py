@@ -104,7 +104,7 @@ class InnerNode(Node):
 
 
 @dataclass(frozen=True)
-class UseNode(Node):
+class SubtreeNode(Node):
     """A use of a subtree.
 
     Attributes:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model import grammar
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, UnknownNode, UseNode
+from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode, UnknownNode
 from executive.mission.parse.control import (
     find_inner_keys,
     find_sibling_keys,
@@ -152,8 +152,8 @@ class NodeParser:
             message = f"use must be the name of a subtree, not {describe_node(entry.value)}"
             self.add_error(entry.value.span, "wrong-type", message)
             return make_unknown_node(entry.key.span)
-        name = entry.value.text
-        return UseNode(entry.value.span, label, name, settings.get("with", {}), settings.get("returns", {}))
+        arguments, returns = settings.get("with", {}), settings.get("returns", {})
+        return SubtreeNode(entry.value.span, label, entry.value.text, arguments, returns)
 
     def _read_label(self, node: YamlMapping) -> str:
         value = node.get("as")

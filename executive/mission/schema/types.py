@@ -126,7 +126,7 @@ def _make_param_schema(param: Param) -> Schema:
     schema |= {key: bound for key, bound in bounds.items() if bound is not None}
     if param.choices is not None:
         # A param for a name in the cell accepts the names in the cell file and the choices.
-        schema["examples" if param.refers else "enum"] = list(param.choices)
+        schema["examples" if param.refers_to else "enum"] = list(param.choices)
     if not param.is_required:
         schema["default"] = to_jsonable_python(param.default)
     return {"description": _describe_param(param), **allow_reference(schema)}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_path_name
-from executive.mission.model.nodes import InnerNode, Node, UseNode
+from executive.mission.model.nodes import InnerNode, Node, SubtreeNode
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 from executive.tree.failure import Reason
@@ -66,7 +66,7 @@ def find_failure_path(
     for index in reversed(range(len(nodes))):
         node = nodes[index]
         child = nodes[index + 1] if index + 1 < len(nodes) else None
-        subtree = next((each.name for each in reversed(nodes[:index]) if isinstance(each, UseNode)), "")
+        subtree = next((each.name for each in reversed(nodes[:index]) if isinstance(each, SubtreeNode)), "")
         control_node = make_inspection_instance(node) if isinstance(node, InnerNode) else None
         reasons = frozenset(Reason(source, reason) for source in source_names)
         propagated = _make_propagated_failure(timeline, node.path, control_node, child, reasons)

@@ -213,9 +213,9 @@ def _find_required_tool_state(runs: SkillRuns, test_run: SkillTestRun) -> tuple[
         is_unchanged = declared_state is ANY
         return (initial_state, "as before") if is_unchanged else (declared_state, "by tool_state")
     name = HALT if test_run.status == "HALTED" else test_run.reason
-    if name in runs.skill.tool_left:
-        return runs.skill.tool_left[name], f'by tool_left["{name}"]'
-    return initial_state, f'as before, because tool_left has no "{name}"'
+    if name in runs.skill.tool_state_after_failure:
+        return runs.skill.tool_state_after_failure[name], f'by tool_state_after_failure["{name}"]'
+    return initial_state, f'as before, because tool_state_after_failure has no "{name}"'
 
 
 def _is_of_type(value: Any, declared_type: Any) -> bool:

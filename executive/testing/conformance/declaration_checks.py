@@ -23,7 +23,7 @@ FORBIDDEN_PACKAGES = (
 )  # fmt: skip
 """Packages that skills must not import: skills use only the tick thread, the run's clock and the cell."""
 HALT = "halt"
-"""Key of `tool_left` for the state of the tool after a halt."""
+"""Key of `tool_state_after_failure` for the state of the tool after a halt."""
 
 
 def has_documentation(runs: SkillRuns) -> Iterator[str]:
@@ -65,7 +65,7 @@ def declares_reasons(runs: SkillRuns) -> Iterator[str]:
 
 
 def declares_resources(runs: SkillRuns) -> Iterator[str]:
-    """`uses` has only arm, tool, camera; `moves` requires arm; `tool_left` has reasons of the skill."""
+    """`uses` has only arm, tool, camera; `moves` needs arm; `tool_state_after_failure` only reasons."""
     skill, name = runs.skill, runs.name
     unknown_resources = (
         [repr(skill.uses)] if isinstance(skill.uses, str) else sorted(set(skill.uses) - set(RESOURCES))
@@ -75,10 +75,10 @@ def declares_resources(runs: SkillRuns) -> Iterator[str]:
     if skill.moves and "arm" not in skill.uses:
         yield f'{name} moves the arm but does not use it. Add "arm" to uses, or remove moves.'
     allowed_keys = (*skill.reasons, HALT)
-    for key in skill.tool_left:
+    for key in skill.tool_state_after_failure:
         if key not in allowed_keys:
-            listed = ", ".join(allowed_keys)
-            yield f'{name}.tool_left has "{key}", which is not a reason of the skill. Allowed: {listed}.'
+            problem = f'{name}.tool_state_after_failure has "{key}", which is not a reason of the skill'
+            yield f"{problem}. Allowed: {', '.join(allowed_keys)}."
 
 
 def imports_allowed_modules(runs: SkillRuns) -> Iterator[str]:

@@ -136,18 +136,18 @@ def prepare_scene(
 def _list_choices(param: Param, scene: SkillScene) -> list[Any]:
     """Return possible values of a param other than its default: choices, a name of the cell, False, True."""
     values = [False, True] if param.type is bool else list(param.choices or ())
-    values += [_find_name_in_scene(param.refers, scene)] if param.refers else []
+    values += [_find_name_in_scene(param.refers_to, scene)] if param.refers_to else []
     return [value for value in values if value not in (param.default, None)]
 
 
 def _generate_value(declared: Param | Port, scene: SkillScene) -> Any:
     """Return a valid value of a param or an input; None if no value can be generated."""
     if isinstance(declared, Port):
-        return _find_value_of_type(declared.type, declared.refers, scene)
+        return _find_value_of_type(declared.type, declared.refers_to, scene)
     if declared.choices:
         return declared.choices[0]
-    if declared.refers:
-        return _find_name_in_scene(declared.refers, scene)
+    if declared.refers_to:
+        return _find_name_in_scene(declared.refers_to, scene)
     if declared.type not in (int, float):
         return {str: f"some {declared.name}", bool: False}.get(declared.type)
     number = 1 if declared.type is int else GENERATED_NUMBER
@@ -155,19 +155,19 @@ def _generate_value(declared: Param | Port, scene: SkillScene) -> Any:
     return declared.type(number if declared.le is None else min(number, declared.le))
 
 
-def _find_value_of_type(value_type: Any, refers: str, scene: SkillScene) -> Any:
+def _find_value_of_type(value_type: Any, refers_to: str, scene: SkillScene) -> Any:
     """Return a value of this type from the scene; None if the scene has none."""
     if value_type is str:
-        return _find_name_in_scene(refers, scene)
+        return _find_name_in_scene(refers_to, scene)
     if get_origin(value_type) in (Union, types.UnionType):
-        return _find_value_of_type(get_args(value_type)[0], refers, scene)
+        return _find_value_of_type(get_args(value_type)[0], refers_to, scene)
     if value_type == list[Target]:
         return list(scene.targets)
     return {Target: scene.targets[0], Detections: scene.detections}.get(value_type)
 
 
-def _find_name_in_scene(refers: str, scene: SkillScene) -> str | None:
-    """Return a name of the kind `refers` from the scene, for instance of a bin; None: unknown kind."""
+def _find_name_in_scene(refers_to: str, scene: SkillScene) -> str | None:
+    """Return a name of the kind `refers_to` from the scene, for instance of a bin; None: unknown kind."""
     fake = scene.cell
     label = fake.ledger.get_label(scene.item)
     names = {
@@ -177,7 +177,7 @@ def _find_name_in_scene(refers: str, scene: SkillScene) -> str | None:
         "detector": next(iter(fake.detectors)),
         "pose": list(fake.arm.poses)[-1],
     }
-    return names.get(refers)
+    return names.get(refers_to)
 
 
 def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:

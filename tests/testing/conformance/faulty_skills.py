@@ -96,7 +96,7 @@ class TextForTuple(Pause):
 class BadResources(Pause):
     uses: ClassVar = ("gripper", "tool")
     moves: ClassVar = True
-    tool_left: ClassVar = {"dropped": EMPTY, "halt": EMPTY, "tired": EMPTY}
+    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": EMPTY, "tired": EMPTY}
 
 
 class StepsNotTaken(Push):
@@ -132,12 +132,12 @@ class AlwaysFails(Pause):
 class Shake(Skill):
     """Shake the held item up and down, around the height at which it is held."""
 
-    held: In[Item] = port(refers="item", doc="the item in the tool")
+    held: In[Item] = port(refers_to="item", doc="the item in the tool")
     reasons: ClassVar = ("unreachable", "blocked", "dropped")
     uses: ClassVar = ("arm", "tool")
     moves: ClassVar = True
     tool_state: ClassVar = (HOLDING, HOLDING)
-    tool_left: ClassVar = {"dropped": EMPTY, "halt": ANY}
+    tool_state_after_failure: ClassVar = {"dropped": EMPTY, "halt": ANY}
     strokes: ClassVar = (0.03, -0.03, 0.0)
 
     def run(self, cell: Cell) -> Steps:
@@ -196,7 +196,7 @@ class FailsWithoutSentence(Pause):
 
 
 class WrongOutputs(Pause):
-    chosen: Out[Item] = port(refers="item", doc="what was chosen")
+    chosen: Out[Item] = port(refers_to="item", doc="what was chosen")
     targets: Out[list[Target]] = port(doc="what there is")
     length: Out[float | None] = port(doc="how long")
 

@@ -63,7 +63,8 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ("declares_resources", faulty.BadResources, [
         "BadResources uses gripper. Write a tuple of arm, tool, camera.",
         'BadResources moves the arm but does not use it. Add "arm" to uses, or remove moves.',
-        'BadResources.tool_left has "dropped", which is not a reason of the skill. Allowed: tired, halt.',
+        'BadResources.tool_state_after_failure has "dropped", which is not a reason of the skill. '
+        "Allowed: tired, halt.",
     ]),
     ("calls_take_effect", faulty.StepsNotTaken, [
         unmade("follow"), unmade("follow"), unmade("cell.clock.sleep"), unmade("self._rest"), unmade("_wait"),
@@ -130,7 +131,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
     ]),
     ("leaves_tool_as_declared", faulty.HoldsOnWhenHalted, [
         f"{EMPTY} it was halted at tick 1, and the tool holds something. It should be empty, as before, "
-        f'because tool_left has no "halt". {TOOL}',
+        f'because tool_state_after_failure has no "halt". {TOOL}',
     ]),
     ("leaves_arm_at_rest", faulty.RunsOnWhenHalted, [
         f"{EMPTY} it was halted at tick 25, and the arm still moves. {REST}",

@@ -30,10 +30,10 @@ class Everything(Skill):
     target: In[Target] = port(doc="one")
     targets: In[list[Target]] = port(doc="all")
     detections: In[Detections] = port(doc="a look")
-    item: In[Item] = port(refers="item", doc="a name")
-    bin: In[str | None] = port(refers="bin", doc="a name")
-    label: In[str] = port(refers="class", doc="a name")
-    pose: In[str] = port(refers="pose", doc="a name")
+    item: In[Item] = port(refers_to="item", doc="a name")
+    bin: In[str | None] = port(refers_to="bin", doc="a name")
+    label: In[str] = port(refers_to="class", doc="a name")
+    pose: In[str] = port(refers_to="pose", doc="a name")
     left_out: In[Target | None] = port(default=None, doc="perhaps")
     unknown: In[dict[str, int] | None] = port(default=None, doc="perhaps")
     word: str = param(doc="any text")
@@ -43,7 +43,7 @@ class Everything(Skill):
     many: int = param(ge=3, doc="a count")
     often: bool = param(doc="a truth")
     order: str = param(choices=("rows", "columns"), doc="a choice")
-    where: str = param(refers="detector", doc="a name")
+    where: str = param(refers_to="detector", doc="a name")
 
     def run(self, cell: Cell) -> Steps:
         """Do nothing with it."""
