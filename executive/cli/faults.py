@@ -79,6 +79,6 @@ def command(
                 results = campaign.run_fault_pairs(pairs) if pairs else campaign.run_single_faults()
                 output = fault_results.results_to_json(results)
                 text = fault_results.format_results(results)
-                exit_code = int(bool(results.failed_trials)) if results.complete else ExitCode.HALTED
+                exit_code = int(bool(results.failed_trials)) if results.is_complete else ExitCode.HALTED
     print_json(output) if as_json else click.echo(text)
     ctx.exit(exit_code)

@@ -15,7 +15,7 @@ from executive.view.results.fault_results import Branch, FaultCampaignResults, T
 FAKE = ("sort_overhead", "--set", "cell.kind=fake")
 TRIAL = Trial(
     (1,), ("tree/Grasp missed, first: the suction cup cannot seal",), "Grasp", "sort.yaml:7", "missed",
-    "first", happened=True, status="SUCCESS",
+    "first", have_occurred=True, status="SUCCESS",
 )  # fmt: skip
 
 

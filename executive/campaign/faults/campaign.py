@@ -121,7 +121,7 @@ class Campaign:
             if number in trials_by_number:
                 continue
             replaced_trial = trials_by_number.get(fault.replaced_number)
-            if fault.replaced_number and (replaced_trial is None or replaced_trial.raised):
+            if fault.replaced_number and (replaced_trial is None or replaced_trial.had_effect):
                 continue
             required_faults = triggers_by_path.get(fault.location) if fault.is_conditional else ()
             if required_faults is not None and len(required_faults) < MAX_FAULTS_PER_RUN:

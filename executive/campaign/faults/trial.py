@@ -115,14 +115,14 @@ class _TrialRun:
         ]
         return replace(
             make_empty_trial(self._faults),
-            happened=all(map(self._has_occurred, faults)),
-            raised=self._has_effect(faults[-1]),
+            have_occurred=all(map(self._has_occurred, faults)),
+            had_effect=self._has_effect(faults[-1]),
             is_halted_by_user=run_end.status == "HALTED" and not self._is_stopped,
             status=run_end.status,
             reason=run_end.reason,
             message=run_end.message,
             node=run_end.node,
-            missing=self._nominal_run.placed_count - items["placed"],
+            missing_count=self._nominal_run.placed_count - items["placed"],
             items=items,
             audit=audit,
             robot_time=run_end.robot_time,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from operator import itemgetter
 
 OCCASIONS = ("first", "middle", "late", "lasting")
-"""Values of `Trial.when`; each value has a column in the table of verdicts."""
+"""Values of `Trial.occasion`; each value has a column in the table of verdicts."""
 
 
 @dataclass(frozen=True)
@@ -19,18 +19,18 @@ class Trial:
         fault_numbers: Numbers of the injected faults. The last fault is under test, and occurs only after
             all other faults.
         descriptions: Description of each fault.
-        name: Name of the skill, or of the part of the cell, that the last fault affects.
-        place: File and line of the affected node in the mission, or "".
-        what: Failure reason that the last fault should cause, or kind of the fault.
-        when: Occasion of the last fault, one of `OCCASIONS`.
-        happened: True if all faults occurred.
-        raised: True if the affected node failed with the expected reason, or if no reason is expected.
+        affected_part: Name of the skill, or of the part of the cell, that the last fault affects.
+        mission_line: File and line of the affected node in the mission, or "".
+        fault_kind: Failure reason that the last fault should cause, or kind of the fault.
+        occasion: Occasion of the last fault, one of `OCCASIONS`.
+        have_occurred: True if all faults occurred.
+        had_effect: True if the affected node failed with the expected reason, or if no reason is expected.
         is_halted_by_user: True if the user halted the run.
         status: Status of the run at its end.
         reason: Reason of the status, or "".
         message: Sentence that explains the status, or "".
         node: Path of the node that determined the status, or "".
-        missing: Number of objects in bins after a run without faults, minus the number after this run.
+        missing_count: Number of objects in bins after a run without faults, minus the number after this run.
         items: Number of items in the ledger by state.
         audit: Number of objects by their true place, or None if there was no audit.
         robot_time: Duration of the run on its clock [s].
@@ -41,18 +41,18 @@ class Trial:
 
     fault_numbers: tuple[int, ...]
     descriptions: tuple[str, ...]
-    name: str
-    place: str
-    what: str
-    when: str
-    happened: bool = False
-    raised: bool = True
+    affected_part: str
+    mission_line: str
+    fault_kind: str
+    occasion: str
+    have_occurred: bool = False
+    had_effect: bool = True
     is_halted_by_user: bool = False
     status: str = ""
     reason: str = ""
     message: str = ""
     node: str = ""
-    missing: int = 0
+    missing_count: int = 0
     items: Mapping[str, int] = field(default_factory=dict)
     audit: Mapping[str, int] | None = None
     robot_time: float = 0.0
@@ -68,15 +68,11 @@ class Trial:
     @property
     def verdict(self) -> str:
         """Verdict: `!!` (problem), `-` (fault did not occur), `ok`, `ok -N` (N objects fewer), or status."""
-        if self.problems:
-            return "!!"
-        if not self.happened:
-            return "-"
+        if self.problems or not self.have_occurred:
+            return "!!" if self.problems else "-"
         if self.status in ("SUCCESS", "INCOMPLETE"):
-            return f"ok -{self.missing}" if self.missing > 0 else "ok"
-        if self.status == "FAILURE":
-            return f"FAILURE {self.reason}"
-        return self.status
+            return f"ok -{self.missing_count}" if self.missing_count > 0 else "ok"
+        return f"FAILURE {self.reason}" if self.status == "FAILURE" else self.status
 
 
 @dataclass(frozen=True)
@@ -84,16 +80,16 @@ class Branch:
     """A branch of the tree that runs only after a failure, or at the end.
 
     Attributes:
-        place: File and line of the branch in the mission.
-        what: Kind of the branch: `catch on Grasp.missed`, `recover`, `choice 2`, `finally`.
+        mission_line: File and line of the branch in the mission.
+        name: Name of the branch: `catch on Grasp.missed`, `recover`, `choice 2`, `finally`.
         paths: Path of the root of the branch, for each use of the subtree that contains the branch.
-        entered: Number of trials that entered the branch.
+        trial_count: Number of trials that entered the branch.
     """
 
-    place: str
-    what: str
+    mission_line: str
+    name: str
     paths: tuple[str, ...]
-    entered: int = 0
+    trial_count: int = 0
 
 
 @dataclass(frozen=True)
@@ -105,22 +101,22 @@ class FaultCampaignResults:
         cell: Kind of the cell, and source of the detections, as text.
         seed: Seed of the random numbers.
         robot_time: Duration of a run without faults on its clock [s].
-        listed: Number of single faults that can be injected into the mission.
+        fault_count: Number of single faults that can be injected into the mission.
         trials: All trials, in the order of the faults.
         branches: All branches that run only after a failure or at the end, in the order of the tree.
-        complete: False if the user ended the campaign before its last run.
-        pairs: True if two faults are injected into each run.
+        is_complete: False if the user ended the campaign before its last run.
+        has_pairs: True if two faults are injected into each run.
     """
 
     mission: str
     cell: str
     seed: int
     robot_time: float
-    listed: int
+    fault_count: int
     trials: tuple[Trial, ...]
     branches: tuple[Branch, ...]
-    complete: bool
-    pairs: bool = False
+    is_complete: bool
+    has_pairs: bool = False
 
     @property
     def failed_trials(self) -> tuple[Trial, ...]:
@@ -130,32 +126,33 @@ class FaultCampaignResults:
     @property
     def unentered_branches(self) -> tuple[Branch, ...]:
         """Branches that no trial entered."""
-        return tuple(branch for branch in self.branches if not branch.entered)
+        return tuple(branch for branch in self.branches if not branch.trial_count)
 
 
 def results_to_json(results: FaultCampaignResults) -> dict[str, object]:
     """Return the results of a campaign as JSON values by key; times are in s."""
-    names = ("mission", "cell", "seed", "listed", "pairs", "complete")
     return {
-        **{name: getattr(results, name) for name in names},
-        "robot_time_s": results.robot_time,
-        "runs": len(results.trials),
-        "failed": len(results.failed_trials),
+        "mission": results.mission, "cell": results.cell, "seed": results.seed,
+        "listed": results.fault_count, "pairs": results.has_pairs, "complete": results.is_complete,
+        "robot_time_s": results.robot_time, "runs": len(results.trials), "failed": len(results.failed_trials),
         "branches": [
-            {"place": branch.place, "what": branch.what, "entered": branch.entered}
+            {"place": branch.mission_line, "what": branch.name, "entered": branch.trial_count}
             for branch in results.branches
         ],
         "trials": [trial_to_json(trial) for trial in results.trials],
-    }
+    }  # fmt: skip
 
 
 def trial_to_json(trial: Trial) -> dict[str, object]:
     """Return a trial as JSON values by key; times are in s."""
-    values = asdict(trial)
-    for name in ("fault_numbers", "descriptions", "name", "is_halted_by_user", "entered_paths", "robot_time"):
-        del values[name]
-    values |= {"fault": trial.fault_option, "verdict": trial.verdict, "robot_time_s": trial.robot_time}
-    return {**values, "descriptions": list(trial.descriptions), "problems": list(trial.problems)}
+    return {
+        "place": trial.mission_line, "what": trial.fault_kind, "when": trial.occasion,
+        "happened": trial.have_occurred, "raised": trial.had_effect, "status": trial.status,
+        "reason": trial.reason, "message": trial.message, "node": trial.node, "missing": trial.missing_count,
+        "items": trial.items, "audit": trial.audit, "problems": list(trial.problems), "remark": trial.remark,
+        "fault": trial.fault_option, "verdict": trial.verdict, "robot_time_s": trial.robot_time,
+        "descriptions": list(trial.descriptions),
+    }  # fmt: skip
 
 
 def format_results(results: FaultCampaignResults) -> str:
@@ -171,45 +168,42 @@ def format_trial(trial: Trial) -> str:
 def _list_result_lines(results: FaultCampaignResults) -> Iterator[str]:
     """Yield the lines of the text about a campaign."""
     trials = results.trials
-    faults_text = "pairs of faults" if results.pairs else "faults"
+    faults_text = "pairs of faults" if results.has_pairs else "faults"
     yield (
         f"{results.mission} ({results.cell}), seed {results.seed}: {len(trials)} runs with {faults_text}; "
         f"a run without faults takes {results.robot_time:.1f} s"
     )
-    if not results.complete:
+    if not results.is_complete:
         yield "  ended by the user before the last run"
-    if not results.pairs:
-        yield ""
-        yield from _list_table_lines(trials)
-        yield ""
+    if not results.has_pairs:
+        yield from ("", *_list_table_lines(trials), "")
     yield from _list_count_lines(trials)
     yield f"  runs with a problem: {len(results.failed_trials) or 'none'}"
     for trial in results.failed_trials:
         yield from (f"    {line}" for line in _list_trial_lines(trial))
     yield from _list_remark_lines(trials)
-    branches, unentered_branches = results.branches, results.unentered_branches
-    yield f"  branches after a failure: {len(branches) - len(unentered_branches)} of {len(branches)} entered"
+    unentered_branches, branch_count = results.unentered_branches, len(results.branches)
+    yield f"  branches after a failure: {branch_count - len(unentered_branches)} of {branch_count} entered"
     for branch in unentered_branches:
-        yield f"    never entered: {branch.place}: {branch.what}"
+        yield f"    never entered: {branch.mission_line}: {branch.name}"
 
 
 def _list_table_lines(trials: Sequence[Trial]) -> Iterator[str]:
     """Yield the lines of a table of verdicts: a row per node and kind of fault, a column per occasion."""
     trials_by_row: dict[tuple[str, str, str], dict[str, list[Trial]]] = defaultdict(lambda: defaultdict(list))
     for trial in trials:
-        trials_by_row[(trial.name, trial.place, trial.what)][trial.when].append(trial)
+        key = trial.affected_part, trial.mission_line, trial.fault_kind
+        trials_by_row[key][trial.occasion].append(trial)
     rows: list[tuple[str, ...]] = [("node", "place", "fault", *OCCASIONS)]
     # The sort is stable, so the faults of a node keep their order.
-    for name, place, what in sorted(trials_by_row, key=itemgetter(0, 1)):
-        trials_by_occasion = trials_by_row[name, place, what]
-        verdicts = (_summarize_verdicts(trials_by_occasion[occasion]) for occasion in OCCASIONS)
-        rows.append((name, place, what, *verdicts))
+    for key in sorted(trials_by_row, key=itemgetter(0, 1)):
+        rows.append((*key, *(_summarize_verdicts(trials_by_row[key][occasion]) for occasion in OCCASIONS)))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     previous_node = ("", "")
-    for name, place, *texts in rows:
-        # Only the first row of a node shows the name and the place of the node.
-        node = (name, place) if (name, place) != previous_node else ("", "")
-        previous_node = name, place
+    for part, line, *texts in rows:
+        # Only the first row of a node shows the name and the line of the node.
+        node = (part, line) if (part, line) != previous_node else ("", "")
+        previous_node = part, line
         padded = (text.ljust(width) for text, width in zip((*node, *texts), widths, strict=True))
         yield f"  {'  '.join(padded).rstrip()}"
 
@@ -259,7 +253,7 @@ def _list_remark_lines(trials: Sequence[Trial]) -> Iterator[str]:
 def _list_trial_lines(trial: Trial) -> Iterator[str]:
     """Yield the lines of the text about a trial."""
     yield f"fault {trial.fault_option}: {'; and '.join(trial.descriptions)}"
-    if not trial.happened:
+    if not trial.have_occurred:
         subject = "one of the faults" if len(trial.descriptions) > 1 else "the fault"
         yield f"  {subject} did not occur"
     status_text = " ".join(filter(None, (trial.status, trial.reason)))

@@ -75,20 +75,20 @@ def test_every_fault_is_tried_once_in_the_order_of_the_list(
     faults = Campaign(small).faults
     left_out = {number for number in range(1, len(faults) + 1) if number not in last}
     # Only what the cell brought about already is not said by the skill, too.
-    raised = {trial.fault_numbers[-1] for trial in figures.trials if trial.raised}
+    raised = {trial.fault_numbers[-1] for trial in figures.trials if trial.had_effect}
     assert left_out
     assert all(faults[number - 1].replaced_number in raised for number in left_out)
-    assert (figures.complete, figures.listed) == (True, len(faults))
+    assert (figures.is_complete, figures.fault_count) == (True, len(faults))
 
 
 def test_every_way_on_is_entered_the_one_behind_another_fault_with_it(figures: FaultCampaignResults) -> None:
-    ways = [(branch.what, branch.place.rpartition(":")[2]) for branch in figures.branches]
+    ways = [(branch.name, branch.mission_line.rpartition(":")[2]) for branch in figures.branches]
     assert ways == [
         ("finally", "18"), ("choice 2", "10"), ("catch on Grasp.missed", "15"),
         ("catch on Approach.blocked", "17"),
     ]  # fmt: skip
     assert figures.unentered_branches == ()
-    behind = next(trial for trial in figures.trials if trial.name == "RejectTarget")
+    behind = next(trial for trial in figures.trials if trial.affected_part == "RejectTarget")
     assert (len(behind.fault_numbers), behind.descriptions[0].rpartition("/")[2]) == (
         2, "Grasp missed, first: the suction cup cannot seal",
     )  # fmt: skip
@@ -98,10 +98,10 @@ def test_a_recovery_without_a_run_is_listed_with_its_position(
     figures: FaultCampaignResults, small: MissionUnderTest
 ) -> None:
     without = [trial for trial in figures.trials if "Grasp missed" not in " ".join(trial.descriptions)]
-    without = [trial for trial in without if not trial.what.startswith("no seal")]
-    assert [branch.what for branch in find_branches(small.loaded.tree, without) if not branch.entered] == [
-        "catch on Grasp.missed"
-    ]
+    without = [trial for trial in without if not trial.fault_kind.startswith("no seal")]
+    assert [
+        branch.name for branch in find_branches(small.loaded.tree, without) if not branch.trial_count
+    ] == ["catch on Grasp.missed"]
 
 
 @pytest.mark.slow
@@ -134,7 +134,7 @@ def test_after_ctrl_c_the_finished_trials_are_reported(small: MissionUnderTest) 
     messages: list[str] = []
     campaign = Campaign(small, workers=1, progress=interrupt, on_halt=lambda: messages.append("halting"))
     figures = campaign.run_single_faults()
-    assert (len(figures.trials), figures.complete, messages) == (1, False, ["halting"])
+    assert (len(figures.trials), figures.is_complete, messages) == (1, False, ["halting"])
 
 
 def test_an_unknown_number_is_refused_with_the_valid_range(campaign: Campaign) -> None:

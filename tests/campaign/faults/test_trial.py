@@ -55,7 +55,7 @@ SLOW = pytest.mark.slow
 )
 def test_a_fault_is_dealt_with(campaign: Campaign, name: str, what: str, when: str, verdict: str) -> None:
     trial = tried(campaign, number_of(campaign, name, what, when))
-    assert (trial.verdict, trial.happened, trial.raised, trial.problems) == (verdict, True, True, ())
+    assert (trial.verdict, trial.have_occurred, trial.had_effect, trial.problems) == (verdict, True, True, ())
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_a_bug_ends_the_run_as_a_fault_of_its_node(
 ) -> None:
     number = number_of(campaign, name, what, when)
     trial = tried(campaign, number)
-    assert (trial.status, trial.happened, trial.problems) == ("FAULT", True, ())
+    assert (trial.status, trial.have_occurred, trial.problems) == ("FAULT", True, ())
     assert "InjectedError" in trial.message
     assert campaign.faults[number - 1].location in (trial.node, trial.message.partition(": ")[0])
 
@@ -81,7 +81,7 @@ def test_what_runs_only_behind_another_fault_is_reached_with_it(campaign: Campai
     alone = tried(campaign, behind)
     assert (alone.verdict, alone.status) == ("-", "SUCCESS")
     both = tried(campaign, number_of(campaign, "Transit", "unreachable"), behind)
-    assert (both.verdict, both.raised, both.problems) == ("ok", True, ())
+    assert (both.verdict, both.had_effect, both.problems) == ("ok", True, ())
     assert campaign.faults[behind - 1].location in both.entered_paths
     assert both.fault_option.endswith(f"+{behind}")
 
@@ -95,7 +95,7 @@ def test_no_skill_says_that_it_dropped_what_sticks(campaign: Campaign) -> None:
 def test_what_cannot_happen_there_found_no_occasion(campaign: Campaign) -> None:
     # The camera of the cell sees the whole table: nothing moves before the first look.
     trial = tried(campaign, number_of(campaign, "MoveToScan", "unreachable"))
-    assert (trial.verdict, trial.raised) == ("-", False)
+    assert (trial.verdict, trial.had_effect) == ("-", False)
 
 
 def test_a_run_that_never_ends_is_ended_and_found(campaign: Campaign) -> None:

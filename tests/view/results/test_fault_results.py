@@ -15,20 +15,22 @@ from executive.view.results.fault_results import (
 
 MISSED = Trial(
     (1,), ("tree/Grasp missed, first: nothing seals",), "Grasp", "sort.yaml:7", "missed", "first",
-    happened=True, status="SUCCESS",
+    have_occurred=True, status="SUCCESS",
 )  # fmt: skip
-LASTING = replace(MISSED, fault_numbers=(2,), when="lasting", missing=3)
-AGAIN = replace(MISSED, fault_numbers=(3,), missing=0)
+LASTING = replace(MISSED, fault_numbers=(2,), occasion="lasting", missing_count=3)
+AGAIN = replace(MISSED, fault_numbers=(3,), missing_count=0)
 STUCK = replace(
-    MISSED, fault_numbers=(4,), name="Release", place="sort.yaml:9", what="stuck", status="FAILURE",
-    reason="Release.stuck", message="it hangs", node="tree/Release",
+    MISSED, fault_numbers=(4,), affected_part="Release", mission_line="sort.yaml:9", fault_kind="stuck",
+    status="FAILURE", reason="Release.stuck", message="it hangs", node="tree/Release",
 )  # fmt: skip
 NOWHERE = replace(
-    MISSED, fault_numbers=(1, 5), name="Wait", place="sort.yaml:9", what="raises", happened=False
-)
+    MISSED, fault_numbers=(1, 5), affected_part="Wait", mission_line="sort.yaml:9", fault_kind="raises",
+    have_occurred=False,
+)  # fmt: skip
 WRONG = replace(
     STUCK, fault_numbers=(6,), problems=("the arm is not at rest",), remark="it says Release.stuck",
-    name="object", place="", what="taken", when="late", descriptions=("object taken, late: from 8.00 s on",),
+    affected_part="object", mission_line="", fault_kind="taken", occasion="late",
+    descriptions=("object taken, late: from 8.00 s on",),
 )  # fmt: skip
 BRANCHES = (
     Branch("sort.yaml:12", "catch on Grasp.missed", ("tree/try/catch/1",), 2),
@@ -60,7 +62,7 @@ def test_a_cell_of_several_runs_tells_how_many_were_ok_and_the_worst_of_the_othe
     assert cell(MISSED, failed, failed) == "ok 1/3, FAILURE Grasp.missed"
     assert cell(MISSED, failed, replace(MISSED, problems=("bad",))) == "ok 1/3, !!"
     # A fault that did not occur was also tried at another time.
-    assert cell(MISSED, replace(MISSED, happened=False)) == "ok"
+    assert cell(MISSED, replace(MISSED, have_occurred=False)) == "ok"
 
 
 def test_problems_and_recoveries_never_entered_are_printed_with_their_positions() -> None:
@@ -82,8 +84,8 @@ def test_problems_and_recoveries_never_entered_are_printed_with_their_positions(
 def test_pairs_have_no_matrix_a_campaign_cut_short_says_so_and_one_run_is_a_few_lines() -> None:
     lines = ["fault 1+5: tree/Grasp missed, first: nothing seals", "  the fault did not occur", "  SUCCESS"]
     assert format_trial(NOWHERE).splitlines() == lines
-    lines = format_results(replace(FIGURES, pairs=True, complete=False, trials=(NOWHERE,))).splitlines()
-    assert lines[:3] == [
+    text = format_results(replace(FIGURES, has_pairs=True, is_complete=False, trials=(NOWHERE,)))
+    assert text.splitlines()[:3] == [
         "sort (fake), seed 3: 1 runs with pairs of faults; a run without faults takes 11.5 s",
         "  ended by the user before the last run",
         "  as without faults: 0; fewer objects sorted: 0; failed: 0; ended as FAULT: 0; "
