@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 from numpy.typing import ArrayLike
 
 from executive.geometry import Array, Pose
-from executive.motion.limits import JointRange
+from executive.motion.joints import JointRange
 
 BranchKey = tuple[float, ...]
 """Key of a branch of the inverse kinematics; the meaning of the numbers depends on the arm.

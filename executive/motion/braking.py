@@ -16,7 +16,7 @@ from ruckig import ControlInterface, InputParameter, Ruckig
 from ruckig import Trajectory as Profile
 
 from executive.geometry import Array
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 
 MIN_BRAKING_TIME = 0.02

@@ -12,8 +12,7 @@ from executive.geometry import Array
 from executive.motion.arm_model import BranchKey, Kinematics
 from executive.motion.cartesian_line import WAYPOINT_COUNT, CartesianLine
 from executive.motion.configurations import find_configuration_pairs, solve_vertical_waypoints
-from executive.motion.limits import JointLimits, compute_min_time
-from executive.motion.state import JointState
+from executive.motion.joints import JointLimits, JointState, compute_min_time
 
 MIN_JOINT_DIFFERENCE = 0.2
 """Minimum difference between two candidates in the joint that differs most [rad]."""

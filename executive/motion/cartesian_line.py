@@ -19,8 +19,7 @@ from ruckig import Trajectory as Profile
 from scipy.interpolate import CubicSpline
 
 from executive.geometry import Array
-from executive.motion.limits import JointLimits
-from executive.motion.state import JointState
+from executive.motion.joints import JointLimits, JointState
 
 WAYPOINT_COUNT = 4
 """Number of inverse-kinematics solutions along a line."""
@@ -31,7 +30,7 @@ _MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for
 
 
 class CartesianLine:
-    """A straight motion of the tool; implements `executive.motion.state.MotionPiece`.
+    """A straight motion of the tool; implements `executive.motion.trajectory.MotionPiece`.
 
     If the tool moves at one end of the line, its speed there is the highest from which it can stop on it.
 

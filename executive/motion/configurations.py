@@ -11,7 +11,7 @@ from executive.cell.arm import Goal
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose, make_tool_down_pose
 from executive.motion.arm_model import BranchKey, Kinematics, Solutions, wrap_angles
-from executive.motion.limits import JointRange
+from executive.motion.joints import JointRange
 
 PREFERRED_LIMIT_DISTANCE = math.radians(1.0)
 """Preferred minimum distance of joint positions from their limits [rad]."""

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
 from executive.motion.arm_model import BranchKey, Solutions, wrap_angles
-from executive.motion.limits import JointRange
+from executive.motion.joints import JointRange
 
 IIWA14_JOINT_COUNT = 7
 """Number of joints of the arm."""

@@ -16,10 +16,9 @@ import numpy as np
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
 from executive.motion.clearance_model import ClearanceModel, Discs
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits, JointState
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import Connector, JointLimitError, PointToPoint
-from executive.motion.state import JointState
 from executive.motion.transcription import (
     SAMPLES_PER_STEP,
     STEP_COUNT,

@@ -23,7 +23,7 @@ from executive.errors import Blocked, Unreachable
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import JointLimitError
 from executive.motion.search import MotionSearch

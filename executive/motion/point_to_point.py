@@ -12,8 +12,7 @@ from ruckig import Trajectory as Profile
 
 from executive.errors import Fault
 from executive.geometry import Array
-from executive.motion.limits import JointLimits
-from executive.motion.state import JointState
+from executive.motion.joints import JointLimits, JointState
 
 _ROUNDING_ERROR = 1e-9  # fraction of a limit
 
@@ -23,7 +22,7 @@ class JointLimitError(ValueError):
 
 
 class PointToPoint:
-    """A motion between two joint states; implements `executive.motion.state.MotionPiece`."""
+    """A motion between two joint states; implements `executive.motion.trajectory.MotionPiece`."""
 
     def __init__(self, profile: Profile) -> None:
         self._profile = profile

@@ -19,12 +19,11 @@ from executive.motion.candidates import Candidate, find_candidates
 from executive.motion.cartesian_line import WAYPOINT_COUNT, CartesianLine
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.configurations import find_vertical_waypoints, solve_vertical_waypoints
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits, JointState
 from executive.motion.optimizer import OptimizationProblem, Optimizer
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import Connector, JointLimitError
-from executive.motion.state import JointState, MotionPiece
-from executive.motion.trajectory import Trajectory, sample_pieces
+from executive.motion.trajectory import MotionPiece, Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS
 
 MAX_CANDIDATES = 3

@@ -8,18 +8,32 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
+from typing import Protocol
 
 import numpy as np
 
 from executive.cell.clock import STEP
 from executive.errors import Fault, Unreachable
 from executive.geometry import Array
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits, JointState
 from executive.motion.point_to_point import JointLimitError
-from executive.motion.state import JointState, MotionPiece
 
 _ROUNDING_ERROR = 1e-6
 """Maximum difference of joint states that count as equal [rad, rad/s, rad/s²]."""
+
+
+class MotionPiece(Protocol):
+    """A piece of a motion, from time 0 to its duration."""
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+
+    def state_at(self, time: float) -> JointState:
+        """Return the state at `time`, 0 to `duration` [s]."""
+
+    def sample(self, times: Array) -> JointState:
+        """Return the states at `times` `(N,)` [s], each array of shape `(N, n)`."""
 
 
 class Trajectory:

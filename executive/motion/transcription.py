@@ -25,8 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.geometry import Array
-from executive.motion.limits import JointLimits
-from executive.motion.state import JointState
+from executive.motion.joints import JointLimits, JointState
 
 STEP_COUNT = 8
 """Number of time steps of a motion."""

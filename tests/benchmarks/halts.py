@@ -30,7 +30,7 @@ from executive.errors import ExecutiveError
 from executive.events import RunEnded
 from executive.geometry import Array
 from executive.ledger.outcomes import is_balanced
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import load_cell_kind
 from executive.record.journal import Journal, read_journal

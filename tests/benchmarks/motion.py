@@ -23,8 +23,8 @@ from executive.cells.sim.world import World
 from executive.errors import Blocked, InputError, Unreachable
 from executive.geometry import Array
 from executive.motion.braking import plan_braking
+from executive.motion.joints import JointState
 from executive.motion.planner import Planner
-from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory, compute_peak_fractions
 from tests.benchmarks import motion_baselines as baselines
 from tests.benchmarks.motion_execution import execute_pairs

@@ -20,9 +20,8 @@ from executive.cell.clock import STEP
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
 from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
-from executive.motion.limits import JointLimits, compute_min_time
+from executive.motion.joints import JointLimits, JointState, compute_min_time
 from executive.motion.point_to_point import Connector
-from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 from tests.motion.joint_states import reach
 

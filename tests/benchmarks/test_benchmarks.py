@@ -23,9 +23,8 @@ from executive.cell.config import CellConfig
 from executive.cells.fake.cell import FakeCell
 from executive.events import TimedEvent
 from executive.motion.braking import plan_braking
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits, JointState
 from executive.motion.point_to_point import Connector
-from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 from executive.record.result import Audit, ItemCounts, Result
 from tests.benchmarks import damaged_records, halts, journal, kills, report, soak, suction_map, tick

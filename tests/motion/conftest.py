@@ -12,7 +12,7 @@ from executive.cell.config import CellConfig
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
 from executive.motion.arms import build_kinematics, build_planner
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits
 from executive.motion.planner import Planner
 from executive.motion.point_to_point import Connector
 

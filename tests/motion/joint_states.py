@@ -10,8 +10,8 @@ from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.arm_model import Kinematics
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.limits import JointLimits, JointRange
-from executive.motion.state import JointState, MotionPiece
+from executive.motion.joints import JointLimits, JointRange, JointState
+from executive.motion.trajectory import MotionPiece
 
 POSITION_LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
 """Of an iiwa 14 [rad]."""

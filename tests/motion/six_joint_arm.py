@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from executive.errors import Unreachable
 from executive.geometry import Array, Pose
 from executive.motion.arm_model import BranchKey, Solutions, wrap_angles
-from executive.motion.limits import JointRange
+from executive.motion.joints import JointRange
 
 HEIGHT, UPPER_ARM, FOREARM, WRIST_TO_FLANGE = 0.30, 0.45, 0.42, 0.10  # [m]
 AXES = "zyyzyz"

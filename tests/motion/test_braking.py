@@ -9,7 +9,7 @@ from joint_states import positions
 from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.braking import plan_braking
-from executive.motion.state import JointState
+from executive.motion.joints import JointState
 from executive.motion.trajectory import Trajectory
 
 STEP = 1 / 240

@@ -14,7 +14,7 @@ from executive.errors import Unreachable
 from executive.geometry import Array
 from executive.motion.configurations import find_configuration_pairs, find_vertical_waypoints
 from executive.motion.iiwa14_kinematics import Iiwa14
-from executive.motion.limits import JointRange
+from executive.motion.joints import JointRange
 
 ARM = Iiwa14(0.12, LIMITS.position)
 START = np.radians([38, 33, 0, -88, 0, 59, 20])

@@ -11,7 +11,7 @@ from pybullet_utils.bullet_client import BulletClient
 
 from executive.geometry import Pose
 from executive.motion.iiwa14_kinematics import Iiwa14
-from executive.motion.limits import JointRange
+from executive.motion.joints import JointRange
 
 LIMIT = np.radians([170, 120, 170, 120, 170, 120, 175])
 ARM = Iiwa14(0.12, JointRange(-LIMIT, LIMIT))

@@ -11,10 +11,10 @@ from joint_states import LIMITS, passed, peaks, positions
 from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.geometry import Array, make_tool_down_pose
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
+from executive.motion.joints import JointState
 from executive.motion.optimizer import OptimizationProblem, Optimizer
 from executive.motion.payload import PayloadLimit
 from executive.motion.point_to_point import JointLimitError
-from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory, sample_pieces
 from executive.motion.transcription import SAMPLE_FRACTIONS
 

@@ -16,7 +16,7 @@ from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked, Unreachable
 from executive.motion.arm_model import Kinematics
 from executive.motion.configurations import find_configuration_pairs
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits
 from executive.motion.planner import Planner
 
 LIMITS = LimitsConfig(

@@ -9,8 +9,8 @@ import pytest
 
 from executive.cell.objects import Load, ObjectClass
 from executive.geometry import GRAVITY
+from executive.motion.joints import JointState
 from executive.motion.payload import DISTANCE_PER_ACCELERATION, SAFETY_FACTOR, SAMPLE_STRIDE, PayloadLimit
-from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory
 from executive.motion.transcription import SAMPLE_FRACTIONS, SAMPLES_PER_STEP, STEP_COUNT
 

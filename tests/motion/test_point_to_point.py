@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from joint_states import LIMITS, passed, peaks, states
 
 from executive.errors import Fault
+from executive.motion.joints import JointState
 from executive.motion.point_to_point import Connector, JointLimitError
-from executive.motion.state import JointState
 
 CONNECTOR = Connector(LIMITS)
 STILL = JointState.at_rest(np.zeros(7))

@@ -13,8 +13,8 @@ from joint_states import LIMITS, positions, states
 from executive.cell.clock import STEP
 from executive.cells.sim.rebuild import build_trajectory
 from executive.errors import Fault, Unreachable
+from executive.motion.joints import JointState
 from executive.motion.point_to_point import Connector, JointLimitError
-from executive.motion.state import JointState
 from executive.motion.trajectory import Trajectory, compute_peak_fractions, downsample_path
 
 CONNECTOR = Connector(LIMITS)

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from joint_states import LIMITS, positions, shares
 
 from executive.geometry import Array
+from executive.motion.joints import JointState
 from executive.motion.point_to_point import Connector
-from executive.motion.state import JointState
 from executive.motion.transcription import (
     SAMPLES_PER_STEP,
     STEP_COUNT,

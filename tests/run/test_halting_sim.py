@@ -18,7 +18,7 @@ from executive.cells.sim.cell import SimCell
 from executive.events import NodeEnded, NodeStarted, RunEnded
 from executive.geometry import Array
 from executive.mission.load import load_mission
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import load_skills
 from executive.record.journal import Journal, read_journal

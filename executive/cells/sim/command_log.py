@@ -17,7 +17,7 @@ import numpy as np
 from executive.cells.log_file import LogFile
 from executive.errors import Fault, InputError, explain_os_errors
 from executive.geometry import Array
-from executive.motion.state import JointState
+from executive.motion.joints import JointState
 from executive.motion.trajectory import Trajectory
 
 FORMAT_VERSION = 2

@@ -11,7 +11,7 @@ from executive.cells.sim.tool import TOUCH_DISTANCE
 from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
 from executive.motion.arms import build_kinematics
-from executive.motion.limits import JointLimits, compute_min_time
+from executive.motion.joints import JointLimits, compute_min_time
 
 REDUNDANCY_ANGLE_STEP = np.radians(20.0)
 """Difference between neighbouring samples of the redundancy angle [rad]."""

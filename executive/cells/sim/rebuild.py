@@ -16,7 +16,7 @@ from executive.cells.sim.command_log import Command, get_joint_states
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
-from executive.motion.state import JointState
+from executive.motion.joints import JointState
 from executive.motion.trajectory import Trajectory
 
 
@@ -108,7 +108,7 @@ def rebuild_world(world: World, tool: SuctionTool, commands: Iterable[Command]) 
 
 
 class SampledMotion:
-    """Quintic spline through the samples of a motion; implements `executive.motion.state.MotionPiece`.
+    """Quintic spline through the samples of a motion; implements `executive.motion.trajectory.MotionPiece`.
 
     Args:
         states: States at multiples of `STEP` and at the end; each array has the shape `(N, n)`.

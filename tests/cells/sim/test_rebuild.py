@@ -18,7 +18,7 @@ from executive.cells.sim.command_log import JOINT_TARGETS, CommandLog
 from executive.events import discard_event
 from executive.geometry import Array
 from executive.mission.load import load_mission
-from executive.motion.limits import JointLimits
+from executive.motion.joints import JointLimits
 from executive.motion.trajectory import Trajectory
 from executive.plugins import load_skills
 from executive.run.assembly import RunOptions, assemble

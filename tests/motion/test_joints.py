@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joint_states import LIMITS, shares
 
-from executive.motion.limits import JointLimits, compute_min_time
+from executive.motion.joints import JointLimits, JointState, compute_min_time
 from executive.motion.point_to_point import Connector
-from executive.motion.state import JointState
 
 CONNECTOR = Connector(LIMITS)
 

@@ -1,4 +1,4 @@
-"""Joint limits as arrays in SI units, and the minimum time of a motion within the limits."""
+"""State, range and limits of the joints of an arm, and the minimum time of a motion within the limits."""
 
 from __future__ import annotations
 
@@ -11,6 +11,19 @@ from numpy.typing import NDArray
 
 from executive.cell.config import LimitsConfig
 from executive.geometry import Array
+
+
+class JointState(NamedTuple):
+    """Position [rad], velocity [rad/s] and acceleration [rad/s²] of `n` joints, each `(n,)` or `(N, n)`."""
+
+    q: Array
+    qd: Array
+    qdd: Array
+
+    @staticmethod
+    def at_rest(q: Array) -> JointState:
+        """Return the state of rest at `q` `(n,)` [rad]."""
+        return JointState(q, np.zeros(len(q)), np.zeros(len(q)))
 
 
 class JointRange(NamedTuple):
