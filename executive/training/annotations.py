@@ -6,10 +6,10 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import yaml
-from pydantic import BaseModel, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, Field, FiniteFloat, TypeAdapter, ValidationError
 
 from executive.cell.frame import Box
 from executive.cell.paths import has_outside_link, is_outside_path
@@ -130,7 +130,7 @@ def read_annotations(split: Path) -> Annotations:
 def _read_coco(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
     """Yield the path and the objects of each image of a split in COCO format."""
     file = split / COCO_FILE_NAME
-    content = parse_file(file, MAX_COCO_FILE_SIZE, _CocoFile.model_validate_json)
+    content = _parse_file(file, MAX_COCO_FILE_SIZE, _CocoFile.model_validate_json)
     class_names = {category.id: category.name for category in content.categories}
     annotations = {image.id: ImageAnnotation() for image in content.images}
     for message, keys in (
@@ -167,7 +167,7 @@ def _read_yolo(split: Path) -> Iterator[tuple[Path, ImageAnnotation]]:
         """Return the class file; `BaseLoader` reads each name as text, for instance `no`."""
         return _YoloClassFile.model_validate(yaml.load(text, Loader=yaml.BaseLoader))
 
-    names = parse_file(class_file, MAX_CLASS_FILE_SIZE, parse).names
+    names = _parse_file(class_file, MAX_CLASS_FILE_SIZE, parse).names
     class_names = dict(enumerate(names)) if isinstance(names, list) else names
     folder = split / "images"
     for path in folder.iterdir():
@@ -215,19 +215,19 @@ def _read_labels(file: Path, class_names: Mapping[int, str]) -> ImageAnnotation:
     return annotation
 
 
-def _find_image(folder: Path, name: str, source: str) -> Path:
-    """Return the path of an image; in error messages, `source` names the file and key with the name.
+def _find_image(folder: Path, name: str, place: str) -> Path:
+    """Return the path of the image `name`; `place` (file and key) starts the error messages.
 
     Raises:
         InputError: The image is missing, is not a regular file, or lies outside of the folder.
     """
     path = folder / name
     if not name or is_outside_path(name):
-        raise InputError(f'{source}: "{name}" is not below {folder}')
+        raise InputError(f'{place}: "{name}" is not below {folder}')
     if not os.path.isfile(path):
-        raise InputError(f'{source}: "{name}" is not a file in {folder}')
+        raise InputError(f'{place}: "{name}" is not a file in {folder}')
     if has_outside_link(folder, name):
-        raise InputError(f'{source}: "{name}" is a link to a file outside of {folder}')
+        raise InputError(f'{place}: "{name}" is a link to a file outside of {folder}')
     return path
 
 
@@ -243,7 +243,13 @@ def _read_text(file: Path, max_size: int) -> str:
         raise InputError(f"{file} cannot be read: {error}") from error
 
 
-def parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> ContentT:
+def read_json(file: Path) -> dict[str, Any]:
+    """Return the values in a JSON file by file name of the image; {} if the JSON file does not exist."""
+    parse = TypeAdapter(dict[str, Any]).validate_json
+    return _parse_file(file, MAX_COCO_FILE_SIZE, parse) if file.is_file() else {}
+
+
+def _parse_file(file: Path, max_size: int, parse: Callable[[str], ContentT]) -> ContentT:
     """Return the parsed content of a file of at most `max_size` [byte].
 
     Raises:

@@ -66,25 +66,23 @@ def compress_weights(model: onnx.ModelProto) -> onnx.ModelProto:
     return compressed
 
 
-def _to_float16(name: str, values: NDArray[np.float32], added_nodes: list[Any]) -> list[onnx.TensorProto]:
-    """Return a weight as float16; append its conversion node (to float32) to `added_nodes`."""
+def _to_float16(name: str, values: NDArray[np.float32], nodes: list[Any]) -> list[onnx.TensorProto]:
+    """Return a weight as float16; append its conversion node (to float32) to `nodes`."""
     tensor = numpy_helper.from_array(values.astype(np.float16), f"{name}_half")
-    added_nodes.append(helper.make_node("Cast", [tensor.name], [name], to=TensorProto.FLOAT))
+    nodes.append(helper.make_node("Cast", [tensor.name], [name], to=TensorProto.FLOAT))
     return [tensor]
 
 
-def _to_int8(
-    name: str, values: NDArray[np.float32], axis: int, added_nodes: list[Any]
-) -> list[onnx.TensorProto]:
-    """Return a weight as int8, and its scales; append its conversion nodes (to float32) to `added_nodes`."""
+def _to_int8(name: str, values: NDArray[np.float32], axis: int, nodes: list[Any]) -> list[onnx.TensorProto]:
+    """Return a weight as int8, and its scales; append its conversion nodes (to float32) to `nodes`."""
     other_axes = tuple(index for index in range(values.ndim) if index != axis)
     # The largest weight of each output channel becomes 127, the maximum of int8.
     scales = np.abs(values).max(axis=other_axes, keepdims=True) / 127
     scales = np.where(scales == 0, 1, scales).astype(np.float32)
     tensor = numpy_helper.from_array(np.round(values / scales).astype(np.int8), f"{name}_int8")
     scale_tensor = numpy_helper.from_array(scales, f"{name}_scale")
-    added_nodes.append(helper.make_node("Cast", [tensor.name], [f"{name}_wide"], to=TensorProto.FLOAT))
-    added_nodes.append(helper.make_node("Mul", [f"{name}_wide", scale_tensor.name], [name]))
+    nodes.append(helper.make_node("Cast", [tensor.name], [f"{name}_wide"], to=TensorProto.FLOAT))
+    nodes.append(helper.make_node("Mul", [f"{name}_wide", scale_tensor.name], [name]))
     return [tensor, scale_tensor]
 
 

@@ -99,18 +99,17 @@ def write_annotations(
 def _to_coco(entries: Sequence[DatasetEntry], classes: Sequence[str]) -> dict[str, Any]:
     """Return the content of the COCO file of a split."""
     images: list[dict[str, Any]] = []
-    annotations: list[dict[str, Any]] = []
+    objects: list[dict[str, Any]] = []
     for image_id, entry in enumerate(entries):
         width, height = entry.size
         images.append({"id": image_id, "file_name": entry.file, "width": width, "height": height})
         for label, (left, top, right, bottom) in zip(entry.labels, entry.boxes, strict=True):
             box = [round(value, 3) for value in (left, top, right - left, bottom - top)]
             area = round((right - left) * (bottom - top), 3)
-            ids = {"id": len(annotations) + 1, "image_id": image_id, "category_id": classes.index(label)}
-            annotations.append({**ids, "bbox": box, "area": area, "iscrowd": 0, "segmentation": []})
+            ids = {"id": len(objects) + 1, "image_id": image_id, "category_id": classes.index(label)}
+            objects.append({**ids, "bbox": box, "area": area, "iscrowd": 0, "segmentation": []})
     categories = [{"id": i, "name": name, "supercategory": "object"} for i, name in enumerate(classes)]
-    lists = {"categories": categories, "images": images, "annotations": annotations}
-    return {"info": {}, "licenses": [], **lists}
+    return {"info": {}, "licenses": [], "categories": categories, "images": images, "annotations": objects}
 
 
 def _write_yolo(folder: Path, entries: Sequence[DatasetEntry], classes: Sequence[str]) -> None:

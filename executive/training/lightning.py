@@ -8,7 +8,9 @@ import torch
 from rfdetr.training import RFDETRDataModule, RFDETRModelModule
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
-from executive.training.symmetry import SYMMETRY_COUNT, transform_boxes, transform_image
+SYMMETRY_COUNT = 8
+"""Number of symmetries of the square. Symmetry 2 k rotates by k quarter turns anticlockwise; symmetry 2 k + 1
+first mirrors left to right, then rotates by k quarter turns."""
 
 
 class SymmetryAugmentedData(RFDETRDataModule):
@@ -45,9 +47,8 @@ class MixedPrecisionModel(RFDETRModelModule):
         super().__init__(model_config, train_config)
         self._is_mixed = is_mixed
         # Reference boxes have the data type of the encoder's features, and must stay in float32.
-        self.model.backbone[0].projector.register_forward_hook(
-            lambda _module, _inputs, output: to_float32(output)
-        )
+        projector = self.model.backbone[0].projector
+        projector.register_forward_hook(lambda _module, _inputs, output: to_float32(output))
 
     def training_step(self, batch: tuple[Any, Any], batch_idx: int) -> Any:
         """Return the loss of a batch."""
@@ -62,6 +63,23 @@ class MixedPrecisionModel(RFDETRModelModule):
         loss = torch.stack([losses[name] * weights[name] for name in losses if name in weights]).sum()
         self.log("train/loss", loss, on_epoch=True, on_step=False, batch_size=len(targets))
         return loss
+
+
+def transform_image(image: torch.Tensor, symmetry: int) -> torch.Tensor:
+    """Return `image` `(..., N, N)`, transformed by the symmetry with the number `symmetry`, 0 to 7."""
+    mirrored = image.flip(-1) if symmetry % 2 else image
+    return mirrored.rot90(symmetry // 2, (-2, -1))
+
+
+def transform_boxes(boxes: torch.Tensor, symmetry: int) -> torch.Tensor:
+    """Return `boxes` `(N, 4)` (centre x and y, width, height; 0 to 1), transformed by a symmetry, 0 to 7."""
+    x, y, width, height = boxes.unbind(-1)
+    if symmetry % 2:
+        x = 1 - x
+    for _ in range(symmetry // 2):
+        # A quarter turn anticlockwise moves the right edge of the image to the top.
+        x, y, width, height = y, 1 - x, height, width
+    return torch.stack((x, y, width, height), dim=-1)
 
 
 def to_float32(value: Any) -> Any:

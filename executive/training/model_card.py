@@ -43,9 +43,7 @@ def render_card(
         thresholds = sorted({evaluation.threshold for evaluation in evaluations.values()})
         rows = []
         for dataset, evaluation in evaluations.items():
-            metrics = [
-                template.format(getattr(evaluation, name)) for name, template in METRIC_COLUMNS.values()
-            ]
+            metrics = [pattern.format(getattr(evaluation, name)) for name, pattern in METRIC_COLUMNS.values()]
             errors = [_format_distribution(values) for values in (evaluation.centre, evaluation.position)]
             rows.append([dataset, *metrics, *errors])
         blocks += [

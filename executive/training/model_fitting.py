@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytorch_lightning
 import torch
+from rfdetr import RFDETR
 from rfdetr.training import build_trainer
 
 from executive.training.architecture import create_model
@@ -29,7 +30,8 @@ def fit_model(
     if not has_gpu:
         torch.set_num_threads(CPU_THREAD_COUNT)
     pytorch_lightning.seed_everything(settings.seed, workers=True, verbose=False)
-    labels = read_class_names(dataset)
+    # Exports of Roboflow contain a parent category, which rfdetr omits because the category is no class.
+    labels = list(RFDETR._load_classes(str(dataset)))
     learning_rate = settings.learning_rate or choose_learning_rate(start_model, labels)
     if start_model is not None and start_model.suffix == ".onnx":
         start_model = _write_checkpoint(start_model, out)
@@ -72,14 +74,6 @@ def _write_checkpoint(model: Path, out: Path) -> Path:
     path = out / "start.pth"
     torch.save({"model": restore_model(model).model.model.state_dict()}, path)
     return path
-
-
-def read_class_names(dataset: Path) -> list[str]:
-    """Return the class names of a COCO or YOLO dataset in the order of the model's outputs."""
-    from rfdetr import RFDETR
-
-    # Exports of Roboflow contain a parent category, which rfdetr omits because the category is no class.
-    return list(RFDETR._load_classes(str(dataset)))
 
 
 def has_bfloat16() -> bool:

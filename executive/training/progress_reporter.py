@@ -15,17 +15,13 @@ class ProgressReporter(Callback):
     def __init__(self, report_epoch: ReportEpoch, report_batch: ReportBatch) -> None:
         self._report_epoch, self._report_batch = report_epoch, report_batch
 
-    def on_train_batch_end(
-        self, trainer: Any, pl_module: Any, outputs: Any, batch: Any, batch_idx: int
-    ) -> None:
+    def on_train_batch_end(self, trainer: Any, _model: Any, _loss: Any, _batch: Any, batch_idx: int) -> None:
         """Report the number of finished batches and the number of all batches, over all epochs."""
-        del pl_module, outputs, batch
         epoch_size = trainer.num_training_batches
         finished_count = trainer.current_epoch * epoch_size + batch_idx + 1
         self._report_batch(finished_count, trainer.max_epochs * epoch_size)
 
-    def on_train_epoch_end(self, trainer: Any, pl_module: Any) -> None:
+    def on_train_epoch_end(self, trainer: Any, _model: Any) -> None:
         """Report the metrics of the epoch on the training images and on the validation images."""
-        del pl_module
         metrics = {name: float(value) for name, value in trainer.callback_metrics.items()}
         self._report_epoch(trainer.current_epoch + 1, metrics)

@@ -63,7 +63,7 @@ def generate_dataset(
     write_annotations(out, layout, [], classes)
     train_count = image_count - round(image_count * valid_fraction)
     render = partial(_render_dataset_images, cells, out, layout, seed, train_count)
-    entries = _render_in_blocks(render, image_count, worker_count, progress)
+    entries = _render_blocks(render, image_count, worker_count, progress)
     write_annotations(out, layout, entries, classes)
 
 
@@ -83,11 +83,10 @@ def render_run_frames(
         progress: Called after each block of `BLOCK_SIZE` frames.
         scene: Differences of the simulated world from the cell file.
     """
-    render = partial(_render_frames, config, scene, seed)
-    return _render_in_blocks(render, image_count, worker_count, progress)
+    return _render_blocks(partial(_render_frames, config, scene, seed), image_count, worker_count, progress)
 
 
-def _render_in_blocks(
+def _render_blocks(
     render: Callable[[range], dict[int, ResultT]], count: int, worker_count: int, progress: ReportProgress
 ) -> list[ResultT]:
     """Return the results of `render` for images 0 to `count` - 1, in order, from worker processes."""

@@ -51,7 +51,7 @@ def restore_model(model: Path) -> Any:
                 "in the architecture that `executive train` trains; start from a model of `executive train`"
             )
         candidates = _find_candidate_tensors(weights_by_name, name)
-        matching_view = next((view for view in candidates if _is_equal(view, values)), None)
+        matching_view = next((view for view in candidates if np.array_equal(view.numpy(), values)), None)
         # An initializer without a matching tensor is a constant of the graph.
         if matching_view is not None:
             matching_view.copy_(torch.from_numpy(stored_weights[name]))
@@ -88,11 +88,6 @@ def _find_candidate_tensors(weights_by_name: dict[str, torch.Tensor], name: str)
             if view.ndim == 2:
                 yield view.T
                 yield view[None]
-
-
-def _is_equal(view: torch.Tensor, values: Array) -> bool:
-    """Return True if a tensor has the shape and the values of an array."""
-    return tuple(view.shape) == values.shape and bool(np.array_equal(view.numpy(), values))
 
 
 def _copy_query_groups(weights_by_name: dict[str, torch.Tensor]) -> None:

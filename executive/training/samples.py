@@ -4,21 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
 
 from executive.errors import InputError
-from executive.training.annotations import (
-    COCO_FILE_NAME,
-    MAX_COCO_FILE_SIZE,
-    is_split,
-    parse_file,
-    read_annotations,
-)
+from executive.training.annotations import COCO_FILE_NAME, is_split, read_annotations, read_json
 from executive.training.labelled_image import LabelledImage
 
 EVALUATION_SPLITS = ("test", "valid", "val", "train")
@@ -52,7 +44,7 @@ class Samples:
         Raises:
             InputError: An image cannot be read.
         """
-        ignored, truth = (_read_json(self._split / name) for name in ("ignored.json", "truth.json"))
+        ignored, truth = (read_json(self._split / name) for name in ("ignored.json", "truth.json"))
         for path, annotation in self._annotations.items():
             image = read_image(path)
             height, width = image.shape[:2]
@@ -92,9 +84,3 @@ def _find_split(folder: Path) -> Path:
         f"contain {COCO_FILE_NAME} (COCO) or images/ and labels/ (YOLO); render a dataset with "
         "`executive dataset`"
     )
-
-
-def _read_json(path: Path) -> dict[str, Any]:
-    """Return the values in a JSON file by file name of the image; {} if the JSON file does not exist."""
-    parse = TypeAdapter(dict[str, Any]).validate_json
-    return parse_file(path, MAX_COCO_FILE_SIZE, parse) if path.is_file() else {}

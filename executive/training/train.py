@@ -83,7 +83,8 @@ def train(
     fit_model(dataset, out, settings, report_epoch, report_batch)
     model, labels = out / "model.onnx", out / "labels.txt"
     export_onnx(out / "checkpoint_best_total.pth", len(read_labels(labels)), model)
-    accuracy = evaluate_folder(model, labels, _find_validation_split(dataset), CARD_THRESHOLD)
+    validation = next(path for path in (dataset / "valid", dataset / "val", dataset) if path.is_dir())
+    accuracy = evaluate_folder(model, labels, validation, CARD_THRESHOLD)
     card = render_card(
         title=f"Small RF-DETR trained on {dataset.name}",
         summary=f"Detects {', '.join(read_labels(labels))} in square images.",
@@ -123,8 +124,3 @@ def _check_inputs(dataset: Path, start_model: Path | None) -> None:
         )
     for split in list_splits(dataset):
         read_annotations(split)
-
-
-def _find_validation_split(dataset: Path) -> Path:
-    """Return the folder of the validation split: `valid` or `val`; without either, the dataset."""
-    return next(path for path in (dataset / "valid", dataset / "val", dataset) if path.is_dir())

@@ -50,10 +50,8 @@ class CellDetector:
         self._view = view if camera else "full"
         self._classes = classes
         self._now = 0.0
-        clock = StepClock(lambda: self._now)
-        self._detectors = build_detectors(
-            configs, camera=camera or WHOLE_IMAGE_CAMERA, clock=clock, base=base, seed=0
-        )
+        camera, clock = camera or WHOLE_IMAGE_CAMERA, StepClock(lambda: self._now)
+        self._detectors = build_detectors(configs, camera=camera, clock=clock, base=base, seed=0)
 
     def detect(self, frame: Frame) -> tuple[Answer, float]:
         """Return the answer of the detector to a frame, and its latency in wall time [ms].
@@ -72,9 +70,10 @@ class CellDetector:
         finally:
             self._now += REQUEST_INTERVAL
         latency = (time.perf_counter() - start_time) * 1000
-        labels = {entry.label for entry in answer.confident} if self._classes is None else self._classes
-        detections = tuple(entry for entry in answer.confident if entry.label in labels)
-        return replace(answer, confident=detections), latency
+        if self._classes is not None:
+            detections = tuple(entry for entry in answer.confident if entry.label in self._classes)
+            answer = replace(answer, confident=detections)
+        return answer, latency
 
     def close(self) -> None:
         """Release the resources of the detectors."""

@@ -12,7 +12,6 @@ import numpy as np
 from executive.cell.frame import Frame
 from executive.cell.protocols import Localizer
 from executive.errors import NoDepth
-from executive.geometry import Array
 from executive.perception.camera_model import intersect_plane
 from executive.training.evaluation.matching import MIN_IOU, BoxMatch, compute_ious, is_occluded, split_matches
 from executive.training.evaluation.measured_rates import CountedRate, MeasuredErrorRates
@@ -85,9 +84,8 @@ class ErrorStatistics:
             detection_counts[detected_label] += count
         metrics = {}
         for label in sorted(object_counts.keys() - {NO_OBJECT}):
-            precision = self.confusion[label, label] / max(detection_counts[label], 1)
-            recall = self.confusion[label, label] / object_counts[label]
-            metrics[label] = ClassMetrics(object_counts[label], precision, recall)
+            correct, count = self.confusion[label, label], object_counts[label]
+            metrics[label] = ClassMetrics(count, correct / max(detection_counts[label], 1), correct / count)
         return metrics
 
     def make_confusion_matrix(self) -> dict[str, dict[str, int]]:
@@ -207,8 +205,6 @@ class RepeatedErrors:
             return
         true_centre = np.array(sample.truth["centres"][first.object_index])
         with contextlib.suppress(NoDepth):
-            errors: list[Array] = [
-                (self._localizer.locate(match.detection, frame) - true_centre)[:2]
-                for match in (first, second)
-            ]
-            self._error_products += (errors[0] * errors[1]).tolist()
+            positions = [self._localizer.locate(match.detection, frame) for match in (first, second)]
+            errors = (np.array(positions) - true_centre)[:, :2]
+            self._error_products += errors.prod(axis=0).tolist()

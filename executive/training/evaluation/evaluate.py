@@ -87,11 +87,11 @@ def evaluate(
         recall=errors.recall,
         map50=map50,
         map50_95=map50_95,
-        centre=Distribution.of(errors.centre_errors),
-        position=Distribution.of(errors.position_errors),
-        localized=Distribution.of(errors.localization_errors),
+        centre=Distribution.compute(errors.centre_errors),
+        position=Distribution.compute(errors.position_errors),
+        localized=Distribution.compute(errors.localization_errors),
         # The first request is slower: it fills caches and opens connections.
-        latency=Distribution.of(latencies[1:] or latencies),
+        latency=Distribution.compute(latencies[1:] or latencies),
         by_class=errors.compute_class_metrics(),
         confusion=errors.make_confusion_matrix(),
         unavailable=unavailable_count,
@@ -143,10 +143,8 @@ class AveragePrecision:
 
     def __init__(self) -> None:
         # The import takes half a second and 120 MB; only an evaluation needs the package.
-        import supervision
         from supervision.metrics import MeanAveragePrecision
 
-        self._detections_type = supervision.Detections
         self._metric = MeanAveragePrecision()
         self._class_ids: dict[str, int] = {}
         self._has_objects = False
@@ -168,5 +166,7 @@ class AveragePrecision:
 
     def _to_detections(self, boxes: Sequence[Box], labels: Sequence[str]) -> Any:
         """Return boxes and labels as `supervision.Detections`."""
+        import supervision as sv
+
         ids = [self._class_ids.setdefault(label, len(self._class_ids)) for label in labels]
-        return self._detections_type(np.array(boxes, float).reshape(-1, 4), class_id=np.array(ids, dtype=int))
+        return sv.Detections(np.array(boxes, float).reshape(-1, 4), class_id=np.array(ids, dtype=int))

@@ -29,7 +29,7 @@ class Distribution:
     worst: float
 
     @staticmethod
-    def of(values: Sequence[float]) -> Distribution | None:
+    def compute(values: Sequence[float]) -> Distribution | None:
         """Return the distribution of `values`, or None if there are no values."""
         if not len(values):
             return None

@@ -29,8 +29,8 @@ LINE_THICKNESS = 2
 LEGEND = "boxes: detected, corners: ground truth"
 """Text in the header that explains the lines."""
 
-BACKGROUND, TEXT, SECONDARY_TEXT = (32, 38, 43), (255, 255, 255), (169, 180, 188)
-"""Colours of background, main text and secondary text of the sheet, RGB."""
+BACKGROUND_COLOUR, TEXT_COLOUR, CAPTION_COLOUR = (32, 38, 43), (255, 255, 255), (169, 180, 188)
+"""Colours of the background, of titles, and of file names and legend, RGB."""
 TRUE_COLOUR, DETECTED_COLOUR, OUTLINE_COLOUR = "#56B4E9", "#E69F00", "#000000"
 """Colours of true boxes, of detected boxes, and of the outline around their lines."""
 
@@ -119,18 +119,18 @@ def draw_sheet(mistakes: Sequence[Mistake], title: str) -> Picture:
     rows = max(math.ceil(len(mistakes) / columns), 1)
     column_width, row_height = TILE_SIZE + GAP, TILE_SIZE + CAPTION_HEIGHT + GAP
     width = GAP + columns * column_width
-    sheet = np.full((HEADER_HEIGHT + rows * row_height, width, 3), BACKGROUND, np.uint8)
+    sheet = np.full((HEADER_HEIGHT + rows * row_height, width, 3), BACKGROUND_COLOUR, np.uint8)
     legend_left = width - GAP - _measure_text(LEGEND)
-    _write_text(sheet, LEGEND, (legend_left, HEADER_BASELINE), SECONDARY_TEXT)
+    _write_text(sheet, LEGEND, (legend_left, HEADER_BASELINE), CAPTION_COLOUR)
     header = title if mistakes else f"{title}: no mistakes"
-    _write_text(sheet, header, (GAP, HEADER_BASELINE), TEXT, legend_left - 2 * GAP)
+    _write_text(sheet, header, (GAP, HEADER_BASELINE), TEXT_COLOUR, legend_left - 2 * GAP)
     for index, mistake in enumerate(mistakes):
         row, column = divmod(index, columns)
         left, top = GAP + column * column_width, HEADER_HEIGHT + row * row_height
         sheet[top : top + TILE_SIZE, left : left + TILE_SIZE] = _draw_tile(mistake)
         bottom = top + TILE_SIZE
-        _write_text(sheet, f"{index + 1}. {mistake.text}", (left, bottom + TEXT_BASELINE), TEXT)
-        _write_text(sheet, mistake.sample.file, (left, bottom + FILE_BASELINE), SECONDARY_TEXT)
+        _write_text(sheet, f"{index + 1}. {mistake.text}", (left, bottom + TEXT_BASELINE), TEXT_COLOUR)
+        _write_text(sheet, mistake.sample.file, (left, bottom + FILE_BASELINE), CAPTION_COLOUR)
     return sheet
 
 
@@ -146,7 +146,7 @@ def _draw_tile(mistake: Mistake) -> Picture:
     shift = zoom * (0.5 - crop_corner) - 0.5
     matrix = np.array([[zoom, 0.0, shift[0]], [0.0, zoom, shift[1]]])
     image = mistake.sample.image[..., ::-1]  # The annotators expect BGR.
-    size, border = (TILE_SIZE, TILE_SIZE), BACKGROUND[::-1]
+    size, border = (TILE_SIZE, TILE_SIZE), BACKGROUND_COLOUR[::-1]
     tile = cv2.warpAffine(image, matrix, size, flags=cv2.INTER_CUBIC, borderValue=border)
     detected = sv.BoxAnnotator, [detection.box for detection in mistake.detections], DETECTED_COLOUR
     layers: Any = (detected, (sv.BoxCornerAnnotator, mistake.sample.boxes, TRUE_COLOUR))

@@ -141,7 +141,7 @@ def test_the_worst_misses_are_gathered(saying, sample, both):
 
 
 def test_a_spread_names_its_quantiles():
-    assert Distribution.of(list(range(101))) == Distribution(median=50, p95=95, p99=99, worst=100)
+    assert Distribution.compute(list(range(101))) == Distribution(median=50, p95=95, p99=99, worst=100)
 
 
 def rates(full_view_count, missed, confused, invented, looks, jitter):
