@@ -42,11 +42,9 @@ def command(ctx: click.Context, missions: tuple[str, ...], overrides: dict[str, 
                 loaded = load_mission(mission, skills, overrides, load_cell_kind)
                 findings, failures, is_valid = loaded.warnings, loaded.unhandled_failures, True
                 texts.append(_describe_mission(mission, findings, failures))
-            except MissionError as error:
-                findings, failures, is_valid = error.findings, (), False
-                texts.append(str(error))
             except InputError as error:
-                findings = (Finding(mission, 0, 0, "error", "no-mission", str(error)),)
+                missing_mission = Finding(mission, 0, 0, "error", "no-mission", str(error))
+                findings = error.findings if isinstance(error, MissionError) else (missing_mission,)
                 failures, is_valid = (), False
                 texts.append(str(error))
             listed_findings = findings[:MAX_LISTED_FINDINGS]

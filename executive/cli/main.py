@@ -44,10 +44,7 @@ class CommandGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command with the name `cmd_name`; None if there is no such command."""
         del ctx
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = import_module(f"executive.cli.{cmd_name}").command
-        return command
+        return import_module(f"executive.cli.{cmd_name}").command if cmd_name in COMMANDS else None
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

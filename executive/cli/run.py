@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from executive.record.recorded_run import RecordOptions
     from executive.record.result import Result
     from executive.run.assembly import RunOptions
-    from executive.view.live.page import LivePage
     from executive.view.terminal.lines import LineView
     from executive.view.terminal.screen import TerminalView
 
@@ -78,11 +76,16 @@ def command(
         from executive.record.result import describe_disagreement, find_exit_code
         from executive.record.run_directory import RunDirectory
         from executive.run.assembly import RunOptions
+        from executive.view.live.page import LivePage
         from executive.view.report.page import try_write_report
         from executive.view.terminal.summary import describe_end, format_repeat_command, format_summary
 
-        terminal_view = None if quiet else _make_terminal_view()
-        with _serve_page(has_page) as page:
+        terminal_view = None if quiet else _make_terminal_view(has_keyboard)
+        with contextlib.ExitStack() as exit_stack:
+            page = LivePage() if has_page else None
+            if page is not None:
+                exit_stack.callback(page.finish)
+                click.echo(f"watch the run at {page.address}", err=True)
             views = [GuardedView(view) for view in (terminal_view, page) if view is not None]
             record = RecordOptions(views, starts_paused=paused)
             run_options = RunOptions(
@@ -154,23 +157,7 @@ def _resume(
     return result, find_run_start(read_journal(path / "journal.jsonl"), path, "run the mission again")
 
 
-@contextlib.contextmanager
-def _serve_page(is_enabled: bool) -> Iterator[LivePage | None]:
-    """Serve the live page of a run in this context and print the page address; yield None if not enabled."""
-    if not is_enabled:
-        yield None
-        return
-    from executive.view.live.page import LivePage
-
-    page = LivePage()
-    try:
-        click.echo(f"watch the run at {page.address}", err=True)
-        yield page
-    finally:
-        page.finish()
-
-
-def _make_terminal_view() -> LineView | TerminalView:
+def _make_terminal_view(has_keyboard: bool) -> LineView | TerminalView:
     """Return a view that redraws the terminal; if stderr is no terminal, return a view that prints lines."""
     from rich.console import Console
 
@@ -180,4 +167,4 @@ def _make_terminal_view() -> LineView | TerminalView:
     console = Console(file=open_unescaped_stderr())
     if not console.is_terminal or console.is_dumb_terminal:
         return LineView(sys.stderr)
-    return TerminalView(console, sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None)
+    return TerminalView(console, sys.stdin.fileno() if has_keyboard else None)

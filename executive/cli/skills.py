@@ -6,6 +6,7 @@ import inspect
 import json
 import re
 import textwrap
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, cast, get_args
@@ -65,17 +66,28 @@ def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool
     for name, skill in skills.items():
         with keep_stdout_clean():
             from executive.testing.conformance import list_conformance_checks
-            from executive.view.results.conformance_results import format_verdict_counts, format_verdicts
 
             skill_verdicts = [check.run() for check in list_conformance_checks(skill, name=name)]
         if not as_json:
-            click.echo("\n".join(format_verdicts(skill_verdicts)))
+            click.echo("\n".join(map(_describe_verdict, skill_verdicts)))
         verdicts += skill_verdicts
+    counts = Counter(verdict.status for verdict in verdicts)
     if as_json:
         print_json([asdict(verdict) for verdict in verdicts])
     else:
-        click.echo(format_verdict_counts(verdicts))
-    return all(verdict.status == "ok" for verdict in verdicts)
+        texts = (f"{counts[status]} {status}" for status in ("ok", "failed", "not run") if counts[status])
+        skills_text = f"{len(skills)} skill{'' if len(skills) == 1 else 's'}"
+        click.echo(f"{len(verdicts)} checks of {skills_text}: {', '.join(texts)}")
+    return counts["ok"] == len(verdicts)
+
+
+def _describe_verdict(verdict: Verdict) -> str:
+    """Return a line about a check: status, skill, name of the check, and first problem of a failed check."""
+    line = f"{verdict.status:7}  {verdict.skill}.{verdict.check}"
+    if verdict.status != "failed":
+        return line
+    other_count = len(verdict.problems) - 1
+    return f"{line}: {verdict.problems[0]}" + (f" (and {other_count} more)" if other_count else "")
 
 
 def collect_declarations(name: str, skill: type[Skill]) -> Declaration:

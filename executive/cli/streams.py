@@ -24,6 +24,7 @@ class TolerantStream(io.TextIOBase):
         escapes: False to write control characters unchanged, for a library that draws on the terminal.
 
     Attributes:
+        stream: Underlying stream, or None.
         error: Message of the first write error, or "".
     """
 
@@ -31,45 +32,41 @@ class TolerantStream(io.TextIOBase):
         if isinstance(stream, io.TextIOWrapper):
             # By default, a character that the encoding lacks would cause an error.
             stream.reconfigure(errors="backslashreplace")
-        self._stream = stream
+        self.stream = stream
         self._escapes = escapes
         self.error = ""
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
         """Name of the character encoding of the stream."""
-        return "utf-8" if self._stream is None else self._stream.encoding
+        return "utf-8" if self.stream is None else self.stream.encoding
 
     def write(self, text: str) -> int:
         """Write `text`; drop the text if the stream is closed or a write has failed."""
-        if self._stream is None:
+        if self.stream is None:
             self.error = "it is closed"
         elif not self.error:
             try:
-                self._stream.write(escape_control_characters(text) if self._escapes else text)
+                self.stream.write(escape_control_characters(text) if self._escapes else text)
             except OSError as error:
-                self._stop_writing(self._stream, error)
+                self._stop_writing(self.stream, error)
         return len(text)
 
     def flush(self) -> None:
         """Flush the buffer of the stream; do nothing if the stream is closed or a write has failed."""
-        if self._stream is not None and not self.error:
+        if self.stream is not None and not self.error:
             try:
-                self._stream.flush()
+                self.stream.flush()
             except OSError as error:
-                self._stop_writing(self._stream, error)
+                self._stop_writing(self.stream, error)
 
     def isatty(self) -> bool:
         """Return True if the stream is a terminal."""
-        return self._stream is not None and self._stream.isatty()
-
-    def copy_unescaped(self) -> TolerantStream:
-        """Return a stream to the same file that does not escape control characters."""
-        return TolerantStream(self._stream, escapes=False)
+        return self.stream is not None and self.stream.isatty()
 
     def fileno(self) -> int:
         """Return the number of the stream's file descriptor."""
-        return super().fileno() if self._stream is None else self._stream.fileno()
+        return super().fileno() if self.stream is None else self.stream.fileno()
 
     def _stop_writing(self, stream: TextIO, error: OSError) -> None:
         """Store the error of a write, and connect the stream to the null device."""
@@ -82,7 +79,7 @@ class TolerantStream(io.TextIOBase):
 def open_unescaped_stderr() -> TextIO:
     """Return stderr without escaping of control characters, for a library that draws on the terminal."""
     if isinstance(sys.stderr, TolerantStream):
-        return cast(TextIO, sys.stderr.copy_unescaped())
+        return cast(TextIO, TolerantStream(sys.stderr.stream, escapes=False))
     return sys.stderr
 
 

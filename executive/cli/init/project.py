@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from jinja2 import Environment, StrictUndefined
 
-from executive.errors import InputError
+from executive.errors import InputError, explain_os_errors
 
 TEMPLATE = Path(__file__).parent / "template"
 """Folder with the template of every file of a project."""
@@ -41,14 +41,11 @@ def write_project(folder: Path, package: str) -> list[str]:
         _map_path(file, package): templates.from_string(file.read_text(encoding="utf-8")).render(name=package)
         for file in sorted(TEMPLATE.rglob(f"*{SUFFIX}"))
     }
-    try:
+    with explain_os_errors(InputError, f"{folder} cannot be written", "name a writable folder"):
         for path_in_project, text in files.items():
             path = folder / path_in_project
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        problem = f"{error.filename or folder} cannot be written: {error.strerror}"
-        raise InputError(f"{problem}; name a writable folder") from None
     return list(files)
 
 

@@ -1,1 +1,1 @@
-"""Results of fault campaigns, detector evaluations and conformance checks, as text and as JSON values."""
+"""Results of fault campaigns and detector evaluations, as text and as JSON values."""
