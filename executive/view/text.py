@@ -10,17 +10,14 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 _INVALID_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Pattern of the characters that XML 1.0 does not allow."""
-_CHARACTERS_BY_WIDTH = {
-    0.36: "ijlIJ',./:;\\| ",
-    0.42: "frt!()-[]",
-    0.54: 'csz"*?_`',
-    0.85: "wDGHOQ#&+<=>^~MNU",
-    1.0: "mW%@",
-}
-"""Characters by their width in DejaVu Sans, the widest common sans-serif font [fraction of the font size]."""
 _WIDTH_BY_CHARACTER = {
-    character: width for width, characters in _CHARACTERS_BY_WIDTH.items() for character in characters
+    **dict.fromkeys("ijlIJ',./:;\\| ", 0.36),
+    **dict.fromkeys("frt!()-[]", 0.42),
+    **dict.fromkeys('csz"*?_`', 0.54),
+    **dict.fromkeys("wDGHOQ#&+<=>^~MNU", 0.85),
+    **dict.fromkeys("mW%@", 1.0),
 }
+"""Width of characters in DejaVu Sans, the widest common sans-serif font [fraction of the font size]."""
 _DEFAULT_WIDTH, _EAST_ASIAN_WIDTH = 0.64, 1.05
 """Widths of unlisted characters, and of wide East Asian characters [fraction of the font size]."""
 _BOLD_FACTOR = 1.12

@@ -41,8 +41,8 @@ class FilmSource:
             name: "#" + bytes(round(255 * channel) for channel in bin_config.colour).hex()
             for name, bin_config in self.config.bins.items()
         }
-        items = {timed.event.item for timed in self.events if isinstance(timed.event, ItemChanged)}
-        self.item_count = len(items)
+        changes = (timed.event for timed in self.events if isinstance(timed.event, ItemChanged))
+        self.item_count = len({change.item for change in changes})
         self.result = read_result(directory, events) or find_run_end(events)
 
 

@@ -90,7 +90,7 @@ def _get_end_key(activation: Activation | None) -> tuple[int, str]:
 def _describe_incident(timed_event: TimedEvent) -> str:
     """Return a text about a failed skill with an item, a halt, a fault or a resumption; else ""."""
     match timed_event.event:
-        case NodeEnded(status="FAILURE", skill=skill, item=item) as event if skill and item:
+        case NodeEnded(status="FAILURE") as event if event.skill and event.item:
             return f"{get_skill_name(event.node)}.{event.reason}: {event.message}"
         case RunHalted():
             return "halt"

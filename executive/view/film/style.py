@@ -21,9 +21,11 @@ _LINE_WIDTH = 0.17
 """Width of the lines of a mark [fraction of the size of the mark]."""
 _TRIANGLE_MARK = [(0.16, 0.08), (0.92, 0.5), (0.16, 0.92)]
 """Corners of the mark for RUNNING: points (x, y), y down [fraction of the size of the mark]."""
-_CHECK_MARK = [[(0.12, 0.54), (0.4, 0.82), (0.9, 0.22)]]
-_CROSS_MARK = [[(0.17, 0.17), (0.83, 0.83)], [(0.83, 0.17), (0.17, 0.83)]]
-"""Lines of the marks for SUCCESS and FAILURE: points (x, y), y down [fraction of the size of the mark]."""
+_MARK_LINES = {
+    "SUCCESS": [[(0.12, 0.54), (0.4, 0.82), (0.9, 0.22)]],
+    "FAILURE": [[(0.17, 0.17), (0.83, 0.83)], [(0.83, 0.17), (0.17, 0.83)]],
+}
+"""Lines of a mark by status: points (x, y), y down [fraction of the size of the mark]."""
 
 
 @lru_cache(maxsize=32)
@@ -75,13 +77,12 @@ def _draw_mask(status: str, size: int) -> Image.Image:
     draw = ImageDraw.Draw(mask)
     if status == "RUNNING":
         draw.polygon([(x * large_size, y * large_size) for x, y in _TRIANGLE_MARK], 255)
-    elif status in ("SUCCESS", "FAILURE"):
-        width = round(large_size * _LINE_WIDTH)
-        for line in _CHECK_MARK if status == "SUCCESS" else _CROSS_MARK:
-            points = [(x * large_size, y * large_size) for x, y in line]
-            draw.line(points, 255, width, joint="curve")
-            for end in (points[0], points[-1]):
-                draw.circle(end, width / 2, 255)
-    else:
+    elif status not in _MARK_LINES:
         draw.circle((large_size / 2, large_size / 2), 0.16 * large_size, 255)
+    for line in _MARK_LINES.get(status, ()):
+        points = [(x * large_size, y * large_size) for x, y in line]
+        width = round(large_size * _LINE_WIDTH)
+        draw.line(points, 255, width, joint="curve")
+        for end in (points[0], points[-1]):
+            draw.circle(end, width / 2, 255)
     return mask.resize((size, size), Image.Resampling.BOX)

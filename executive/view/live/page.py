@@ -98,7 +98,6 @@ class LivePage:
     def open(self, run: Run) -> None:
         """Show the tree and the scene of a run, and start to send the state of the run."""
         nodes = make_outline(run.root)
-        mission = run.mission
         self._run = run
         with self._catch_errors():
             self._visuals = run.workcell.visuals()
@@ -106,7 +105,7 @@ class LivePage:
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(messages.SceneChange(shapes=shapes))
-        self._enqueue(messages.PageChange(tree=draw_svg(nodes, mission, empty_results)))
+        self._enqueue(messages.PageChange(tree=draw_svg(nodes, run.mission, empty_results)))
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 
@@ -193,8 +192,7 @@ class LivePage:
                 while not self._queue.empty():
                     batch.append(self._queue.get())
                 is_last_batch = None in batch
-                batch_messages = [message for message in batch if message is not None]
-                pickle.dump(batch_messages, pipe, pickle.HIGHEST_PROTOCOL)
+                pickle.dump(list(filter(None, batch)), pipe, pickle.HIGHEST_PROTOCOL)
                 pipe.flush()
                 if not is_last_batch:
                     time.sleep(BATCH_PERIOD)

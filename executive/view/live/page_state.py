@@ -44,8 +44,9 @@ class PageState:
             case CameraImage():
                 self._set_values(look=_encode_camera_image(message))
             case PageChange():
-                values = asdict(message)
-                self._set_values(**{name: values[name] for name in values if values[name] is not None})
+                self._set_values(
+                    **{key: value for key, value in asdict(message).items() if value is not None}
+                )
 
     def take_changes(self) -> JsonObject:
         """Return the values that changed since the last call, by key."""
@@ -93,18 +94,18 @@ class PageState:
 
 def _encode_camera_image(camera_image: CameraImage) -> JsonObject:
     """Return the detections in a frame and its image as JPEG, darkened where the arm occludes the scene."""
-    frame, detection_event = camera_image.frame, camera_image.search
     import cv2
 
+    frame = camera_image.frame
     image = cv2.cvtColor(frame.image, cv2.COLOR_RGB2BGR)
     if frame.visible is not None:
         occluded = ~frame.visible
         image[occluded] = (image[occluded] * (1 - OCCLUSION_DARKENING)).astype(np.uint8)
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    height, width = frame.image.shape[:2]
+    height, width, _ = image.shape
     return {
         "source": "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode(),
         "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
-        "detector": detection_event.detector, "stamp": frame.stamp,
-        "detections": [vars(detection) for detection in detection_event.confident],
+        "detector": camera_image.search.detector, "stamp": frame.stamp,
+        "detections": list(map(vars, camera_image.search.confident)),
     }  # fmt: skip

@@ -82,8 +82,7 @@ class Server:
             raise web.HTTPForbidden(text=f"{problem}\n", headers=SECURITY_HEADERS)
         response = await handler(request)
         if not response.prepared:
-            for key, value in SECURITY_HEADERS.items():
-                response.headers.setdefault(key, value)
+            response.headers.update(SECURITY_HEADERS)
         return response
 
     async def send_changes(self) -> None:

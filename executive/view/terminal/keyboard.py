@@ -7,7 +7,6 @@ import select
 import termios
 import threading
 import tty
-from typing import Any
 
 from executive.run.run_control import RunControl
 
@@ -25,9 +24,9 @@ class KeyReader:
     """Thread that reads single keys from the file descriptor of a terminal, and controls a run."""
 
     def __init__(self, descriptor: int, control: RunControl) -> None:
+        self.control = control
         self._descriptor = descriptor
-        self._control = control
-        self._saved_attributes: list[Any] | None = None
+        self._saved_attributes = termios.tcgetattr(descriptor)
         self._must_stop = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -35,7 +34,6 @@ class KeyReader:
         """Start the thread unless it is running; Ctrl-C still sends a signal while the thread reads keys."""
         if self._thread is not None:
             return
-        self._saved_attributes = termios.tcgetattr(self._descriptor)
         tty.setcbreak(self._descriptor)
         self._must_stop.clear()
         self._thread = threading.Thread(target=self._read_keys, name="keys", daemon=True)
@@ -48,7 +46,6 @@ class KeyReader:
         self._must_stop.set()
         self._thread.join()
         self._thread = None
-        assert self._saved_attributes is not None
         termios.tcsetattr(self._descriptor, termios.TCSADRAIN, self._saved_attributes)
 
     def _read_keys(self) -> None:
@@ -65,8 +62,8 @@ class KeyReader:
 
     def _handle_key(self, key: str) -> None:
         if key == STEP_KEY:
-            self._control.step()
-        elif key in PAUSE_KEYS and self._control.is_paused:
-            self._control.resume()
+            self.control.step()
+        elif key in PAUSE_KEYS and self.control.is_paused:
+            self.control.resume()
         elif key in PAUSE_KEYS:
-            self._control.pause()
+            self.control.pause()

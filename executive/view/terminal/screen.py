@@ -15,7 +15,6 @@ from executive.events import OperatorAsked, RequestGiven, TimedEvent
 from executive.mission.outline import OutlineNode, make_outline
 from executive.record.timeline.timeline import Timeline
 from executive.run.run import Run
-from executive.run.run_control import RunControl
 from executive.view.terminal.keyboard import HELP, HELP_PAUSED, KeyReader
 from executive.view.tree.tree_text import draw_line_prefixes, select_active_nodes
 
@@ -40,7 +39,6 @@ class TerminalView:
     def __init__(self, console: Console, keyboard: int | None = None) -> None:
         self._console = console
         self._keyboard = keyboard
-        self._control: RunControl | None = None
         self._key_reader: KeyReader | None = None
         self._nodes: Sequence[OutlineNode] = ()
         self._lock = threading.Lock()
@@ -52,7 +50,6 @@ class TerminalView:
     def open(self, run: Run) -> None:
         """Show the view of a run, and start to read keys that control the run."""
         self._nodes = make_outline(run.root)
-        self._control = run.control
         if self._keyboard is not None:
             self._key_reader = KeyReader(self._keyboard, run.control)
         self._show()
@@ -84,7 +81,7 @@ class TerminalView:
             title = "" if start_event is None else f"{start_event.mission}  seed {start_event.seed}"
             header = Text(f"{title}  {self.timeline.clock:.1f} s", style="bold")
             if self._key_reader is not None:
-                is_paused = self._control is not None and self._control.is_paused
+                is_paused = self._key_reader.control.is_paused
                 help_text, style = (HELP_PAUSED, "yellow") if is_paused else (HELP, "dim")
                 header.append(f"   {help_text}", style=style)
             return Group(header, grid)

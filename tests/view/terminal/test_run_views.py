@@ -151,9 +151,10 @@ def test_the_summary_says_how_it_ended_how_long_it_took_and_how_to_repeat_it_in_
 
 
 def test_the_keys_are_named_beside_the_clock_where_there_is_a_keyboard(monkeypatch):
-    keys = SimpleNamespace(start=lambda: None, stop=lambda: None)
+    control = RunControl()
+    keys = SimpleNamespace(start=lambda: None, stop=lambda: None, control=control)
     monkeypatch.setattr("executive.view.terminal.screen.KeyReader", lambda file, control: keys)
-    view, control = TerminalView(Console(file=io.StringIO(), force_terminal=True), keyboard=0), RunControl()
+    view = TerminalView(Console(file=io.StringIO(), force_terminal=True), keyboard=0)
     view.open(SimpleNamespace(root=TREE, control=control))
     for words in ("p pause, s step, Ctrl-C stop", "paused: p continue, s step, Ctrl-C stop"):
         assert page(view).splitlines()[0].rstrip() == f"  0.0 s   {words}"
