@@ -16,7 +16,7 @@ from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import suggest_choice
-from executive.perception.detectors.detector_registry import find_detector_problems
+from executive.perception.detectors.detector_registry import find_detector_errors
 from executive.perception.envelope.fingerprint import compute_fingerprint
 from executive.perception.envelope.measurement import (
     MEASUREMENT_SUFFIX,
@@ -135,7 +135,7 @@ def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: 
                 "measure its detector on your own images with --dataset"
             )
         load_scene(scene, cell)
-    for key_path, problem in find_detector_problems(detector.configs, detector.base):
+    for key_path, problem in find_detector_errors(detector.configs, detector.base):
         raise InputError(f"detector {key_path[1]}: {problem}")
 
 

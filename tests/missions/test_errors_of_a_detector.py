@@ -11,7 +11,7 @@ import pytest
 from executive.cells.fake.cell import FakeCell
 from executive.cells.fake.noisy_detector import NoisyDetector
 from executive.mission.load import LoadedMission, load_mission
-from executive.perception.detectors.setting import DetectorSetting
+from executive.perception.detectors.requests import DetectorContext
 from executive.plugins import load_cell_kind, load_skills
 from executive.record.result import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
@@ -36,10 +36,10 @@ class Spoilt(FakeCell):
         super().__init__(config, seed=seed, **given)
         name, other = config.detectors
         camera = next(iter(config.cameras.values()))
-        setting = DetectorSetting(
+        context = DetectorContext(
             name, camera, self.cell.clock, Path(), seed, lambda _: self.detectors[other]
         )
-        spoilt: Any = NoisyDetector.from_config(config.detectors[name], setting)
+        spoilt: Any = NoisyDetector.from_config(config.detectors[name], context)
         self.detectors[name] = spoilt
 
     def advance(self) -> None:

@@ -13,7 +13,7 @@ from executive.perception.detectors import detector_registry
 from executive.perception.detectors.detector_registry import (
     build_detectors,
     find_detectable_labels,
-    find_detector_problems,
+    find_detector_errors,
 )
 
 INSTALLED = ", ".join(sorted(detector_registry.find_detector_kinds()))
@@ -24,16 +24,16 @@ class Oracle:
 
     made: ClassVar = []
 
-    def __init__(self, config, setting):
-        self.config, self.setting, self.closed = config, setting, False
-        self.other = setting.get_detector(config.options["beside"]) if "beside" in config.options else None
+    def __init__(self, config, context):
+        self.config, self.context, self.closed = config, context, False
+        self.other = context.get_detector(config.options["beside"]) if "beside" in config.options else None
         Oracle.made.append(self)
         if config.options.get("broken"):
             raise InputError("it is broken")
 
     @classmethod
-    def from_config(cls, config, setting):
-        return cls(config, setting)
+    def from_config(cls, config, context):
+        return cls(config, context)
 
     def close(self):
         self.closed = True
@@ -59,7 +59,7 @@ def oracle_installed(monkeypatch):
 def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path):
     configs = {"first": DetectorConfig(kind="embedded"), "second": DetectorConfig(kind="yolo")}
     sentence = f'detector "second" is of kind "yolo", which is not installed; installed: {INSTALLED}'
-    assert list(find_detector_problems(configs, tmp_path)) == [(("detectors", "second", "kind"), sentence)]
+    assert list(find_detector_errors(configs, tmp_path)) == [(("detectors", "second", "kind"), sentence)]
     with pytest.raises(InputError) as caught:
         build(second=configs["second"])
     assert str(caught.value) == sentence
@@ -67,7 +67,7 @@ def test_a_kind_that_is_not_installed_is_found_before_and_at_the_start(tmp_path)
 
 def test_a_wrong_option_is_found_at_its_key(tmp_path):
     configs = {"mine": DetectorConfig(kind="rfdetr", model_path="m.onnx", labels=["cube"])}
-    ((keys, sentence),) = find_detector_problems(configs, tmp_path)
+    ((keys, sentence),) = find_detector_errors(configs, tmp_path)
     assert keys == ("detectors", "mine", "model_path")
     assert sentence.startswith(f"there is no model file {tmp_path / 'm.onnx'}; check the path")
 
@@ -76,7 +76,7 @@ def test_the_labels_of_a_kind_that_does_not_say_them_are_not_known(tmp_path, ora
     configs = {kind: DetectorConfig(kind=kind) for kind in ("embedded", "oracle", "yolo")}
     known = find_detectable_labels(configs, tmp_path)
     assert known == {"embedded": ("cube", "sphere", "duck"), "oracle": None, "yolo": None}
-    assert [keys for keys, _ in find_detector_problems(configs, tmp_path)] == [("detectors", "yolo", "kind")]
+    assert [keys for keys, _ in find_detector_errors(configs, tmp_path)] == [("detectors", "yolo", "kind")]
 
 
 def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypatch):
@@ -89,7 +89,7 @@ def test_a_kind_of_somebody_elses_is_found_by_its_entry_point(tmp_path, monkeypa
     monkeypatch.syspath_prepend(tmp_path)
     mine = build(tmp_path, mine=oracle(wish=3))["mine"]
     assert mine.config.options == {"wish": 3}
-    assert (mine.setting.name, mine.setting.base, mine.setting.seed) == ("mine", tmp_path, 7)
+    assert (mine.context.name, mine.context.cell_folder, mine.context.seed) == ("mine", tmp_path, 7)
 
 
 def test_detectors_are_built_once_in_the_order_of_the_file(oracle_installed):

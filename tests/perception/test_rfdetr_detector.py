@@ -11,8 +11,8 @@ from executive.cell.config import DetectorConfig
 from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.embedded import LABELS_PATH, MODEL_PATH, EmbeddedDetector
+from executive.perception.detectors.requests import DetectorContext
 from executive.perception.detectors.rfdetr import RfdetrDetector
-from executive.perception.detectors.setting import DetectorSetting
 
 ONNX = str(MODEL_PATH)
 
@@ -39,15 +39,15 @@ def frame_with_spot(left, top):
     return SimpleNamespace(image=image)
 
 
-def setting(base=None):
+def context(base=None):
     camera = SimpleNamespace(table_view=(192, 100, 448, 356))
-    return DetectorSetting("eye", camera, SimpleNamespace(now=0.0), base, seed=0, get_detector=None)
+    return DetectorContext("eye", camera, SimpleNamespace(now=0.0), base, seed=0, get_detector=None)
 
 
 def found_by(detector, frame, view):
     """Return what the detector finds, waited for on its clock."""
     request = detector.request(frame, view)
-    detector._setting.clock.now += 0.05
+    detector._context.clock.now += 0.05
     assert request.ready
     detector.close()
     return request.result().confident
@@ -56,7 +56,7 @@ def found_by(detector, frame, view):
 def spots(size, left, top, view):
     """Return the spots that a model of an input size finds, and the shapes that it was given."""
     model = BrightSpots(size)
-    detector = RfdetrDetector(model, DetectorConfig(kind="rfdetr"), setting())
+    detector = RfdetrDetector(model, DetectorConfig(kind="rfdetr"), context())
     return found_by(detector, frame_with_spot(left, top), view), model.shapes
 
 
@@ -86,14 +86,14 @@ def test_any_exported_model_can_be_used_by_path_and_the_embedded_one_needs_no_op
     (tmp_path / "names.txt").write_text("one\ntwo\nthree\n")
     mine = configured(RfdetrDetector, model_path="model.onnx", labels="names.txt", threshold=0.6)
     for kind, config in ((RfdetrDetector, mine), (EmbeddedDetector, configured(EmbeddedDetector))):
-        detector = kind.from_config(config, setting(tmp_path))
+        detector = kind.from_config(config, context(tmp_path))
         assert found_by(detector, frame_with_spot(640, 480), "table") == ()
 
 
 def test_an_answer_shows_after_the_latency_with_its_detector_and_the_cells_names():
     config = DetectorConfig(kind="rfdetr", threshold=0.6, miss_rate=0.2)
-    detector = RfdetrDetector(BrightSpots(256), config, setting(), {"spot": "cube"})
-    clock = detector._setting.clock
+    detector = RfdetrDetector(BrightSpots(256), config, context(), {"spot": "cube"})
+    clock = detector._context.clock
     clock.now = 1.0
     request = detector.request(frame_with_spot(300, 200), "table")
     clock.now = 1.04
@@ -129,7 +129,7 @@ def test_a_wrong_option_is_said_in_a_sentence_before_and_at_the_start(tmp_path, 
     ((found, sentence),) = kind.check(configured(kind, **options), tmp_path, {})
     assert found == option
     with pytest.raises(InputError, match=text) as caught:
-        kind.from_config(configured(kind, **options), setting(tmp_path))
+        kind.from_config(configured(kind, **options), context(tmp_path))
     assert str(caught.value) == sentence
 
 

@@ -8,17 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.cell.config import DetectorConfig, Section
+from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.cell.frame import Frame
 from executive.cell.protocols import Detector
-from executive.perception.detectors.requests import ChangedRequest
-from executive.perception.detectors.setting import (
-    DetectorSetting,
-    OptionErrors,
-    find_option_errors,
-    read_options,
-)
+from executive.perception.detectors.options import DetectorOptions, OptionErrors
+from executive.perception.detectors.requests import ChangedRequest, DetectorContext
 
 MAX_CONFUSED_CONFIDENCE = 0.75
 """Maximum confidence of a detection with a wrong class, 0 to 1."""
@@ -26,7 +21,7 @@ FALSE_BOX_SIDE_RANGE = (15.0, 40.0)
 """Minimum and maximum side of the box of a false detection [pixel]."""
 
 
-class NoisyOptions(Section):
+class NoisyOptions(DetectorOptions):
     """Options of a noisy detector in the cell file, in addition to its error rates."""
 
     of: str
@@ -49,26 +44,26 @@ class NoisyDetector:
 
     is_fake = True
 
-    def __init__(self, config: DetectorConfig, options: NoisyOptions, setting: DetectorSetting) -> None:
+    def __init__(self, config: DetectorConfig, options: NoisyOptions, context: DetectorContext) -> None:
         self._config = config
         self._options = options
-        self._setting = setting
-        self._base_detector: Detector = setting.get_detector(options.of)
+        self._context = context
+        self._base_detector: Detector = context.get_detector(options.of)
 
     @classmethod
-    def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> NoisyDetector:
+    def from_config(cls, config: DetectorConfig, context: DetectorContext) -> NoisyDetector:
         """Return the noisy detector of a section of a cell file.
 
         Raises:
             InputError: An option is missing, unknown or wrong.
         """
-        return cls(config, read_options(NoisyOptions, config), setting)
+        return cls(config, NoisyOptions.read(config), context)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
         del base
-        invalid_options = list(find_option_errors(NoisyOptions, config))
+        invalid_options = list(NoisyOptions.find_errors(config))
         yield from invalid_options
         if not invalid_options and config.options["of"] not in others:
             yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(others)}'
@@ -84,13 +79,13 @@ class NoisyDetector:
     def _add_errors(self, answer: Answer, frame: Frame, view: str) -> Answer:
         """Return the answer with random errors, which depend on the seed, the frame and the view."""
         # The length of the name identifies the view, because the names of all views differ in length.
-        rng = np.random.default_rng([self._setting.seed, frame.id, len(view)])
+        rng = np.random.default_rng([self._context.seed, frame.id, len(view)])
         detections = [detection for detection in answer.confident if rng.random() >= self._config.miss_rate]
         detections = [self._shift_box(self._replace_class(detection, rng), rng) for detection in detections]
         false_count = rng.poisson(self._config.false_detections)
         detections += [self._make_false_detection(frame, view, rng) for _ in range(false_count)]
         detections.sort(key=lambda detection: -detection.confidence)
-        return Answer(self._setting.name, tuple(detections), self._config.error_rates)
+        return Answer(self._context.name, tuple(detections), self._config.error_rates)
 
     def _replace_class(self, detection: Detection, rng: np.random.Generator) -> Detection:
         """Return the detection with a wrong class at the confusion rate, else unchanged."""
@@ -110,7 +105,7 @@ class NoisyDetector:
     def _make_false_detection(self, frame: Frame, view: str, rng: np.random.Generator) -> Detection:
         """Return a detection with random class, confidence and box in the region of a view."""
         height, width = frame.image.shape[:2]
-        region = self._setting.camera.table_view if view == "table" else (0, 0, width, height)
+        region = self._context.camera.table_view if view == "table" else (0, 0, width, height)
         x, y = rng.uniform(region[:2], region[2:])
         half_width, half_height = rng.uniform(*FALSE_BOX_SIDE_RANGE, 2) / 2
         box = (x - half_width, y - half_height, x + half_width, y + half_height)

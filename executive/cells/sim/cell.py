@@ -29,9 +29,9 @@ from executive.errors import InputError
 from executive.events import Emit
 from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import build_planner, find_arm_errors
-from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_problems
+from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
+from executive.perception.detectors.requests import ClosableDetector
 from executive.perception.detectors.screening import screen_detectors
-from executive.perception.detectors.setting import ClosableDetector
 from executive.perception.envelope.rated_detectors import build_rated_detectors
 from executive.perception.localization import build_localizer
 
@@ -121,7 +121,7 @@ class SimCell(CellWithoutHardware):
         return (
             *model_errors,
             *_find_missing_depth_sensors(config),
-            *find_detector_problems(config.detectors, base),
+            *find_detector_errors(config.detectors, base),
             *find_places_out_of_reach(config),
             *find_lack_of_room(config),
             # The check of the poses builds a world, which is impossible if a model is missing.

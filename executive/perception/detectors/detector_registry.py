@@ -9,7 +9,7 @@ from executive.cell.config import CameraConfig, DetectorConfig
 from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
 from executive.errors import InputError
-from executive.perception.detectors.setting import ClosableDetector, DetectorSetting
+from executive.perception.detectors.requests import ClosableDetector, DetectorContext
 from executive.plugins import PluginEntry, list_entries
 
 DETECTOR_GROUP = "executive.detectors"
@@ -32,7 +32,7 @@ def build_detectors(
         configs: The section `detectors` of the cell file.
         camera: The camera whose frames the detectors search.
         clock: Clock of the run, which determines when answers become available.
-        base: Folder to which paths in options are relative.
+        base: Folder of the cell file.
         seed: Random seed of the detectors.
 
     Raises:
@@ -53,8 +53,8 @@ def build_detectors(
         if kind not in kinds:
             raise InputError(_describe_missing_kind(name, kind, kinds))
         unfinished_names.append(name)
-        setting = DetectorSetting(name, camera, clock, base, seed, build)
-        detectors[name] = kinds[kind].load().from_config(configs[name], setting)
+        context = DetectorContext(name, camera, clock, base, seed, build)
+        detectors[name] = kinds[kind].load().from_config(configs[name], context)
         unfinished_names.remove(name)
         return detectors[name]
 
@@ -66,13 +66,11 @@ def build_detectors(
         raise
 
 
-def find_detector_problems(
-    configs: Mapping[str, DetectorConfig], base: Path
-) -> Iterator[tuple[KeyPath, str]]:
-    """Yield each error in the sections of the detectors: its key in the cell file, and an error message.
+def find_detector_errors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
+    """Yield the key and the message of each error in the sections of the detectors, without loading a model.
 
-    A kind may check its options in a static method `check(config, base, others)`, where `others` are the
-    sections of all detectors of the cell. No model is loaded.
+    A kind may check its options in a static method `check(config, base, others)`: `base` is the folder of
+    the cell file, and `others` are the sections of all detectors of the cell.
     """
     kinds = find_detector_kinds()
     for name, config in configs.items():
@@ -92,9 +90,9 @@ def find_detector_problems(
 def find_detectable_labels(
     configs: Mapping[str, DetectorConfig], base: Path
 ) -> dict[str, tuple[str, ...] | None]:
-    """Return the detectable labels of each detector of a cell file, by its name; None if unknown.
+    """Return the labels that each detector can find, by name of the detector; None if unknown.
 
-    A kind of detector may have a static method `labels(config, base)` for its labels. No model is loaded.
+    A kind of detector may return its labels in a static method `labels(config, base)`, which loads no model.
     """
     kinds = find_detector_kinds()
     labels: dict[str, tuple[str, ...] | None] = {}

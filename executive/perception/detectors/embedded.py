@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from executive.cell.config import DetectorConfig, Section
+from executive.cell.config import DetectorConfig
 from executive.perception.detectors.onnx_model import OnnxModel, read_labels
+from executive.perception.detectors.options import DetectorOptions, OptionErrors
+from executive.perception.detectors.requests import DetectorContext
 from executive.perception.detectors.rfdetr import RfdetrDetector
-from executive.perception.detectors.setting import (
-    DetectorSetting,
-    OptionErrors,
-    find_option_errors,
-    read_options,
-)
 
 MODEL_PATH = Path(__file__).parent.parent / "weights" / "embedded.onnx"
 """Exported model with the shipped weights."""
@@ -24,20 +20,20 @@ class EmbeddedDetector(RfdetrDetector):
     """Detector of cubes, spheres and ducks with shipped weights (model card: `weights/embedded.card.md`)."""
 
     @classmethod
-    def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> EmbeddedDetector:
+    def from_config(cls, config: DetectorConfig, context: DetectorContext) -> EmbeddedDetector:
         """Return the detector with the shipped weights.
 
         Raises:
             InputError: The cell file has an option; this kind of detector has no options.
         """
-        read_options(Section, config)
-        return cls(OnnxModel(MODEL_PATH, read_labels(LABELS_PATH)), config, setting)
+        DetectorOptions.read(config)
+        return cls(OnnxModel(MODEL_PATH, read_labels(LABELS_PATH)), config, context)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each option in the cell file with an error message: this kind of detector has no options."""
         del base, others
-        yield from find_option_errors(Section, config)
+        yield from DetectorOptions.find_errors(config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:

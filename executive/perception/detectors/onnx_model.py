@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from executive.cell.detection import Detection
 from executive.cell.frame import Box
 from executive.errors import InputError, Unavailable
-from executive.geometry import Array
 from executive.perception.detectors.views import remove_duplicates
 
 CHANNEL_MEAN = np.array([0.485, 0.456, 0.406], dtype=np.float32)
@@ -40,27 +39,25 @@ class OnnxModel:
 
     def __init__(self, path: Path, labels: Sequence[str], threads: int = 2) -> None:
         # The import takes 0.1 s and 40 MB, and many runs use no model.
-        import onnxruntime
+        from onnxruntime import InferenceSession, SessionOptions
 
         if not path.is_file():
             raise InputError(describe_missing_model(path))
-        options = onnxruntime.SessionOptions()
+        options = SessionOptions()
         options.intra_op_num_threads = threads
         options.inter_op_num_threads = 1
         # Threads that spin while they wait would slow down the simulation.
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         options.log_severity_level = 3
         try:
-            self._session = onnxruntime.InferenceSession(
-                str(path), options, providers=["CPUExecutionProvider"]
-            )
+            self._session = InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
         except Exception as error:
             raise InputError(f"{path} is not a model that onnxruntime can run: {error}") from error
         self.labels = tuple(labels)
         self.input_size = self._check_shapes(path)
 
     def detect(self, image: NDArray[np.uint8], min_confidence: float) -> list[Detection]:
-        """Return the detections of at least `min_confidence` in an RGB image `(H, W, 3)`.
+        """Return the detections of at least `min_confidence` in an RGB image `(H, W, 3)`, best first.
 
         Raises:
             Unavailable: onnxruntime failed.
@@ -70,33 +67,24 @@ class OnnxModel:
         except Exception as error:
             raise Unavailable(f"onnxruntime failed: {error}") from error
         confidences = 1 / (1 + np.exp(-logits[0, :, :-1].astype(np.float64)))
-        size = np.array(image.shape[1::-1], dtype=float)
-        detections = self._make_detections(boxes[0].astype(np.float64), confidences, size, min_confidence)
-        return remove_duplicates(detections)
-
-    def _make_input(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Return the normalized image `(1, 3, R, R)`."""
-        if image.shape[:2] != (self.input_size, self.input_size):
-            image = np.asarray(
-                cv2.resize(image, (self.input_size, self.input_size), interpolation=cv2.INTER_LINEAR),
-                dtype=np.uint8,
-            )
-        normalized = (image.astype(np.float32) / 255 - CHANNEL_MEAN) / CHANNEL_STD
-        return np.ascontiguousarray(normalized.transpose(2, 0, 1)[None])
-
-    def _make_detections(
-        self, boxes: Array, confidences: Array, size: Array, min_confidence: float
-    ) -> list[Detection]:
-        """Return the detections in an image of `size` (width, height) [pixel], most confident first."""
+        image_size = np.array(image.shape[1::-1], dtype=float)
         detections = []
         for query, label in np.argwhere(confidences >= min_confidence):
-            centre, box_size = boxes[query, :2] * size, boxes[query, 2:] * size
-            left, top = np.clip(centre - box_size / 2, 0, size)
-            right, bottom = np.clip(centre + box_size / 2, 0, size)
+            centre, box_size = boxes[0, query].astype(np.float64).reshape(2, 2) * image_size
+            left, top = np.clip(centre - box_size / 2, 0, image_size)
+            right, bottom = np.clip(centre + box_size / 2, 0, image_size)
             box: Box = (float(left), float(top), float(right), float(bottom))
             second = float(max(np.delete(confidences[query], label), default=0.0))
             detections.append(Detection(self.labels[label], float(confidences[query, label]), box, second))
-        return sorted(detections, key=lambda detection: -detection.confidence)
+        return remove_duplicates(sorted(detections, key=lambda detection: -detection.confidence))
+
+    def _make_input(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Return the normalized image `(1, 3, R, R)`."""
+        size = (self.input_size, self.input_size)
+        if image.shape[:2] != size:
+            image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
+        normalized = (image.astype(np.float32) / 255 - CHANNEL_MEAN) / CHANNEL_STD
+        return np.ascontiguousarray(normalized.transpose(2, 0, 1)[None])
 
     def _check_shapes(self, path: Path) -> int:
         """Check names and shapes of inputs and outputs, and return the side of the input image [pixel]."""
@@ -107,12 +95,12 @@ class OnnxModel:
                 f"{path} is not an exported RF-DETR model: it has the inputs {', '.join(inputs)} and the "
                 f"outputs {', '.join(outputs)}; it needs the input input and the outputs dets and labels"
             )
-        size, output_count = inputs["input"][-1], outputs["labels"][-1]
+        size, class_count = inputs["input"][-1], outputs["labels"][-1] - 1
         if not isinstance(size, int):
             raise InputError(f"{path} has an input of variable size; export it with a fixed size")
-        if output_count != len(self.labels) + 1:
+        if class_count != len(self.labels):
             raise InputError(
-                f"{path} has {output_count - 1} classes, but there are {len(self.labels)} labels: "
+                f"{path} has {class_count} classes, but there are {len(self.labels)} labels: "
                 f"{', '.join(self.labels)}; give one label per class, in the order of the model"
             )
         return size

@@ -6,23 +6,52 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from executive.cell.config import DetectorConfig
+from executive.cell.config import CameraConfig, DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.cell.error_rates import ErrorRates
 from executive.cell.frame import Frame
-from executive.cell.protocols import Clock, Request
+from executive.cell.protocols import Clock, Detector, Request
 from executive.errors import DeadlinePassed, Unavailable
-from executive.perception.detectors.setting import DetectorSetting
 from executive.perception.detectors.views import Region, list_regions
 
 MAX_BLOCKING_TIME = 0.05
 """Maximum uninterrupted wait for an overdue answer [s], which is the maximum delay of a second Ctrl-C."""
 CLOCK_ROUNDING_ERROR = 1e-9
 """Maximum rounding error of a time on the clock [s]."""
+
+
+class ClosableDetector(Detector, Protocol):
+    """A detector that holds resources, such as a thread, until it is closed."""
+
+    def close(self) -> None:
+        """Wait for the running search, then release all resources."""
+
+
+@dataclass(frozen=True)
+class DetectorContext:
+    """Parts of the cell and of the run that a detector uses.
+
+    Attributes:
+        name: Name of the detector in the cell file.
+        camera: The camera whose frames the detector searches.
+        clock: Clock of the run, which determines when answers become available.
+        cell_folder: Folder of the cell file, to which paths in options are relative.
+        seed: Random seed of the detector.
+        get_detector: Function that returns a detector of the cell by name; the caller must not close it.
+    """
+
+    name: str
+    camera: CameraConfig
+    clock: Clock
+    cell_folder: Path
+    seed: int
+    get_detector: Callable[[str], Detector]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +61,7 @@ class ChangedRequest:
     Attributes:
         request: The original request.
         change_answer: Function that returns the changed answer for the original answer.
-        detector: Name of the detector, added to error messages; "" for unchanged messages.
+        detector: Name of the detector, which is added to error messages; "" to add nothing.
     """
 
     request: Request
@@ -112,21 +141,21 @@ class ThreadedDetector:
 
     Args:
         config: Section of the detector in the cell file.
-        setting: Parts of the cell and of the run that the detector uses.
+        context: Parts of the cell and of the run that the detector uses.
         timeout: Time from a request until the error of a missed deadline is available [s].
     """
 
-    def __init__(self, config: DetectorConfig, setting: DetectorSetting, timeout: float = -math.inf) -> None:
-        self._config, self._setting, self._timeout = config, setting, timeout
-        self._thread = ThreadPoolExecutor(1, f"detector-{setting.name}")
+    def __init__(self, config: DetectorConfig, context: DetectorContext, timeout: float = -math.inf) -> None:
+        self._config, self._context, self._timeout = config, context, timeout
+        self._thread = ThreadPoolExecutor(1, f"detector-{context.name}")
 
     def request(self, frame: Frame, view: str) -> PendingSearch:
         """Start the detection in a view of a frame: `table` (the workspace) or `full` (the whole image)."""
         regions = self._list_regions(view, frame.image.shape[1::-1])
         future = self._thread.submit(lambda: self._search(frame.image, regions))
-        clock, config = self._setting.clock, self._config
+        clock, config = self._context.clock, self._config
         due_time, expiry_time = clock.now + config.latency, clock.now + self._timeout
-        return PendingSearch(future, due_time, clock, self._setting.name, config.error_rates, expiry_time)
+        return PendingSearch(future, due_time, clock, self._context.name, config.error_rates, expiry_time)
 
     def close(self) -> None:
         """End the thread after the running search; cancel all searches that have not started."""
@@ -134,7 +163,7 @@ class ThreadedDetector:
 
     def _list_regions(self, view: str, size: tuple[int, ...]) -> list[Region]:
         """Return the regions to search for a view; `size` is the width and height of the image [pixel]."""
-        return list_regions(view, self._setting.camera.table_view, (size[0], size[1]))
+        return list_regions(view, self._context.camera.table_view, (size[0], size[1]))
 
     def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
         """Return the detections in the regions of an image, most confident first; runs in the thread."""

@@ -5,28 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from executive.cell.config import DetectorConfig, Section
+from executive.cell.config import DetectorConfig
 from executive.cell.detection import Detection
 from executive.errors import InputError
 from executive.perception.detectors.onnx_model import OnnxModel, describe_missing_model, read_labels
-from executive.perception.detectors.requests import ThreadedDetector
-from executive.perception.detectors.setting import (
-    DetectorSetting,
-    OptionErrors,
-    find_class_map_errors,
-    find_option_errors,
-    read_options,
-)
+from executive.perception.detectors.options import DetectorOptions, OptionErrors, find_class_map_errors
+from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
 from executive.perception.detectors.views import Region, search_regions
 
 
-class RfdetrOptions(Section):
+class RfdetrOptions(DetectorOptions):
     """Options of a detector of kind `rfdetr`."""
 
     model_path: str
@@ -39,7 +34,7 @@ class RfdetrOptions(Section):
     """Maximum number of threads of one inference."""
 
     def read_names(self, base: Path) -> tuple[str, ...]:
-        """Return the class names of the model; `base` is the folder to which paths are relative.
+        """Return the class names of the model; `base` is the folder of the cell file.
 
         Raises:
             InputError: The text file cannot be read.
@@ -53,7 +48,7 @@ class RfdetrDetector(ThreadedDetector):
     Args:
         model: The model.
         config: Section of the detector in the cell file.
-        setting: Parts of the cell and of the run that the detector uses.
+        context: Parts of the cell and of the run that the detector uses.
         class_map: Class names of the cell by class names of the model, if the names differ.
     """
 
@@ -61,37 +56,35 @@ class RfdetrDetector(ThreadedDetector):
         self,
         model: OnnxModel,
         config: DetectorConfig,
-        setting: DetectorSetting,
-        class_map: Mapping[str, str] | None = None,
+        context: DetectorContext,
+        class_map: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        super().__init__(config, setting)
-        self._model = model
-        self._class_map = dict(class_map or {})
+        super().__init__(config, context)
+        self._model, self._class_map = model, class_map
 
     @classmethod
-    def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> RfdetrDetector:
+    def from_config(cls, config: DetectorConfig, context: DetectorContext) -> RfdetrDetector:
         """Return the detector for a section of a cell file.
 
         Raises:
             InputError: An option is missing, unknown or invalid, or the model cannot be read.
         """
-        for _, message in cls.check(config, setting.base, {}):
+        folder = context.cell_folder
+        for _, message in cls.check(config, folder, {}):
             raise InputError(message)
-        options = read_options(RfdetrOptions, config)
-        model = OnnxModel(
-            setting.base / options.model_path, options.read_names(setting.base), options.threads
-        )
-        return cls(model, config, setting, options.class_map)
+        options = RfdetrOptions.read(config)
+        model = OnnxModel(folder / options.model_path, options.read_names(folder), options.threads)
+        return cls(model, config, context, options.class_map)
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each missing, unknown or invalid option, with an error message; load no model."""
         del others
-        errors = list(find_option_errors(RfdetrOptions, config))
+        errors = list(RfdetrOptions.find_errors(config))
         yield from errors
         if errors:
             return
-        options = read_options(RfdetrOptions, config)
+        options = RfdetrOptions.read(config)
         if not (base / options.model_path).is_file():
             yield "model_path", describe_missing_model(base / options.model_path)
         try:
@@ -105,7 +98,7 @@ class RfdetrDetector(ThreadedDetector):
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
         """Return the class names of the cell that the model can find; None if the options are invalid."""
         try:
-            options = read_options(RfdetrOptions, config)
+            options = RfdetrOptions.read(config)
             return tuple(options.class_map.get(name, name) for name in options.read_names(base))
         except InputError:
             return None
@@ -114,7 +107,7 @@ class RfdetrDetector(ThreadedDetector):
     def weights(config: DetectorConfig, base: Path) -> Path | None:
         """Return the path of the model file; None if the options are invalid."""
         try:
-            return base / read_options(RfdetrOptions, config).model_path
+            return base / RfdetrOptions.read(config).model_path
         except InputError:
             return None
 

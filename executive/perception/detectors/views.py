@@ -57,10 +57,9 @@ def list_regions(view: str, table_view: Region, size: tuple[int, int]) -> list[R
     if view != "full":
         raise InputError(f'there is no view "{view}"; the views are table and full')
     side = table_view[2] - table_view[0]
-    columns, rows = (_list_tile_starts(length, side) for length in size)
-    return [
-        (left, top, min(left + side, size[0]), min(top + side, size[1])) for top in rows for left in columns
-    ]
+    width, height = size
+    lefts, tops = _list_tile_starts(width, side), _list_tile_starts(height, side)
+    return [(left, top, min(left + side, width), min(top + side, height)) for top in tops for left in lefts]
 
 
 def search_regions(

@@ -12,8 +12,7 @@ from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
 from executive.errors import InputError
 from executive.perception.detectors.detector_registry import build_detectors, find_detector_kinds
-from executive.perception.detectors.requests import ChangedRequest
-from executive.perception.detectors.setting import ClosableDetector
+from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
 from executive.perception.envelope.fingerprint import compute_fingerprint, list_changed_properties
 from executive.perception.envelope.frame_statistics import FrameRange, compute_frame_statistics
 from executive.perception.envelope.measurement import MEASUREMENT_SUFFIX, Measurement, read_measurements

@@ -11,7 +11,7 @@ import pytest
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Answer, Detection
 from executive.cells.fake.noisy_detector import NoisyDetector
-from executive.perception.detectors.setting import DetectorSetting
+from executive.perception.detectors.requests import DetectorContext
 
 CLASSES = ("cube", "sphere", "duck")
 LOOKS = 1000
@@ -29,10 +29,10 @@ KNOWN = SimpleNamespace(
 def answers(seed=1, view="table", **errors):
     none = {"miss_rate": 1e-9, "confusion_rate": 1e-9, "false_detections": 1e-9, "jitter": 1e-9}
     config = DetectorConfig(kind="noisy", of="known", classes=list(CLASSES), **{**none, **errors})
-    setting = DetectorSetting(
+    context = DetectorContext(
         "noisy", SimpleNamespace(table_view=TABLE), None, Path(), seed, lambda name: KNOWN
     )
-    detector = NoisyDetector.from_config(config, setting)
+    detector = NoisyDetector.from_config(config, context)
     frames = [SimpleNamespace(id=number, image=np.zeros((480, 640, 3))) for number in range(LOOKS)]
     return [detector.request(frame, view).result() for frame in frames]
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from executive.cell.detection import Detection
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
 from executive.perception.detectors.roboflow.failure_messages import (
-    describe_delay,
     describe_failure,
     describe_invalid_answer,
+    describe_missed_deadline,
     shorten_to_line,
 )
 from executive.perception.detectors.roboflow.server_options import RoboflowOptions
@@ -202,4 +202,4 @@ def test_a_passed_deadline_is_reported_with_the_answers_of_the_server():
             ", which is not reachable; check that the server is running, and check url",
         ),
     ):
-        assert describe_delay(repeats, OPTIONS) == f"no answer within 1.0 s from {HOST}{end}"
+        assert describe_missed_deadline(repeats, OPTIONS) == f"no answer within 1.0 s from {HOST}{end}"

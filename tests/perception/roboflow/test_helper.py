@@ -108,7 +108,7 @@ def test_a_process_that_ends_or_is_never_ready_is_reported_without_the_key_and_r
 def test_neither_what_it_prints_nor_an_answer_too_deep_to_read_stops_it(start, capfd):
     assert ask(start("talks"), 5.0)["answer"] == {"width": 500, "height": 500}
     assert capfd.readouterr() == ("", "")
-    assert ask(start("nests"), 5.0) == {"failure": "invalid", "detail": "it is nested too deeply"}
+    assert ask(start("nests"), 5.0) == {"failure": "invalid", "detail": "the answer is nested too deeply"}
 
 
 def test_without_room_for_a_process_it_is_unavailable_until_there_is(start, monkeypatch):

@@ -16,8 +16,8 @@ from stub_server import BODIES, MODEL, SPOILT, WORKFLOW, StubServer
 
 from executive.cell.config import DetectorConfig
 from executive.errors import DeadlinePassed, Unavailable
+from executive.perception.detectors.requests import DetectorContext
 from executive.perception.detectors.roboflow.detector import RoboflowDetector
-from executive.perception.detectors.setting import DetectorSetting
 
 SECRET = "SECRET1234567890"
 DEADLINE = 2.0
@@ -49,8 +49,8 @@ def spot(left=300, top=200, channel=0):
 
 def build(name, **options):
     config = DetectorConfig(kind="roboflow", **{"model_id": MODEL, "deadline": DEADLINE, **options})
-    setting = DetectorSetting(name, CAMERA, SimpleNamespace(now=0.0), None, 0, None)
-    return RoboflowDetector.from_config(config, setting)
+    context = DetectorContext(name, CAMERA, SimpleNamespace(now=0.0), None, 0, None)
+    return RoboflowDetector.from_config(config, context)
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def detector(make, server):
 
 def search(detector, frame, view="table"):
     request = detector.request(frame, view)
-    detector._setting.clock.now += detector._options.deadline
+    detector._context.clock.now += detector._options.deadline
     assert request.ready
     return request.result()
 
@@ -280,7 +280,7 @@ def test_a_server_that_never_answers_costs_its_deadline_and_shows_it_on_the_runs
 ):
     detector._process.wait_until_ready()
     server.faults = lambda look: fault
-    clock = detector._setting.clock
+    clock = detector._context.clock
     clock.now, began = 10.0, time.monotonic()
     request = detector.request(spot(), "table")
     clock.now = 10.05

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,21 +13,13 @@ from numpy.typing import NDArray
 from executive.cell.config import DetectorConfig
 from executive.cell.detection import Detection
 from executive.errors import DeadlinePassed, InputError, Unavailable
-from executive.perception.detectors.requests import ThreadedDetector
+from executive.perception.detectors.options import OptionErrors
+from executive.perception.detectors.requests import DetectorContext, ThreadedDetector
+from executive.perception.detectors.roboflow import failure_messages
 from executive.perception.detectors.roboflow.answers import read_answer, read_output
-from executive.perception.detectors.roboflow.failure_messages import (
-    describe_delay,
-    describe_failure,
-    describe_invalid_answer,
-)
 from executive.perception.detectors.roboflow.inference_process import InferenceProcess, NoAnswer
 from executive.perception.detectors.roboflow.key import ApiKey
-from executive.perception.detectors.roboflow.server_options import (
-    WORKFLOW_OPTIONS,
-    RoboflowOptions,
-    find_roboflow_option_errors,
-)
-from executive.perception.detectors.setting import DetectorSetting, OptionErrors
+from executive.perception.detectors.roboflow.server_options import WORKFLOW_OPTIONS, RoboflowOptions
 from executive.perception.detectors.views import Region, remove_duplicates, search_regions
 
 
@@ -36,43 +29,42 @@ class RoboflowDetector(ThreadedDetector):
     Args:
         config: Section of the detector in the cell file.
         options: Options of this kind of detector.
-        setting: Parts of the cell and of the run that the detector uses.
+        context: Parts of the cell and of the run that the detector uses.
         key: API key of the user.
     """
 
     def __init__(
-        self, config: DetectorConfig, options: RoboflowOptions, setting: DetectorSetting, key: ApiKey
+        self, config: DetectorConfig, options: RoboflowOptions, context: DetectorContext, key: ApiKey
     ) -> None:
-        super().__init__(config, setting, options.deadline)
+        super().__init__(config, context, options.deadline)
         self._options = options
         self._read_answer = read_output if options.api == "workflow" else read_answer
         server = options.model_dump(include={"url", "model_id", "api", *WORKFLOW_OPTIONS})
         self._process = InferenceProcess({**server, "confidence": config.floor}, key)
 
     @classmethod
-    def from_config(cls, config: DetectorConfig, setting: DetectorSetting) -> RoboflowDetector:
-        """Return the detector for a section of a cell file; sends no request and needs no API key.
+    def from_config(cls, config: DetectorConfig, context: DetectorContext) -> RoboflowDetector:
+        """Return the detector for a section of a cell file, without a request and without an API key.
 
         Raises:
             InputError: An option is missing, unknown or invalid.
         """
-        for _, message in find_roboflow_option_errors(config):
-            raise InputError(message)
-        return cls(config, RoboflowOptions.model_validate(config.options), setting, ApiKey())
+        return cls(config, RoboflowOptions.read(config), context, ApiKey())
 
     @staticmethod
     def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
         del base, others
-        yield from find_roboflow_option_errors(config)
+        yield from RoboflowOptions.find_errors(config)
 
     @staticmethod
     def labels(config: DetectorConfig, base: Path) -> tuple[str, ...] | None:
-        """Return the class names of the cell that the model can find; None if not listed in the options."""
+        """Return the class names of the cell that the model can find; None if the options list none."""
         del base
-        if list(find_roboflow_option_errors(config)):
+        try:
+            options = RoboflowOptions.read(config)
+        except InputError:
             return None
-        options = RoboflowOptions.model_validate(config.options)
         return tuple(options.class_map.get(name, name) for name in options.labels) or None
 
     def _list_regions(self, view: str, size: tuple[int, ...]) -> list[Region]:
@@ -88,21 +80,22 @@ class RoboflowDetector(ThreadedDetector):
     def _search(self, image: NDArray[np.uint8], regions: Sequence[Region]) -> list[Detection]:
         self._process.wait_until_ready()
         deadline = time.monotonic() + self._options.deadline
-        return search_regions(
-            image, regions, lambda crop: self._detect_in_crop(crop, deadline), self._options.class_map
-        )
+        detect = partial(self._detect_in_crop, deadline=deadline)
+        return search_regions(image, regions, detect, self._options.class_map)
 
     def _detect_in_crop(self, crop: NDArray[np.uint8], deadline: float) -> list[Detection]:
         """Return the detections of the server in a crop of a frame, with boxes in pixels of the crop."""
         try:
             message = self._process.request(crop, deadline)
         except NoAnswer as error:
-            raise DeadlinePassed(describe_delay(error.retry_causes, self._options)) from None
+            text = failure_messages.describe_missed_deadline(error.retry_causes, self._options)
+            raise DeadlinePassed(text) from None
         if "failure" in message:
-            raise Unavailable(describe_failure(message, self._options))
+            raise Unavailable(failure_messages.describe_failure(message, self._options))
         try:
-            answer = self._read_answer(message["answer"], (crop.shape[1], crop.shape[0]))
+            detections = self._read_answer(message["answer"], (crop.shape[1], crop.shape[0]))
         except ValueError as error:
-            raise Unavailable(describe_invalid_answer(str(error), self._options)) from None
-        detections = [detection for detection in answer if detection.confidence >= self._config.floor]
+            text = failure_messages.describe_invalid_answer(str(error), self._options)
+            raise Unavailable(text) from None
+        detections = [detection for detection in detections if detection.confidence >= self._config.floor]
         return remove_duplicates(sorted(detections, key=lambda detection: -detection.confidence))

@@ -53,7 +53,7 @@ def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> st
     return f"{options.host} {problem}{f' ({detail})' if detail else ''}; {advice}"
 
 
-def describe_delay(retry_causes: Sequence[int | None], options: RoboflowOptions) -> str:
+def describe_missed_deadline(retry_causes: Sequence[int | None], options: RoboflowOptions) -> str:
     """Return the message about a missed deadline.
 
     `retry_causes` are the HTTP statuses that caused retries before the deadline; None for no connection.

@@ -158,8 +158,8 @@ class InferenceProcess:
         try:
             message: Mapping[str, Any] = json.loads(self._key.redact(line.decode()))
         except RecursionError:
-            # The helper process has a shallower call stack, so that its parser accepts deeper nesting.
-            return {"failure": "invalid", "detail": "it is nested too deeply"}
+            # The parser of the helper process reaches its recursion limit later: fewer calls are active.
+            return {"failure": "invalid", "detail": "the answer is nested too deeply"}
         return message
 
     def _raise_exit_error(self, process: subprocess.Popen[bytes]) -> None:

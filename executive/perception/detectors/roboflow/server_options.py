@@ -7,9 +7,9 @@ from urllib.parse import urlsplit
 
 from pydantic import Field
 
-from executive.cell.config import DetectorConfig, Section
+from executive.cell.config import DetectorConfig
+from executive.perception.detectors.options import DetectorOptions, OptionErrors, find_class_map_errors
 from executive.perception.detectors.roboflow.key import KEY_VARIABLE
-from executive.perception.detectors.setting import OptionErrors, find_class_map_errors, find_option_errors
 
 HOSTED_URL = "https://serverless.roboflow.com"
 """Address of Roboflow's hosted server."""
@@ -21,7 +21,7 @@ FORBIDDEN_CHARACTERS = "?&#= "
 """Characters that are not allowed in names, because they would change the URL of a request."""
 
 
-class RoboflowOptions(Section):
+class RoboflowOptions(DetectorOptions):
     """Options of a detector of kind `roboflow`, in addition to the options of all detectors."""
 
     model_id: str = ""
@@ -71,43 +71,39 @@ class RoboflowOptions(Section):
         """Names of the options that select the model or the workflow, for messages."""
         return "workspace and workflow_id" if self.api == "workflow" else "model_id"
 
-
-def find_roboflow_option_errors(config: DetectorConfig) -> OptionErrors:
-    """Yield each invalid option, with a message."""
-    errors = list(find_option_errors(RoboflowOptions, config))
-    for option, message in errors:
-        if any(part in option.lower() for part in SECRET_WORDS):
-            message = (
-                f'"{option}" does not belong in a cell file, because others can read the file; '
-                f"delete the option and set the environment variable {KEY_VARIABLE}"
-            )
-        yield option, message
-    if errors:
-        return
-    options = RoboflowOptions.model_validate(config.options)
-    yield from _check_url(options.url)
-    yield from _check_workflow(options) if options.api == "workflow" else _check_model(options)
-    if options.labels:
-        yield from find_class_map_errors(config, options.class_map, options.labels)
+    @classmethod
+    def find_errors(cls, config: DetectorConfig) -> OptionErrors:
+        """Yield each invalid option in the section `config`, with an error message."""
+        errors = list(super().find_errors(config))
+        for option, message in errors:
+            if any(part in option.lower() for part in SECRET_WORDS):
+                message = (
+                    f'"{option}" does not belong in a cell file, because others can read the file; '
+                    f"delete the option and set the environment variable {KEY_VARIABLE}"
+                )
+            yield option, message
+        if errors:
+            return
+        options = cls.model_validate(config.options)
+        yield from _check_url(options.url)
+        yield from _check_workflow(options) if options.api == "workflow" else _check_model(options)
+        if options.labels:
+            yield from find_class_map_errors(config, options.class_map, options.labels)
 
 
 def _check_model(options: RoboflowOptions) -> OptionErrors:
     """Yield the first invalid option for requests to a model, with a message."""
-    extras = [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]
-    parts = options.model_id.split("/")
-    if extras:
-        names = ", ".join(extras)
-        yield extras[0], f"api: {options.api} does not use {names}; write api: workflow, or delete {names}"
-    elif not options.model_id:
-        yield "model_id", f"api: {options.api} needs model_id: project/version, or a name such as rfdetr-nano"
-    elif any(character in options.model_id for character in FORBIDDEN_CHARACTERS):
+    api, model_id, parts = options.api, options.model_id, options.model_id.split("/")
+    if unused_options := ", ".join(name for name in WORKFLOW_OPTIONS if name in options.model_fields_set):
+        remedy = f"write api: workflow, or delete {unused_options}"
+        yield unused_options.partition(",")[0], f"api: {api} does not use {unused_options}; {remedy}"
+    elif not model_id:
+        yield "model_id", f"api: {api} needs model_id: project/version, or a name such as rfdetr-nano"
+    elif any(character in model_id for character in FORBIDDEN_CHARACTERS):
         yield "model_id", "model_id must be a name or project/version, without ?, &, #, = or a space"
-    elif options.api == "v0" and (len(parts) > 2 or not all(parts)):
-        yield (
-            "model_id",
-            f"model_id must be project/version for v0, or a name such as rfdetr-nano, "
-            f'not "{options.model_id}"',
-        )
+    elif api == "v0" and (len(parts) > 2 or not all(parts)):
+        problem = "must be project/version for v0, or a name such as rfdetr-nano"
+        yield "model_id", f'model_id {problem}, not "{model_id}"'
 
 
 def _check_workflow(options: RoboflowOptions) -> OptionErrors:
