@@ -13,7 +13,7 @@ from executive.motion.joints import JointLimits, JointRange
 from executive.motion.planner import CollisionCheck, Planner
 
 KinematicsFactory = Callable[[float, JointRange, float | None], Kinematics]
-"""Function that builds kinematics from tool length [m], joint range, minimum link distance [m] or None."""
+"""Function of tool length [m], joint range, and minimum link distance [m] or None."""
 
 ARMS_BY_URDF: Mapping[str, tuple[int, KinematicsFactory]] = {
     "kuka_iiwa/model.urdf": (IIWA14_JOINT_COUNT, Iiwa14)
@@ -24,11 +24,9 @@ ARMS_BY_URDF: Mapping[str, tuple[int, KinematicsFactory]] = {
 def find_arm_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key and the message of each error: unsupported arm, or wrong number of joints."""
     if config.arm.urdf not in ARMS_BY_URDF:
-        yield (
-            ("arm", "urdf"),
-            f'the arm model "{config.arm.urdf}" has no kinematics; '
-            f"supported: {', '.join(sorted(ARMS_BY_URDF))}",
-        )
+        supported_arms = ", ".join(sorted(ARMS_BY_URDF))
+        message = f'the arm model "{config.arm.urdf}" has no kinematics; supported: {supported_arms}'
+        yield ("arm", "urdf"), message
         return
     joint_count, _ = ARMS_BY_URDF[config.arm.urdf]
     if config.arm.joint_count != joint_count:

@@ -27,13 +27,13 @@ _ROUNDING_ERROR = 1e-9  # fraction of a control period
 _BRAKING_TIMES = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
 """Candidates for the time from full speed to rest, the shortest first [s]."""
 _RAMP_FRACTIONS = (1 / 2, 1 / 3)
-"""Durations of the two ramps of the deceleration, each as a fraction of the braking time."""
+"""Candidates for the duration of each of the two ramps of the deceleration, per braking time."""
 
 
 class _BrakingProfile(NamedTuple):
     """Path times `s` [s], rates `r`, and derivatives `dr/dt` [1/s] at `N` control steps, each `(N,)`."""
 
-    times: Array
+    path_times: Array
     rates: Array
     rate_derivatives: Array
 
@@ -42,32 +42,31 @@ def plan_braking(trajectory: Trajectory, start_time: float, limits: JointLimits,
     """Return the path times `(N,)` [s] of the control steps after `start_time`, until the arm is at rest.
 
     The arm either brakes along the path or completes the motion. The result is the shortest candidate within
-    the stop limits of joint acceleration and jerk; if none exists, the one that exceeds them least. The
-    arm begins to brake at the path time `start_time` [s]; `period` is the control period [s].
+    the stop limits of joint acceleration and jerk; if no candidate is within the limits, the candidate with
+    the smallest excess. The braking begins at path time `start_time` [s]; `period` is the control period [s].
     """
-    best_times, min_peak_fraction = np.array([start_time]), math.inf
+    best_path_times, min_peak_fraction = np.array([start_time]), math.inf
     for profile in _list_profiles(trajectory, start_time, period):
         peak_fraction = _compute_peak_fraction(trajectory, start_time, profile, limits, period)
         if peak_fraction <= 1.0:
-            return profile.times
+            return profile.path_times
         if peak_fraction < min_peak_fraction:
-            best_times, min_peak_fraction = profile.times, peak_fraction
-    return best_times
+            best_path_times, min_peak_fraction = profile.path_times, peak_fraction
+    return best_path_times
 
 
 def _list_profiles(trajectory: Trajectory, start_time: float, period: float) -> Iterator[_BrakingProfile]:
     """Yield braking profiles and the completion of the motion, the shortest first."""
     remaining_time = max(0.0, trajectory.duration - start_time)
-    has_listed_completion = remaining_time > MAX_BRAKING_TIME
-    for braking_time in _BRAKING_TIMES:
-        if not has_listed_completion and remaining_time <= braking_time:
-            has_listed_completion = True
+    completion_index = np.searchsorted(_BRAKING_TIMES, remaining_time)
+    for index, braking_time in enumerate(_BRAKING_TIMES.tolist()):
+        if index == completion_index:
             step_count = _count_steps(remaining_time, period)
             end_time = start_time + remaining_time
-            times = np.minimum(start_time + period * np.arange(1, step_count + 1), end_time)
-            yield _BrakingProfile(times, np.ones(step_count), np.zeros(step_count))
+            path_times = np.minimum(start_time + period * np.arange(1, step_count + 1), end_time)
+            yield _BrakingProfile(path_times, np.ones(step_count), np.zeros(step_count))
         for ramp_fraction in _RAMP_FRACTIONS:
-            yield _make_profile(start_time, float(braking_time), ramp_fraction, period)
+            yield _make_profile(start_time, braking_time, ramp_fraction, period)
 
 
 def _count_steps(duration: float, period: float) -> int:
@@ -96,8 +95,8 @@ def _compute_peak_fraction(
 ) -> float:
     """Return the largest joint acceleration or jerk of a braking profile as a fraction of its stop limit."""
     accelerations = [trajectory.state_at(start_time).qdd]
-    for time, rate, rate_derivative in zip(*profile, strict=True):
-        _, velocity, acceleration = trajectory.state_at(float(time))
+    for path_time, rate, rate_derivative in zip(*profile, strict=True):
+        _, velocity, acceleration = trajectory.state_at(float(path_time))
         accelerations.append(acceleration * rate**2 + velocity * rate_derivative)
     accelerations.append(np.zeros_like(accelerations[0]))
     jerks = np.diff(accelerations, axis=0) / period

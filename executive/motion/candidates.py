@@ -10,7 +10,7 @@ import numpy as np
 from executive.cell.arm import Goal
 from executive.geometry import Array
 from executive.motion.arm_model import BranchKey, Kinematics
-from executive.motion.cartesian_line import WAYPOINT_COUNT, CartesianLine
+from executive.motion.cartesian_line import CartesianLine
 from executive.motion.configurations import find_configuration_pairs, solve_vertical_waypoints
 from executive.motion.joints import JointLimits, JointState, compute_min_time
 
@@ -41,16 +41,16 @@ class Candidate:
 
 
 def find_candidates(
-    kinematics: Kinematics, limits: JointLimits, start: JointState, goal: Goal, arrival_length: float
+    kinematics: Kinematics, limits: JointLimits, start: JointState, goal: Goal, length: float
 ) -> Iterator[Candidate]:
     """Yield candidates for motions from `start` to a goal, in the order of their minimum durations.
 
-    The last `arrival_length` [m] of each motion is straight; 0: no straight arrival.
+    The arrival is the last `length` [m] of each motion; 0: no arrival.
 
     Raises:
         Unreachable: No joint configuration reaches the goal.
     """
-    pairs = find_configuration_pairs(kinematics, goal, arrival_length, start.q)
+    pairs = find_configuration_pairs(kinematics, goal, length, start.q)
     durations = compute_min_time(pairs.upper_qs - start.q, limits)
     previous_qs: list[Array] = []
     for index in np.argsort(durations, kind="stable"):
@@ -59,10 +59,8 @@ def find_candidates(
             continue
         previous_qs.append(goal_q)
         arrival, entry = None, JointState.at_rest(goal_q)
-        if arrival_length > 0:
-            waypoints = solve_vertical_waypoints(kinematics, goal_q, arrival_length, WAYPOINT_COUNT, branch)
-            arrival = CartesianLine(
-                waypoints[::-1], arrival_length, limits, goal.guarded_speed, starts_in_motion=True
-            )
+        if length > 0:
+            waypoints = solve_vertical_waypoints(kinematics, goal_q, length, branch)[::-1]
+            arrival = CartesianLine(waypoints, length, limits, goal.guarded_speed, starts_in_motion=True)
             entry = arrival.state_at(0.0)
         yield Candidate(float(durations[index]), entry, arrival, branch)

@@ -21,8 +21,6 @@ from scipy.interpolate import CubicSpline
 from executive.geometry import Array
 from executive.motion.joints import JointLimits, JointState
 
-WAYPOINT_COUNT = 4
-"""Number of inverse-kinematics solutions along a line."""
 MAX_CURVATURE_FRACTION = 0.5
 """Maximum fraction of a joint's acceleration and jerk limits that the terms with q_ss and q_sss may use."""
 _CHECKED_FRACTIONS = np.linspace(0.0, 1.0, 33)  # fractions of the length at which joint limits are evaluated
@@ -32,7 +30,7 @@ _MIN_DIVISOR = 1e-9  # [rad/m], [rad/m²], [rad/m³]: avoids a division by 0 for
 class CartesianLine:
     """A straight motion of the tool; implements `executive.motion.trajectory.MotionPiece`.
 
-    If the tool moves at one end of the line, its speed there is the highest from which it can stop on it.
+    At an end where the tool moves, its speed is the highest from which the tool can stop on the line.
 
     Args:
         waypoints: Joint positions `(N, n)` [rad] at `N` evenly spaced points of the line, `N` > 3.

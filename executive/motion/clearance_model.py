@@ -31,7 +31,7 @@ SAMPLING_MARGIN = 0.001
 """Addition to the margin of the cell, because only samples of a motion are checked [m]."""
 MAX_PENETRATION = 2e-4
 """Maximum depth by which a moving load may be pressed into its support [m]."""
-TILT_DISTANCE = 0.1
+DISTANCE_PER_COSINE = 0.1
 """Factor that converts the cosine of the tool's tilt to an equivalent distance [m]."""
 MAX_EXTRA_TILT = 0.003
 """Maximum tilt of the tool beyond its limit during a motion, as an equivalent distance [m]."""
@@ -129,10 +129,11 @@ class ClearanceModel:
         """
         required_distances = self._find_required_distances(tcps)
         slack = self._compute_all_distances(tcps, axes, discs) - required_distances[:, None]
-        state, prism_count = np.arange(len(tcps)), slack.shape[2]
-        pair_slack = slack.reshape(len(tcps), slack.shape[1] * prism_count)
+        state_count, disc_count, prism_count = slack.shape
+        pair_slack = slack.reshape(state_count, disc_count * prism_count)
         disc, prism = np.divmod(pair_slack.argmin(axis=1), prism_count)
-        old_slack, required_distances = slack[state, disc, prism], required_distances[state, prism]
+        old_slack = pair_slack.min(axis=1)
+        required_distances = required_distances[np.arange(state_count), prism]
         nearest_disc = Discs(discs.offsets[disc, None], discs.radii[disc, None], discs.min_cosine)
         prism_fields = [values[prism, None] for values in self._prisms[:-1]]
         nearest_prism = Prisms._make([*prism_fields, self._prisms.names])
@@ -203,7 +204,7 @@ def _describe_tcp(tcp: Array) -> str:
 
 def _compute_tilt_slack(axes: Array, discs: Discs) -> Array:
     """Return the remaining tilt of tool axes `(..., 3)` up to the limit, as an equivalent distance [m]."""
-    return TILT_DISTANCE * (-axes[..., 2] - discs.min_cosine)
+    return DISTANCE_PER_COSINE * (-axes[..., 2] - discs.min_cosine)
 
 
 def _build_prisms(config: CellConfig, obstacles: Sequence[Obstacle]) -> Prisms:

@@ -19,6 +19,8 @@ COARSE_ANGLE_STEP = math.radians(5.0)
 """Distance between the redundancy angles in the first search for configurations [rad]."""
 FINE_ANGLE_STEP = math.radians(0.25)
 """Distance between the redundancy angles in the second search, if the first search finds nothing [rad]."""
+WAYPOINT_COUNT = 4
+"""Number of waypoints on a vertical line."""
 MIN_COSINE_ON_LINE = 0.9998
 """Minimum cosine between the tool axis and straight down at the start of a vertical line."""
 _MAX_SOLUTION_ERROR = 1e-6  # [rad]
@@ -61,7 +63,9 @@ def find_configuration_pairs(
     raise _make_unreachable_error(kinematics, poses, (upper, lower))
 
 
-def find_vertical_waypoints(kinematics: Kinematics, q: Array, length: float, count: int) -> Array | None:
+def find_vertical_waypoints(
+    kinematics: Kinematics, q: Array, length: float, count: int = WAYPOINT_COUNT
+) -> Array | None:
     """Return evenly spaced waypoints `(count, n)` [rad] on a vertical line of the tool, or None.
 
     The line leads from the tool at `q` `(n,)` [rad] upwards, is `length` [m] long, and stays in the branch of
@@ -78,17 +82,15 @@ def find_vertical_waypoints(kinematics: Kinematics, q: Array, length: float, cou
     return waypoints if is_inside and np.max(np.abs(waypoints[0] - q)) < _MAX_SOLUTION_ERROR else None
 
 
-def solve_vertical_waypoints(
-    kinematics: Kinematics, q: Array, length: float, count: int, branch: BranchKey
-) -> Array:
-    """Return evenly spaced waypoints `(count, n)` [rad] on a vertical line of the tool in one branch.
+def solve_vertical_waypoints(kinematics: Kinematics, q: Array, length: float, branch: BranchKey) -> Array:
+    """Return evenly spaced waypoints `(WAYPOINT_COUNT, n)` [rad] on a vertical line, in one branch.
 
     The line of `length` [m] leads upwards from `q` `(n,)` [rad]; tool axis and joint range are not checked.
 
     Raises:
         Unreachable: A point of the line is too far from the arm or too near to the arm.
     """
-    waypoints = _solve_waypoints(kinematics, kinematics.compute_tool_pose(q), length, count, branch)
+    waypoints = _solve_waypoints(kinematics, kinematics.compute_tool_pose(q), length, WAYPOINT_COUNT, branch)
     return waypoints + wrap_angles(q - waypoints[0])
 
 
@@ -96,12 +98,8 @@ def _solve_waypoints(
     kinematics: Kinematics, X_WT: Pose, length: float, count: int, branch: BranchKey
 ) -> Array:
     """Return continuous waypoints `(count, n)` [rad] on a vertical line upwards from the tool pose."""
-    waypoints = np.array(
-        [
-            kinematics.solve(Pose(X_WT.rotation, X_WT.position + np.array([0.0, 0.0, height])), branch)
-            for height in np.linspace(0.0, length, count)
-        ]
-    )
+    positions = X_WT.position + np.outer(np.linspace(0.0, length, count), [0.0, 0.0, 1.0])
+    waypoints = np.array([kinematics.solve(Pose(X_WT.rotation, p), branch) for p in positions])
     waypoints[1:] = waypoints[0] + wrap_angles(waypoints[1:] - waypoints[0])
     return waypoints
 

@@ -19,7 +19,7 @@ DISTANCE_PER_ACCELERATION = 0.02
 """Factor that converts accelerations to distances in the constraints of the optimizer [m per m/s²]."""
 SAMPLE_STRIDE = 4
 """Every `SAMPLE_STRIDE`-th sample has a constraint; a divisor of `SAMPLES_PER_STEP`."""
-_SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])  # factors of three samples in `acceleration * time step²`
+_SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])  # Product with three samples: acceleration * sample_time²
 _FINITE_DIFFERENCE_STEP = 1e-4  # [rad]
 MIN_LIFT_ACCELERATION = 0.5
 """Lower limit of the maximum acceleration of a lift, even if the seal withstands less [m/s²]."""

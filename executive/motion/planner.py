@@ -1,9 +1,9 @@
 """Motion planner: motions from rest to rest, as fast as the limits allow, without collision.
 
 The planner chooses the branch of the inverse kinematics and, if the yaw of the goal is free, the final yaw.
-It prefers the direct motion, and optimizes a detour if an obstacle blocks the direct motion. Each motion is
-checked for collisions, optionally in a more exact model. The search has a maximum number of steps instead of
-a timeout, so that equal queries have equal results.
+The planner prefers the direct motion, and optimizes a detour if an obstacle blocks the direct motion. Each
+motion is checked for collisions, optionally in a more exact model. The search has a maximum number of steps
+instead of a timeout, so that equal queries have equal results.
 """
 
 from __future__ import annotations

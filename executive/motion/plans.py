@@ -60,10 +60,8 @@ class PlanFactory(Generic[M]):
     def __init__(
         self, plan: Callable[[Array, Goal | str, Task], M], clock: Clock, planning_time: float, emit: Emit
     ) -> None:
-        self._plan_motion = plan
-        self._clock = clock
-        self._planning_time = planning_time
-        self._emit = emit
+        self._plan_motion, self._planning_time = plan, planning_time
+        self._clock, self._emit = clock, emit
         self._stored_query: tuple[bytes, Goal | str, Task] | None = None
         self._stored_plan: Plan[M] | None = None
 

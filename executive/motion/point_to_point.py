@@ -62,12 +62,9 @@ class Connector:
             if values.shape != (joint_count,) or not np.isfinite(values.sum()):
                 raise Fault(f"a motion needs states of {joint_count} finite numbers, not {values}")
         inputs, profile = self._inputs, Profile(joint_count)
-        inputs.current_position, inputs.current_velocity, inputs.current_acceleration = (
-            values.tolist() for values in start
-        )
-        inputs.target_position, inputs.target_velocity, inputs.target_acceleration = (
-            values.tolist() for values in end
-        )
+        inputs.current_position, inputs.target_position = start.q.tolist(), end.q.tolist()
+        inputs.current_velocity, inputs.target_velocity = start.qd.tolist(), end.qd.tolist()
+        inputs.current_acceleration, inputs.target_acceleration = start.qdd.tolist(), end.qdd.tolist()
         inputs.minimum_duration = min_duration
         cause: str | None = None
         try:

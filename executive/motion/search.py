@@ -16,7 +16,7 @@ from executive.errors import Unreachable
 from executive.geometry import Array, make_tool_down_pose
 from executive.motion.arm_model import BranchKey, Kinematics
 from executive.motion.candidates import Candidate, find_candidates
-from executive.motion.cartesian_line import WAYPOINT_COUNT, CartesianLine
+from executive.motion.cartesian_line import CartesianLine
 from executive.motion.clearance_model import ClearanceModel, make_tool_discs
 from executive.motion.configurations import find_vertical_waypoints, solve_vertical_waypoints
 from executive.motion.joints import JointLimits, JointState
@@ -110,12 +110,11 @@ class MotionSearch:
         return np.array([[x, y, z + self._end.guarded_length]]), np.array([[0.0, 0.0, -1.0]])
 
     def _list_candidates(self) -> Iterator[Candidate]:
-        """Yield candidates for the end of the motion, the fastest first."""
+        """Return an iterator of candidates for the end of the motion, the fastest first."""
         if not isinstance(self._end, Goal):
-            yield Candidate(0.0, JointState.at_rest(self._end), None, None)
-            return
+            return iter([Candidate(0.0, JointState.at_rest(self._end), None, None)])
         arrival_length = self._end.guarded_length or self._straight_length
-        yield from find_candidates(self._kinematics, self._limits, self._start, self._end, arrival_length)
+        return find_candidates(self._kinematics, self._limits, self._start, self._end, arrival_length)
 
     def _list_direct_and_optimized(self, candidates: Sequence[Candidate]) -> Iterator[Trajectory]:
         """Yield direct motions without collision and optimized detours, the fastest first."""
@@ -206,9 +205,7 @@ class MotionSearch:
         if candidate.branch is None or z >= height:
             return [*rise, connect(start_corner, entry)]
         if is_straight and candidate.arrival is None:
-            waypoints = solve_vertical_waypoints(
-                self._kinematics, entry.q, height - z, WAYPOINT_COUNT, candidate.branch
-            )
+            waypoints = solve_vertical_waypoints(self._kinematics, entry.q, height - z, candidate.branch)
             descent = CartesianLine(waypoints[::-1], height - z, self._limits)
             return [*rise, connect(start_corner, JointState.at_rest(waypoints[-1])), descent]
         goal_corner = self._solve_corner((x, y, height), candidate.branch, entry.q)
@@ -224,7 +221,7 @@ class MotionSearch:
         if not is_pointing_down or z >= height:
             return [], self._start
         if is_straight and self._departure is None:
-            waypoints = find_vertical_waypoints(self._kinematics, q, height - z, WAYPOINT_COUNT)
+            waypoints = find_vertical_waypoints(self._kinematics, q, height - z)
             if waypoints is not None:
                 line = CartesianLine(waypoints, height - z, self._limits)
                 return [line], JointState.at_rest(waypoints[-1])
@@ -253,7 +250,7 @@ class MotionSearch:
         length = self._straight_length or (LIFT_OFF_DISTANCE if self._payload else 0.0)
         if not length or height + length > self._travel_height:
             return None
-        waypoints = find_vertical_waypoints(self._kinematics, start, length, WAYPOINT_COUNT)
+        waypoints = find_vertical_waypoints(self._kinematics, start, length)
         if waypoints is None:
             return None
         acceleration = self._payload.max_lift_acceleration if self._payload else math.inf

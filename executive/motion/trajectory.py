@@ -101,9 +101,8 @@ class Trajectory:
         for name, peaks in zip(("velocity", "acceleration", "jerk"), peak_fractions, strict=True):
             joint = int(np.argmax(peaks))
             if peaks[joint] > 1 + _ROUNDING_ERROR:
-                raise JointLimitError(
-                    f"the {name} of joint {joint + 1} would be {peaks[joint]:.3f} times its limit"
-                )
+                factor = f"{peaks[joint]:.3f} times"
+                raise JointLimitError(f"the {name} of joint {joint + 1} would be {factor} its limit")
         return states
 
 

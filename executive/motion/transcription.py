@@ -105,12 +105,9 @@ class Transcription:
         self._start, self._end = start, end
         self._grid = grid = _build_grid(limits.joint_count)
         self._inner_count = limits.joint_count * (STEP_COUNT - 1)
-        max_velocity, self._max_acceleration, max_jerk = (
-            fraction * limit
-            for fraction, limit in zip(
-                USED_LIMIT_FRACTIONS, (limits.velocity, limits.acceleration, limits.jerk), strict=True
-            )
-        )
+        velocity_fraction, acceleration_fraction, jerk_fraction = USED_LIMIT_FRACTIONS
+        max_velocity, max_jerk = velocity_fraction * limits.velocity, jerk_fraction * limits.jerk
+        self._max_acceleration = acceleration_fraction * limits.acceleration
         half_velocity, velocity_count = grid.half_velocity, len(grid.half_velocity)
         acceleration_count, jerk_count = self._inner_count, limits.joint_count * STEP_COUNT
         jerk_ends = np.zeros((limits.joint_count, STEP_COUNT))
@@ -119,12 +116,8 @@ class Transcription:
         velocity_ends = np.outer(start.qdd, half_velocity[:, 0]) + np.outer(end.qdd, half_velocity[:, -1])
         # Each row limits the absolute value of `row y + linear h + quadratic h²` to
         # `bound[0] h + bound[1] h² + bound[2] h³`. The rows limit accelerations, velocities, and jerks.
-        self._linear = np.concatenate(
-            [np.zeros(acceleration_count), np.repeat(start.qd, velocity_count), np.zeros(jerk_count)]
-        )
-        self._quadratic = np.concatenate(
-            [np.zeros(acceleration_count), velocity_ends.ravel(), jerk_ends.ravel()]
-        )
+        self._linear = np.pad(np.repeat(start.qd, velocity_count), (acceleration_count, jerk_count))
+        self._quadratic = np.pad(np.append(velocity_ends, jerk_ends), (acceleration_count, 0))
         self._bound = np.zeros((3, len(self._linear)))
         self._bound[1, :acceleration_count] = np.repeat(self._max_acceleration, STEP_COUNT - 1)
         self._bound[0, acceleration_count:-jerk_count] = np.repeat(max_velocity, velocity_count)
@@ -212,9 +205,8 @@ class Transcription:
         row_lower[2 * limit_count :] = row_upper[2 * limit_count :]
         lower, upper = np.full(h_column + 2, -_UNBOUNDED), np.full(h_column + 2, _UNBOUNDED)
         lower[h_column:], upper[h_column] = (MIN_STEP_FACTOR, 0.0), MAX_STEP_FACTOR
-        scale = np.concatenate(
-            [np.repeat(self._max_acceleration * step**2, STEP_COUNT - 1), [step, _VIOLATION_UNIT]]
-        )
+        scale = np.repeat(self._max_acceleration * step**2, STEP_COUNT - 1)
+        scale = np.append(scale, [step, _VIOLATION_UNIT])
         hessian, gradient = SMOOTHNESS_WEIGHT * np.eye(h_column + 2), np.zeros(h_column + 2)
         return _Program(scale, hessian, gradient, rows, lower, upper, row_lower, row_upper, 2 * joint_count)
 

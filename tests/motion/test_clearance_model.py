@@ -15,10 +15,10 @@ from executive.cell.objects import Load, ObjectClass, Obstacle
 from executive.errors import Blocked
 from executive.geometry import Array
 from executive.motion.clearance_model import (
+    DISTANCE_PER_COSINE,
     OBSERVED_RADIUS,
     POSITION_TOLERANCE,
     SAMPLING_MARGIN,
-    TILT_DISTANCE,
     ClearanceModel,
     Discs,
     make_tool_discs,
@@ -106,7 +106,7 @@ def test_distances_from_a_bin_are_what_geometry_says(config: CellConfig, tip) ->
     # Its end is here, so that the workspace beside does not count.
     found = slack(ClearanceModel(config, (), tip[None, :2]), tip, discs=discs)
     if nearest > 0:
-        spare = TILT_DISTANCE * (1 - discs.min_cosine)
+        spare = DISTANCE_PER_COSINE * (1 - discs.min_cosine)
         assert found == pytest.approx(
             min(nearest - (config.motion.margin + SAMPLING_MARGIN), spare), abs=5e-4
         )
@@ -139,7 +139,7 @@ def test_the_workspace_is_not_entered_low_but_where_it_was_looked_at(config, x, 
         assert slack(ClearanceModel(config, (), end), tip, discs=discs) < 0
     elif away < OBSERVED_RADIUS - 1e-9:
         wanted = min(
-            tip[2] - (config.motion.margin + SAMPLING_MARGIN), TILT_DISTANCE * (1 - discs.min_cosine)
+            tip[2] - (config.motion.margin + SAMPLING_MARGIN), DISTANCE_PER_COSINE * (1 - discs.min_cosine)
         )
         assert slack(ClearanceModel(config, (), end), tip, discs=discs) == pytest.approx(wanted, abs=1e-9)
 
