@@ -25,12 +25,15 @@ class IsHolding(Skill):
 
     def run(self, cell: Cell) -> None:
         """Compare the vacuum sensor with the ledger; unless both report an item, open the tool and fail."""
-        item = cell.ledger.find_held_item()
-        if cell.tool.holding and item is not None:
+        item, is_sealed = cell.ledger.find_held_item(), cell.tool.holding
+        if is_sealed and item is not None:
             self.held = item
             return
         cell.tool.open()
         if item is not None:
             cell.ledger.record_drop(item)
             raise self.failure("empty", f"the sensor detects no seal; {item} was dropped")
-        raise self.failure("empty", "the sensor detects no seal")
+        seal = (
+            "a seal, but the ledger has no item in the tool; the tool was opened" if is_sealed else "no seal"
+        )
+        raise self.failure("empty", f"the sensor detects {seal}")

@@ -18,6 +18,15 @@ def test_an_empty_tool_is_a_failure(fake: FakeCell) -> None:
     assert result.message == "the sensor detects no seal"
 
 
+def test_an_object_that_the_ledger_does_not_know_is_released(fake: FakeCell, held: str) -> None:
+    fake.ledger.record_drop(held)
+    result = run_skill(IsHolding(), fake)
+    assert (result.status, result.reason, fake.tool.holding) == ("FAILURE", "empty", False)
+    assert result.message == (
+        "the sensor detects a seal, but the ledger has no item in the tool; the tool was opened"
+    )
+
+
 def test_what_should_be_in_the_tool_and_is_not_was_dropped(fake: FakeCell, held: str) -> None:
     fake.tool.open()
     assert run_skill(IsHolding(), fake).message == f"the sensor detects no seal; {held} was dropped"
