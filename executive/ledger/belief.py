@@ -110,6 +110,11 @@ class Belief:
         return 1.0 if self.is_proved else float(expit(self.log_odds))
 
     @property
+    def is_probable(self) -> bool:
+        """True if the item exists with a probability of at least 0.5."""
+        return self.existence_probability >= 0.5
+
+    @property
     def probability_at_last_detection(self) -> float:
         """Probability that the item exists, 0 to 1, without the evidence since the last detection."""
         return 1.0 if self.is_proved else float(expit(self.log_odds - math.log(self.miss_probability)))

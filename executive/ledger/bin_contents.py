@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from executive.cell.protocols import Routes
 from executive.geometry import Array
 from executive.ledger.association import MAX_STANDARD_DEVIATIONS
 from executive.ledger.item import ItemRecord, State
+from executive.ledger.records import ItemRecords
 
 WALL_MARGIN = 0.035
 """Minimum distance from the walls at which an object that lands in a bin certainly stays there [m]."""
@@ -27,6 +28,9 @@ BIN_AREA_FRACTION = 0.04
 FLOOR_POINTS = np.array([(0, 0, 0), (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0)])
 """Points of a bin's floor that must be visible, in units of half its length and half its width `(5, 3)`."""
 
+BinNames = Mapping[Observation, str | None]
+"""Name of the bin in which each observed object lies, or None."""
+
 
 @dataclass(frozen=True, eq=False)
 class BinContents:
@@ -36,31 +40,27 @@ class BinContents:
         config: Thresholds of the ledger, from the cell file.
         bins: Bins by name.
         routes: Names of the permitted bins by class.
+        records: All items.
     """
 
     config: LedgerConfig
     bins: Mapping[str, Bin]
     routes: Routes
+    records: ItemRecords
 
-    def count_objects_in(self, bin_name: str, records: Iterable[ItemRecord]) -> int:
+    def count_objects_in(self, bin_name: str) -> int:
         """Return the number of items that were released in a bin or have probably fallen into the bin."""
-        return sum(bin_name in (record.bin, find_probable_bin(record)) for record in records)
+        return sum(bin_name in (record.bin, find_probable_bin(record)) for record in self.records)
 
-    def find_bin_name(
-        self, observation: Observation, bias_std: float, records: Collection[ItemRecord]
-    ) -> str | None:
+    def find_bin_name(self, observation: Observation, bias_std: float) -> str | None:
         """Return the name of the bin in which an observed object lies, or None.
 
-        A bin that contains items is enlarged by the measurement error.
-
-        Args:
-            observation: The observed object.
-            bias_std: Standard deviation of the systematic measurement error along each axis [m].
-            records: All items.
+        A bin that contains items is enlarged by the measurement error. `bias_std` is the standard deviation
+        of the systematic measurement error along each axis [m].
         """
         max_error = MAX_STANDARD_DEVIATIONS * math.hypot(observation.std, bias_std)
         for name, bin in self.bins.items():
-            if bin.contains(observation.position, max_error if self.count_objects_in(name, records) else 0.0):
+            if bin.contains(observation.position, max_error if self.count_objects_in(name) else 0.0):
                 return name
         return None
 
@@ -74,17 +74,11 @@ class BinContents:
             if landing is not None and self.bins[bin_name].contains(landing, -WALL_MARGIN):
                 record.bin_log_odds[bin_name] = LOG_ODDS_FELL_IN_BIN
 
-    def place_dropped_items(
-        self, look: Detections, bin_names: Mapping[Observation, str | None], records: Collection[ItemRecord]
-    ) -> list[ItemRecord]:
+    def place_dropped_items(self, look: Detections, bin_names: BinNames) -> list[ItemRecord]:
         """Set dropped items that almost certainly lie in a permitted bin to PLACED; return these items.
 
-        If a look shows more objects of a class in a bin than known items, one object may be a dropped item.
-
-        Args:
-            look: Detections in a whole image.
-            bin_names: Name of the bin in which each observed object lies, or None.
-            records: All items.
+        If a look at the whole image shows more objects of a class in a bin than known items, one of the
+        objects may be a dropped item.
         """
         # The centre of an object that leans on a wall from the inside may lie over the wall.
         visible_counts = Counter(
@@ -93,10 +87,10 @@ class BinContents:
             if observed.is_confident and name and self.bins[name].contains(observed.position, BIN_THICKNESS)
         )
         placed_records = []
-        for record in (record for record in records if record.state is State.DROPPED):
+        for record in self.records.filter_by_state(State.DROPPED):
             for bin_name in self.routes.get(record.label, ()):
                 key = (record.label, bin_name)
-                is_visible = visible_counts[key] > sum((item.label, item.bin) == key for item in records)
+                is_visible = visible_counts[key] > sum((item.label, item.bin) == key for item in self.records)
                 if is_visible or self.is_floor_visible(bin_name, look):
                     update_bin_log_odds(record, bin_name, look.error_rates, is_visible=is_visible)
                 if record.bin_log_odds[bin_name] >= -math.log(self.config.max_miss_probability):

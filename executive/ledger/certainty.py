@@ -90,12 +90,11 @@ class Certainty:
             counts = ", ".join(f"{count} {label}" for label, count in belief.label_counts.most_common())
             record.set_state(State.REJECTED, f"looks disagree about its class: {counts}")
         elif self._needs_other_viewpoint(record):
-            look_count, class_error = belief.look_count, belief.class_error
-            reason = (
-                f"{look_count} looks from one pose leave a probability of {class_error:.1%} that it is no "
+            record.set_state(
+                State.REJECTED,
+                f"{belief.look_count} looks from one pose leave a probability of {belief.class_error:.1%} "
+                f"that it is no {record.label}; at most {self.config.max_class_error:.1%} is allowed",
             )
-            reason += f"{record.label}; at most {self.config.max_class_error:.1%} is allowed"
-            record.set_state(State.REJECTED, reason)
         elif not is_certain and (
             belief.uncertain_look_count >= MIN_UNCERTAIN_LOOKS_TO_REJECT
             or record.contradiction_count >= max(MIN_CONTRADICTIONS_TO_REJECT, belief.look_count + 1)

@@ -27,18 +27,19 @@ EXPECTED_OBJECT_COUNT = 3.0
 
 def make_look_event(look: Detections, observations: Sequence[Observation]) -> FrameSearched:
     """Return the event of a look; `observations` are the localized detections."""
-    confident_objects: list[DetectedObject] = []
-    doubtful_objects: list[DetectedObject] = []
-    for observation in observations:
-        detection = observation.detection
-        box, position = round_values(detection.box, 2), round_values(observation.position, 4)
-        objects = confident_objects if observation.is_confident else doubtful_objects
-        confidence = round(detection.confidence, 4)
-        objects.append(DetectedObject(detection.label, confidence, box, position, observation.contradiction))
+    confident_objects = [_make_detected_object(entry) for entry in observations if entry.is_confident]
+    doubtful_objects = [_make_detected_object(entry) for entry in observations if not entry.is_confident]
+    frame, unknown_labels = look.frame, [detection.label for detection in look.unknown]
     return FrameSearched(
-        look.frame.id, look.frame.camera, look.detector, look.view, confident_objects, doubtful_objects,
-        [detection.label for detection in look.unknown],
-    )  # fmt: skip
+        frame.id, frame.camera, look.detector, look.view, confident_objects, doubtful_objects, unknown_labels
+    )
+
+
+def _make_detected_object(observation: Observation) -> DetectedObject:
+    """Return the recorded values of an observation, rounded."""
+    detection, position = observation.detection, round_values(observation.position, 4)
+    confidence, box = round(detection.confidence, 4), round_values(detection.box, 2)
+    return DetectedObject(detection.label, confidence, box, position, observation.contradiction)
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class LookUpdate:
         observations = [entry for entry in observations if self._is_unmoved_since_capture(entry.position)]
         confident_observations = [entry for entry in observations if entry.is_confident]
         doubtful_observations = [entry for entry in observations if not entry.is_confident]
-        known_items = [record for record in self.records if record.state in ON_TABLE]
+        known_items = self.records.filter_by_state(*ON_TABLE)
         detected_items = self._update_detected_items(known_items, confident_observations)
         uncertain_items = self._update_uncertain_items(detected_items, doubtful_observations)
         missed_items = [item for item in known_items if item not in (*detected_items, *uncertain_items)]
@@ -86,12 +87,11 @@ class LookUpdate:
         self, known_items: Sequence[ItemRecord], observations: Sequence[Observation]
     ) -> list[ItemRecord]:
         """Update known items with confident observations, add new items, and return the detected items."""
-        # An object at the position of an unlikely item that may have been moved counts as a new item.
-        likely_items = [item for item in known_items if item.belief.existence_probability >= 0.5]
-        candidates = [item for item in known_items if item in likely_items or self.staleness.is_unmoved(item)]
-        matches = associate(observations, candidates, self.staleness, self.config.gate)
+        # An object at the position of an improbable item that may have been moved counts as a new item.
+        rates, viewpoint, staleness = self.look.error_rates, make_viewpoint_key(self.look), self.staleness
+        candidates = [item for item in known_items if item.belief.is_probable or staleness.is_unmoved(item)]
+        matches = associate(observations, candidates, staleness, self.config.gate)
         unmatched_items = [record for record in candidates if record not in matches.values()]
-        rates, viewpoint = self.look.error_rates, make_viewpoint_key(self.look)
         detected_items = []
         for observation in observations:
             # Prior odds: expected number of missed objects divided by expected number of false detections.
@@ -99,7 +99,7 @@ class LookUpdate:
             record = matches.get(observation) or self._add_item(observation, prior_odds)
             if record.reason.startswith(REASON_UNCERTAIN) and not record.attempt_count:
                 record.set_state(State.SEEN, "")
-            is_unmoved = self.staleness.is_unmoved(record)
+            is_unmoved = staleness.is_unmoved(record)
             if not is_unmoved:
                 record.forget_viewpoints()
             label = observation.detection.label
@@ -121,7 +121,7 @@ class LookUpdate:
         for observation in observations:
             if self._may_show_any_item(observation, detected_items):
                 continue
-            on_table = [item for item in self.records if item.state in ON_TABLE]
+            on_table = self.records.filter_by_state(*ON_TABLE)
             near_items = [item for item in on_table if may_show_item(observation, item, self.config.gate)]
             max_miss_probability = self.config.max_miss_probability
             candidates = [item for item in near_items if item.belief.miss_probability > max_miss_probability]

@@ -55,7 +55,7 @@ def find_final_state(
         return None
     if record.state is State.SEEN and not belief.look_count and belief.miss_probability == 1.0:
         return State.REJECTED, REASON_UNCERTAIN
-    if belief.existence_probability < 0.5:
+    if not belief.is_probable:
         return State.PHANTOM, REASON_NOT_FOUND
     if record.empty_probe_count >= MIN_EMPTY_PROBES and has_touched_item and not record.had_contact:
         count = record.empty_probe_count

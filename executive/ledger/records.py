@@ -35,11 +35,14 @@ class ItemRecords:
         Raises:
             Fault: No item has this name.
         """
-        try:
-            return self._records[item]
-        except KeyError:
-            known = ", ".join(self._records) or "none"
-            raise Fault(f'the ledger knows no item "{item}"; it knows: {known}') from None
+        if item not in self._records:
+            known_items = ", ".join(self._records) or "none"
+            raise Fault(f'the ledger knows no item "{item}"; it knows: {known_items}')
+        return self._records[item]
+
+    def filter_by_state(self, *states: State) -> list[ItemRecord]:
+        """Return the records of all items in one of the given states."""
+        return [record for record in self if record.state in states]
 
     def add(
         self, belief: Belief, position: Array, change_count: int, stamp: float, *, has_appeared: bool
@@ -51,9 +54,8 @@ class ItemRecords:
         label = belief.first_label
         self._name_counts[label] += 1
         name = f"{label}-{self._name_counts[label]}"
-        record = ItemRecord(name, belief, position, change_count, stamp, has_appeared)
-        self._records[name] = record
-        return record
+        self._records[name] = ItemRecord(name, belief, position, change_count, stamp, has_appeared)
+        return self._records[name]
 
     def remove(self, record: ItemRecord) -> None:
         """Remove an item that no event has reported yet."""

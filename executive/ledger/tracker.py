@@ -19,13 +19,13 @@ from executive.events import Emit, ItemChanged
 from executive.geometry import Array
 from executive.ledger import outcomes
 from executive.ledger.bin_contents import BinContents, find_probable_bin
+from executive.ledger.bin_recovery import BinRecovery
 from executive.ledger.certainty import Certainty
 from executive.ledger.coverage import Coverage
 from executive.ledger.item import ON_TABLE, ItemRecord, State
 from executive.ledger.look import LookUpdate, make_look_event
 from executive.ledger.records import ItemRecords
 from executive.ledger.staleness import Staleness
-from executive.ledger.untracked_items import Recovery
 
 
 class Tracker:
@@ -54,10 +54,10 @@ class Tracker:
         self._config, self._routes, self._emit = config, routes, emit
         self._records = ItemRecords(emit)
         self._certainty = Certainty(config, labels_with_unique_height)
-        self._bins = BinContents(config, bins, routes)
+        self._bins = BinContents(config, bins, routes, self._records)
         self._coverage, self._staleness = Coverage(table), Staleness()
-        self._recovery: Recovery | None = None
-        """Recovery of untracked items between `lose_track` and `record_bin_contents`; otherwise None."""
+        self._bin_recovery: BinRecovery | None = None
+        """Recovery of the contents of the bins from `lose_track` to `record_bin_contents`; otherwise None."""
         self._last_frame_id = 0
         self.unknown_labels: Counter[str] = Counter()
         self.assumption_reasons: list[str] = []
@@ -90,14 +90,13 @@ class Tracker:
 
     def find_targets(self) -> Sequence[Target]:
         """Return a target for each item in the state SEEN that cannot have moved since its last detection."""
-        seen_items = [record for record in self.records if record.state is State.SEEN]
+        seen_items = self._records.filter_by_state(State.SEEN)
         return [record.target for record in seen_items if self._staleness.is_unmoved(record)]
 
     def find_objects_on_table(self) -> Sequence[Target]:
         """Return all items that lie on the table with a probability of at least 0.5."""
-        items_on_table = [record for record in self.records if record.state in ON_TABLE]
-        probable_items = [record for record in items_on_table if record.belief.existence_probability >= 0.5]
-        return [item.target for item in probable_items if not self._certainty.is_position_empty(item)]
+        items = [record for record in self._records.filter_by_state(*ON_TABLE) if record.belief.is_probable]
+        return [item.target for item in items if not self._certainty.is_position_empty(item)]
 
     def find_uncertain_items(self) -> Sequence[Item]:
         """Return the unsorted items in the workspace that are uncertain, or that may have been moved."""
@@ -109,7 +108,7 @@ class Tracker:
 
     def find_held_item(self) -> Item | None:
         """Return the item in the tool, or None."""
-        return next((record.item for record in self.records if record.state is State.HELD), None)
+        return next((record.item for record in self._records.filter_by_state(State.HELD)), None)
 
     def is_current(self, frame: Frame) -> bool:
         """Return False if the robot may have moved all objects on the table since the capture of a frame."""
@@ -151,7 +150,7 @@ class Tracker:
 
     def count_objects_in(self, bin: str) -> int:
         """Return the number of objects in a bin."""
-        return self._bins.count_objects_in(bin, self.records)
+        return self._bins.count_objects_in(bin)
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
         """Record a touch, and return False if the touch contradicts the class of the item.
@@ -237,25 +236,24 @@ class Tracker:
 
     def lose_track(self) -> None:
         """Record that the tool may have moved any item outside of the bins."""
-        self._recovery = Recovery(self._records, self._bins)
-        self._mark_as_dropped([item for item in self._records if item.state in (State.HELD, State.DROPPED)])
+        self._bin_recovery = BinRecovery(self._bins)
+        self._mark_as_dropped(self._records.filter_by_state(State.HELD, State.DROPPED))
 
     def mark_unseen_as_dropped(self) -> None:
         """Set each item on the table that no look has detected since `lose_track` to DROPPED."""
-        seen_items = [record for record in self.records if record.state is State.SEEN]
-        probable_items = [record for record in seen_items if record.belief.existence_probability >= 0.5]
-        self._mark_as_dropped([item for item in probable_items if not self._staleness.is_unmoved(item)])
+        items = [record for record in self._records.filter_by_state(State.SEEN) if record.belief.is_probable]
+        self._mark_as_dropped([item for item in items if not self._staleness.is_unmoved(item)])
 
     def record_bin_contents(self) -> None:
         """Record an item for each unknown object in a bin, according to the looks since `lose_track`."""
-        recovery, self._recovery = self._recovery, None
+        recovery, self._bin_recovery = self._bin_recovery, None
         assert recovery is not None, "the contents of bins are recorded after `lose_track`"
         recovery.record_bin_contents(self.change_count)
 
     def close(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the behaviour tree succeeded."""
         has_touched_item = any(record.touched_label for record in self.records)
-        dropped_items = [record for record in self.records if record.state is State.DROPPED]
+        dropped_items = self._records.filter_by_state(State.DROPPED)
         for record in self.records:
             final_state = outcomes.find_final_state(
                 record, self._certainty, has_route=record.label in self._routes, is_completed=completed,
@@ -283,20 +281,20 @@ class Tracker:
     def _update(self, detections: Detections, observations: Sequence[Observation]) -> None:
         """Update the items on the table and the dropped items with the observations of a look."""
         bias_std = detections.error_rates.bias
-        bin_names = {entry: self._bins.find_bin_name(entry, bias_std, self.records) for entry in observations}
+        bin_names = {entry: self._bins.find_bin_name(entry, bias_std) for entry in observations}
         observations_on_table = [entry for entry, bin_name in bin_names.items() if bin_name is None]
         update = LookUpdate(self._config, self._records, self._coverage, self._staleness, detections)
         for record in update.apply(observations_on_table):
             self._certainty.reject_if_uncertain(record, is_unmoved=self._staleness.is_unmoved(record))
             self._records.emit(record)
-        if detections.view == "full" and self._recovery is not None:
-            self._recovery.add_look(detections, bin_names)
+        if detections.view == "full" and self._bin_recovery is not None:
+            self._bin_recovery.add_look(detections, bin_names)
         elif detections.view == "full":
-            self._records.emit(*self._bins.place_dropped_items(detections, bin_names, self.records))
+            self._records.emit(*self._bins.place_dropped_items(detections, bin_names))
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""
-        assert self._recovery is not None, "items are marked as dropped after `lose_track`"
+        assert self._bin_recovery is not None, "items are marked as dropped after `lose_track`"
         for record in records:
             record.change_count, record.is_untracked = self.change_count, True
             record.bin_log_odds.clear()
