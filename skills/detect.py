@@ -26,12 +26,8 @@ class Detect(Skill):
 
     detections: Out[Detections] = port(doc="the detections and their frame")
     detector: str = param("", refers_to="detector", doc="a detector of the cell; empty: the first detector")
-    view: str = param(
-        "table", choices=("table", "full"), doc="`table`: the workspace; `full`: the whole image"
-    )
-    doubtful: str = param(
-        "fail", choices=("fail", "pass"), doc="result if all detections on the table are doubtful"
-    )
+    view: str = param("table", choices=("table", "full"), doc="`table`: the workspace; `full`: entire image")
+    doubtful: str = param("fail", choices=("fail", "pass"), doc="result if all table detections are doubtful")
     hidden: str = param("fail", choices=("fail", "pass"), doc="result if the arm hides part of the workspace")
     reasons: ClassVar = ("unsure", "hidden", "unavailable", "crowded", "camera_moved")
     uses: ClassVar = ("camera",)
@@ -60,11 +56,8 @@ class Detect(Skill):
             raise self.failure("crowded", str(error)) from error
         except Unavailable as error:
             raise self.failure("unavailable", str(error)) from error
-        table_detections = (
-            detection for detection in answer.doubtful if not is_detection_in_bin(cell, detection, frame)
-        )
-        if not answer.confident and self.doubtful == "fail" and (best := next(table_detections, None)):
+        on_table = (entry for entry in answer.doubtful if not is_detection_in_bin(cell, entry, frame))
+        if not answer.confident and self.doubtful == "fail" and (best := next(on_table, None)):
             raise self.failure("unsure", answer.describe_doubt(best))
-        self.detections = Detections(
-            **vars(answer), frame=frame, view=self.view, area=camera.get_view_box(self.view)
-        )
+        area = camera.get_view_box(self.view)
+        self.detections = Detections(**vars(answer), frame=frame, view=self.view, area=area)

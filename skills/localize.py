@@ -21,18 +21,15 @@ class Localize(Skill):
     """
 
     detections: In[Detections] = port(doc="the detections and their frame")
-    targets: Out[list[Target]] = port(
-        doc="one target per open item whose position is known from this frame or an earlier frame"
-    )
+    targets: Out[list[Target]] = port(doc="one target per open item with a valid position, from any frame")
     reasons: ClassVar = ("stale", "no_depth")
 
     def run(self, cell: Cell) -> None:
         """Localize every detection, then update the ledger."""
         frame = self.detections.frame
         if not cell.ledger.is_current(frame):
-            raise self.failure(
-                "stale", f"the robot may have moved objects after frame {frame.id} was captured; look again"
-            )
+            message = f"the robot may have moved objects after frame {frame.id} was captured; look again"
+            raise self.failure("stale", message)
         try:
             observations = cell.localizer.localize(self.detections)
         except NoDepth as error:

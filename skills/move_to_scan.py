@@ -30,15 +30,12 @@ class MoveToScan(Skill):
     def run(self, cell: Cell) -> Steps:
         """Select the pose and move to it."""
         yield from wait_for_rest(cell.arm)
-        if self.pose == "auto" and cell.camera.sees_table():
-            return
-        name = self._choose_pose(cell)
-        motion = yield from plan(self, cell.arm, lambda: (name, make_task(cell)))
+        pose = self.pose
+        if pose == "auto":
+            if cell.camera.sees_table():
+                return
+            pose = cell.camera.scan_poses[0]
+        elif pose == "next":
+            pose = cell.camera.next_pose()
+        motion = yield from plan(self, cell.arm, lambda: (pose, make_task(cell)))
         yield from follow(self, cell, motion)
-
-    def _choose_pose(self, cell: Cell) -> str:
-        if self.pose == "auto":
-            return cell.camera.scan_poses[0]
-        if self.pose == "next":
-            return cell.camera.next_pose()
-        return self.pose

@@ -23,6 +23,6 @@ class RejectTarget(Skill):
     def run(self, cell: Cell) -> None:
         """Reject the item in the ledger."""
         failures = cell.ledger.count_attempts(self.item)
-        if failures < self.after:
-            return
-        cell.ledger.reject(self.item, f"{self.why} ({failures} failed attempts)" if failures else self.why)
+        if failures >= self.after:
+            reason = f"{self.why} ({failures} failed attempts)" if failures else self.why
+            cell.ledger.reject(self.item, reason)

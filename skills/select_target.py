@@ -16,8 +16,8 @@ class SelectTarget(Skill):
     """Select the next target to pick, and its bin.
 
     The skill selects only open items with a valid position and a class with a route. Enough looks must agree
-    on the class of an item, given the error rates of the detector. Distances are measured from the tool, or
-    from the destination of the arm while the arm moves.
+    on the class of an item, given the error rates of the detector. `nearest` refers to the tool or, while the
+    arm moves, to the destination of the arm; `surest` refers to the confidence of the last detection.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
@@ -26,18 +26,13 @@ class SelectTarget(Skill):
     target: Out[Target] = port(doc="the chosen target")
     item: Out[Item] = port(refers_to="item", doc="the item of the target")
     bin: Out[str] = port(refers_to="bin", doc="the bin of the class with the fewest used slots")
-    prefer: str = param(
-        "nearest", choices=("nearest", "surest"), doc="`nearest` to the tool, or the `surest` detection"
-    )
+    prefer: str = param("nearest", choices=("nearest", "surest"), doc="the `nearest` or the `surest` target")
     reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
 
     def run(self, cell: Cell) -> None:
         """Select the first candidate in the preferred order."""
-        candidates = [
-            target
-            for target in sort_pickable_targets(cell, self.targets)
-            if self._is_requested(cell, target.item)
-        ]
+        pickable_targets = sort_pickable_targets(cell, self.targets)
+        candidates = [target for target in pickable_targets if self._is_requested(cell, target.item)]
         if not candidates:
             raise self._explain_missing_candidate(cell)
         best = candidates[0]
@@ -50,19 +45,13 @@ class SelectTarget(Skill):
 
     def _is_requested(self, cell: Cell, item: Item) -> bool:
         label = cell.ledger.get_label(item)
-        return (
-            label in cell.routes
-            and (self.same is None or item == self.same)
-            and (self.wanted is None or label == self.wanted)
-        )
+        return label in cell.routes and self.same in (None, item) and self.wanted in (None, label)
 
     def _explain_missing_candidate(self, cell: Cell) -> SkillFailed:
         """Return the failure with the reason why there is no candidate."""
         items = cell.ledger.find_uncertain_items()
-        if uncertain := [item for item in items if self._is_requested(cell, item)]:
-            return self.failure(
-                "doubtful", f"not enough looks agree on {', '.join(uncertain)} yet; look again"
-            )
+        if uncertain_items := ", ".join(item for item in items if self._is_requested(cell, item)):
+            return self.failure("doubtful", f"not enough looks agree on {uncertain_items} yet; look again")
         name = self.same or self.wanted or "object to sort"
         if self.same is None and cell.ledger.is_table_empty(self.wanted):
             message = f"no {name} is left on the table, except rejected objects"
