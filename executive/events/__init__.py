@@ -4,12 +4,23 @@ The parts of a run emit events; observers (journal, trace, pictures, views) rece
 The journal contains one JSON object per event; the keys of the object are the fields of the event class.
 """
 
-from executive.events.cell_events import FaultInjected, InputRead, MotionPlanned, ToolCommanded
+from executive.events.cell_events import (
+    DetectedObject,
+    FaultInjected,
+    FrameSearched,
+    InputRead,
+    ItemChanged,
+    MotionPlanned,
+    TargetSelected,
+    ToolCommanded,
+)
 from executive.events.event import Emit, Event, Observer, TimedEvent, discard_event
-from executive.events.ledger_events import DetectedObject, FrameSearched, ItemChanged, TargetSelected
 from executive.events.run_events import (
     JOURNAL_FORMAT,
+    BranchChosen,
     FaultRaised,
+    NodeEnded,
+    NodeStarted,
     OperatorAsked,
     RequestGiven,
     RunEnded,
@@ -17,7 +28,6 @@ from executive.events.run_events import (
     RunResumed,
     RunStarted,
 )
-from executive.events.tree_events import BranchChosen, NodeEnded, NodeStarted
 
 __all__ = [
     "JOURNAL_FORMAT",

@@ -1,4 +1,4 @@
-"""Events of a run: start, requests of the operator, halt, resume, fault and end."""
+"""Events of a run and of the nodes of its behaviour tree."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ JOURNAL_FORMAT = 3
 
 RunStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|INCOMPLETE|FAILURE|FAULT|HALTED)$")]
 """Final status of a run; INCOMPLETE if the tree succeeded but items were rejected."""
+NodeStatus: TypeAlias = Annotated[str, Field(pattern="^(SUCCESS|FAILURE|INVALID)$")]
+"""Final status of a node; INVALID for a node that was halted or raised a fault."""
 
 
 @dataclass(frozen=True)
@@ -129,3 +131,61 @@ class RunEnded(Event):
     held_item: str
     ticks: int
     robot_time: float
+
+
+@dataclass(frozen=True)
+class NodeStarted(Event):
+    """A node of the tree started.
+
+    Attributes:
+        node: Path of the node.
+        skill: Name of the skill; "" for a control node.
+        item: Item on which the skill works, or "".
+    """
+
+    node: str
+    skill: str = ""
+    item: str = ""
+
+
+@dataclass(frozen=True)
+class NodeEnded(Event):
+    """A node of the tree ended.
+
+    Attributes:
+        node: Path of the node.
+        status: Final status.
+        skill: Name of the skill; "" for a control node.
+        item: Item on which the skill worked, or "".
+        reason: Reason of a failure (`missed` for a skill, `Grasp.missed` for a control node); `fault` after
+            a fault of a skill; "" for all other ends.
+        message: Message of the failure or fault, or "".
+        origin: Path of the node that caused the failure of a control node, or "".
+        outputs: Values of the outputs of a successful skill by name; None for other nodes and ends.
+    """
+
+    node: str
+    status: NodeStatus
+    skill: str = ""
+    item: str = ""
+    reason: str = ""
+    message: str = ""
+    origin: str = ""
+    outputs: Mapping[str, JsonValue] | None = None
+
+
+@dataclass(frozen=True)
+class BranchChosen(Event):
+    """A control node made a decision, for instance to run another child after a failure.
+
+    Attributes:
+        node: Path of the control node.
+        choice: Description of the decision.
+        reason: Failure that caused the decision, for instance `Grasp.missed`, or "".
+        message: Message of the failure, or "".
+    """
+
+    node: str
+    choice: str
+    reason: str = ""
+    message: str = ""
