@@ -57,15 +57,15 @@ class Answer:
     unknown: tuple[Detection, ...] = ()
 
     def describe_doubt(self, detection: Detection) -> str:
-        """Return the message for an answer without confident detections; `detection` is its best."""
-        threshold, reason = (
-            self.error_rates.threshold,
-            f"with another class at {detection.second_confidence:.2f}",
-        )
-        if detection.confidence < threshold:
-            reason = f"< {threshold:.2f}"
-        description = f"a {detection.label} at {detection.confidence:.2f} {reason}"
-        return f"detector {self.detector} found nothing certain: at best {description}"
+        """Return the message for an answer without confident detections.
+
+        `detection` is the doubtful detection with the highest confidence on the table.
+        """
+        confidence, threshold = detection.confidence, self.error_rates.threshold
+        doubt = f"with another class at {detection.second_confidence:.2f}"
+        doubt = f"< {threshold:.2f}" if confidence < threshold else doubt
+        best_object = f"a {detection.label} at {confidence:.2f} {doubt}"
+        return f"detector {self.detector} found nothing certain: at best {best_object}"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

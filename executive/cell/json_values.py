@@ -71,10 +71,7 @@ _CONVERTERS: Sequence[tuple[type | tuple[type, ...], Callable[[Any], Any]]] = (
     (np.ndarray, lambda value: to_json(value.tolist())),
     (Frame, lambda frame: {"frame": frame.id, "camera": frame.camera, "stamp": _round_number(frame.stamp)}),
     (Pose, lambda pose: pose.to_rounded_list(DECIMAL_PLACES)),
-    (
-        Mapping,
-        lambda mapping: {_escape_surrogates(str(key)): to_json(value) for key, value in mapping.items()},
-    ),
+    (Mapping, lambda mapping: {_escape_surrogates(str(key)): to_json(item) for key, item in mapping.items()}),
     ((list, tuple), lambda values: [to_json(value) for value in values]),
     ((set, frozenset), lambda values: sorted((to_json(value) for value in values), key=repr)),
     (PurePath, lambda path: _escape_surrogates(str(path))),

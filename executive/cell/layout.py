@@ -24,10 +24,8 @@ NECK_LENGTH = 0.015
 def build_bin(name: str, config: BinConfig) -> Bin:
     """Return the bin that `config` declares, with slots evenly distributed over the floor."""
     position, size = np.array(config.position), np.array(config.size)
-    columns, rows = config.slots
-    x = position[0] + size[0] * ((np.arange(columns) + 0.5) / columns - 0.5)
-    y = position[1] + size[1] * ((np.arange(rows) + 0.5) / rows - 0.5)
-    slots = np.array([[slot_x, slot_y] for slot_x in x for slot_y in y])
+    slot_indices = np.array([*np.ndindex(config.slots)])
+    slots = position[:2] + size[:2] * ((slot_indices + 0.5) / config.slots - 0.5)
     return Bin(name, position, size, slots)
 
 

@@ -81,13 +81,10 @@ def intercept(cell: Cell, interceptor: Interceptor, roles: Collection[str]) -> C
 
     The interceptor also handles accesses to `Planning` and `Request` objects that these parts return.
     """
-    parts: dict[str, Any] = {
-        role: _Proxy(role, "", getattr(cell, role), interceptor) for role in roles if role != "detector"
-    }
+    part_roles, detectors = set(roles) - {"detector"}, cell.detectors.items()
+    parts: dict[str, Any] = {role: _Proxy(role, "", getattr(cell, role), interceptor) for role in part_roles}
     if "detector" in roles:
-        parts["detectors"] = {
-            name: _Proxy("detector", name, detector, interceptor) for name, detector in cell.detectors.items()
-        }
+        parts["detectors"] = {name: _Proxy("detector", name, part, interceptor) for name, part in detectors}
     return replace(cell, **parts)
 
 
@@ -109,9 +106,8 @@ class _Proxy:
         if IS_METHOD[self._role][member]:
             return partial(self._call, member)
         if member not in self._attribute_accesses:
-            self._attribute_accesses[member] = Access(
-                self._role, self._detector, member, partial(getattr, self._part, member)
-            )
+            proceed = partial(getattr, self._part, member)
+            self._attribute_accesses[member] = Access(self._role, self._detector, member, proceed)
         return self._intercept(self._attribute_accesses[member])
 
     def _call(self, member: str, /, *arguments: Any, **keywords: Any) -> Any:

@@ -57,11 +57,11 @@ class BinRecovery:
     def _find_unknown_objects(self) -> Iterator[tuple[str, str]]:
         """Yield class and bin name of each object in a bin that is not an item of the ledger.
 
-        The number of objects of a class is the median over the looks. The number of unknown objects of a class
-        is this number minus the number of items of the class in the bin. The total number of unknown objects
-        is at most the number of objects minus the number of items in the bin. Classes with a route to the bin
-        have priority: an object of another class may be a known item with a wrongly detected class, and must
-        not be rejected.
+        The number of objects of a class is the median over the looks. The number of unknown objects of a
+        class is the number of objects minus the number of items of the class in the bin. In total, at most
+        the number of objects minus the number of items in the bin are unknown. Classes with a route to the
+        bin have priority: an object of another class may be a known item with a wrongly detected class, and
+        must not be rejected.
         """
         for bin_name, counts in self._object_counts.items():
             labels = set().union(*counts)

@@ -53,10 +53,9 @@ def make_approach(
         overtravel: Continuation below the expected surface [m], at most half the height of the object.
         spacing: Scale of the spiral of contact points [m].
     """
-    object_class, failed_attempts = cell.classes[target.label], cell.ledger.count_attempts(target.item)
     goal = make_object_goal(
-        object_class, target.position, cell.descent, cell.descent_speed,
-        failed_attempts=failed_attempts, overtravel=overtravel, spacing=spacing,
+        cell.classes[target.label], target.position, cell.descent, cell.descent_speed,
+        failed_attempts=cell.ledger.count_attempts(target.item), overtravel=overtravel, spacing=spacing,
     )  # fmt: skip
     return goal, Task(obstacles=list_obstacles(cell, target.item), target=make_obstacle(cell, target))
 
@@ -109,11 +108,7 @@ def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]
     still valid.
     """
     ledger, destination = cell.ledger, cell.arm.destination[:2]
-
-    def compute_sort_key(target: Target) -> tuple[float, Item]:
-        return float(np.linalg.norm(target.position[:2] - destination)), target.item
-
-    pickable = [
+    pickable_targets = [
         target
         for target in targets
         if ledger.is_open(target.item)
@@ -121,7 +116,8 @@ def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]
         and ledger.is_certain(target.item)
         and ledger.get_label(target.item) in cell.routes
     ]
-    return sorted(pickable, key=compute_sort_key)
+    offsets = {target.item: target.position[:2] - destination for target in pickable_targets}
+    return sorted(pickable_targets, key=lambda target: (np.linalg.norm(offsets[target.item]), target.item))
 
 
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:

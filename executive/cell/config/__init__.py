@@ -13,8 +13,7 @@ from executive.cell.config.cameras import (
     NoiseConfig,
     TransformConfig,
 )
-from executive.cell.config.cell import CellConfig, LedgerConfig
-from executive.cell.config.detectors import DetectorConfig
+from executive.cell.config.cell import CellConfig, DetectorConfig, LedgerConfig
 from executive.cell.config.objects import BinConfig, ObjectConfig, TableConfig
 from executive.cell.config.section import Colour, Section
 
