@@ -46,8 +46,7 @@ def find_cell(path_or_name: str) -> Path:
     path = Path(path_or_name)
     if path.is_file():
         return path
-    folder = get_shipped_folder() / "cells"
-    shipped_files = {file.stem: file for file in sorted(folder.glob("*.yaml"))}
+    shipped_files = {file.stem: file for file in sorted((get_shipped_folder() / "cells").glob("*.yaml"))}
     if path_or_name in shipped_files:
         return shipped_files[path_or_name]
     choices = suggest_choice(path_or_name, shipped_files, "Shipped cells")

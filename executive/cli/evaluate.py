@@ -24,16 +24,13 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
     "--detector", "detector_name", metavar="NAME",
     help="Name of the detector in --cell; by default the first detector.",
 )  # fmt: skip
-@click.option(
-    "--dataset", type=options.FOLDER, metavar="FOLDER",
-    help="COCO or YOLO dataset to use instead of rendered scenes.",
-)  # fmt: skip
+@click.option("--dataset", type=options.FOLDER, help="COCO or YOLO dataset instead of rendered scenes.")
 @click.option(
     "--weights", type=options.FILE, metavar="ONNX",
     help="Exported RF-DETR model (ONNX) to evaluate instead of the detector of a cell.",
 )  # fmt: skip
 @click.option(
-    "--labels", type=options.FILE, metavar="FILE",
+    "--labels", type=options.FILE,
     help="Class names of --weights, one per line; by default NAME.labels.txt or labels.txt beside NAME.onnx.",
 )  # fmt: skip
 @click.option("--images", type=options.COUNT, default=200, help="Number of scenes to render per cell.")
@@ -53,7 +50,7 @@ IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 @options.scene_option
 @options.overrides_option
 @click.option(
-    "--out", type=options.FILE, metavar="FILE",
+    "--out", type=options.FILE,
     help="File for the error rates that runs read; by default CELL.measured.json beside the cell file.",
 )  # fmt: skip
 @options.workers_option

@@ -23,16 +23,12 @@ def parse_fault_numbers(text: str) -> tuple[int, ...]:
 @click.command(name="faults")
 @options.mission_argument
 @options.oracle_option
-@click.option(
-    "--pairs", type=options.COUNT, help="Number of random pairs of faults to inject instead of single faults."
-)
+@click.option("--pairs", type=options.COUNT, help="Inject this number of random pairs of faults.")
 @click.option(
     "--fault", "fault_numbers", type=parse_fault_numbers, metavar="N[+M]",
     help="Inject only the fault N of --list, or N and M together, and record the run.",
 )  # fmt: skip
-@click.option(
-    "--list", "list_only", is_flag=True, help="Print the faults, and run only the mission without faults."
-)
+@click.option("--list", "list_only", is_flag=True, help="Print the faults without injecting them.")
 @options.workers_option
 @options.seed_option
 @options.overrides_option
@@ -51,10 +47,8 @@ def command(
     Exit code 1 if a run does not handle its fault: the run loses an object within reach, misplaces an object,
     does not end correctly, or has a ledger that differs from the world.
     """
-    option_count = sum((pairs is not None, fault_numbers is not None, list_only))
-    options.check_usage(
-        (option_count > 1, "--pairs, --fault and --list exclude each other; give one of them")
-    )
+    has_conflict = sum((pairs is not None, fault_numbers is not None, list_only)) > 1
+    options.check_usage((has_conflict, "--pairs, --fault and --list exclude each other; give one of them"))
     with keep_stdout_clean():
         from executive.campaign.faults.campaign import Campaign
         from executive.campaign.faults.trial import record_trial

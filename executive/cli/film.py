@@ -13,7 +13,7 @@ from executive.cli.streams import keep_stdout_clean, print_json
 @click.command(name="film")
 @click.argument("run", metavar="RUN")
 @click.option(
-    "-o", "--output", type=FILE, metavar="FILE",
+    "-o", "--output", type=FILE,
     help="File to write, .mp4 or .gif; by default film.mp4 in the run directory.",
 )  # fmt: skip
 @click.option("--gif", is_flag=True, help="Make an animated GIF, for example for a README.")
@@ -57,7 +57,6 @@ def command(
                     source, partial_file, film_format, speed=speed, workers=workers, progress=progress
                 )
         seconds, size = frame_count / film_format.frame_rate, film_file.stat().st_size
-        result = {"file": str(film_file), "frames": frame_count, "seconds": seconds, "size": size}
         click.echo(f"{film_file}: {seconds:.1f} s, {size / 1e6:.1f} MB", err=True)
     if as_json:
-        print_json(result)
+        print_json({"file": str(film_file), "frames": frame_count, "seconds": seconds, "size": size})

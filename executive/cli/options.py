@@ -61,7 +61,7 @@ runs_option = click.option("--runs", type=FOLDER, default=Path("runs"), help="Fo
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
 seed_option = click.option("--seed", type=click.IntRange(0, MAX_SEED), default=0, help="Random seed.")
 scene_option = click.option(
-    "--scene", type=FILE, metavar="FILE",
+    "--scene", type=FILE,
     help="Scene file: differences of the simulated world from the cell file (light, table, objects, camera).",
 )  # fmt: skip
 workers_option = click.option("--workers", type=COUNT, default=2, help="Number of parallel processes.")

@@ -13,10 +13,7 @@ from executive.exit_codes import ExitCode
 
 @click.command(name="replay")
 @click.argument("run", metavar="RUN")
-@click.option(
-    "--mission", "mission_file", type=FILE, metavar="FILE",
-    help="Mission file to use instead of the recorded mission.",
-)  # fmt: skip
+@click.option("--mission", "mission_file", type=FILE, help="Mission file instead of the recorded mission.")
 @runs_option
 @json_option
 @click.pass_context
@@ -24,8 +21,8 @@ def command(ctx: click.Context, run: str, mission_file: Path | None, runs: Path,
     """Repeat the decisions of a recorded run.
 
     RUN is a run directory or `latest`. Nothing moves and nothing is simulated: tree, skills and ledger get
-    the recorded inputs from arm, tool, camera, detectors and operator. Exit code 1 if a
-    decision differs from the record; the first difference is printed.
+    the recorded inputs from arm, tool, camera, detectors and operator. Exit code 1 if a decision differs
+    from the record; the first difference is printed.
     """
     with keep_stdout_clean():
         from executive.plugins import load_skills

@@ -24,19 +24,14 @@ if TYPE_CHECKING:
 
 @click.command(name="run")
 @click.argument("mission", metavar="MISSION", required=False)
-@click.option(
-    "--resume", metavar="RUN",
-    help="Resume an interrupted run (a run directory or `latest`) instead of a mission.",
-)  # fmt: skip
+@click.option("--resume", metavar="RUN", help="Resume an interrupted run: a run directory or `latest`.")
 @options.seed_option
 @options.overrides_option
 @options.scene_option
 @options.runs_option
 @options.json_option
 @click.option("--quiet", is_flag=True, help="Print only the cause if the run does not succeed.")
-@click.option(
-    "--view", "has_page", is_flag=True, help="Show the run on a page in the browser; its address is printed."
-)
+@click.option("--view", "has_page", is_flag=True, help="Show the run on a web page, and print its address.")
 @click.option("--paused", is_flag=True, help="Wait for the operator before the first control step.")
 @click.option("--gui", is_flag=True, help="Open the simulator's window.")
 @click.option("--realtime", is_flag=True, help="Run in real time instead of as fast as possible.")

@@ -55,9 +55,7 @@ def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) 
     if as_json:
         print_json(declarations if name is None else declarations[0])
     else:
-        click.echo(
-            _describe_skill(declarations[0]) if name else "\n".join(map(_summarize_skill, declarations))
-        )
+        click.echo("\n".join(map(_describe_skill if name else _summarize_skill, declarations)))
 
 
 def _check_conformance(skills: Mapping[str, type[Skill]], as_json: bool) -> bool:

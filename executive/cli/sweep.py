@@ -28,10 +28,7 @@ def parse_seed_range(text: str) -> range:
 
 @click.command(name="sweep")
 @options.mission_argument
-@click.option(
-    "--seeds", type=parse_seed_range, metavar="A-B", required=True,
-    help="First and last seed, for example 0-99.",
-)  # fmt: skip
+@click.option("--seeds", type=parse_seed_range, metavar="A-B", required=True, help="First and last seed.")
 @options.workers_option
 @click.option("--frames", is_flag=True, help="Save the camera images on which decisions are based.")
 @options.overrides_option

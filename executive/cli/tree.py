@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 @click.command(name="tree")
 @mission_argument
 @overrides_option
-@click.option(
-    "--ports", is_flag=True, help="Print the inputs (with ? if possibly unset) and outputs of every skill."
-)
+@click.option("--ports", is_flag=True, help="Print the inputs (?: possibly unset) and outputs of each skill.")
 @click.option(
     "--reasons", is_flag=True,
     help="Print the failure reasons of every skill, and the reasons that every catch handles.",
