@@ -18,7 +18,7 @@ from executive.mission.findings import Finding, MissionError, make_warning, sort
 from executive.mission.flow.unhandled_failures import UnhandledFailure, find_unhandled_failures
 from executive.mission.model.mission import Mission
 from executive.mission.model.node_paths import assign_paths
-from executive.mission.model.nodes import Node, UnknownNode
+from executive.mission.model.nodes import InvalidNode, Node
 from executive.mission.parse.cell_file import CellFile
 from executive.mission.parse.read_mission import MissionFiles, RecordedCell, read_mission
 from executive.mission.parse.validate import find_span
@@ -104,7 +104,7 @@ def load_mission(
         classes_by_detector = dict(cell_kind.labels(config, folder))
         min_times = None if cell_findings else cell_kind.min_times(config)
     expansion = expand(mission, skills)
-    tree = assign_paths(expansion.tree or UnknownNode(files.source.make_span(), label=""))
+    tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))
     context = CheckContext(
         mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector, min_times
     )

@@ -42,7 +42,7 @@ class CheckContext:
 
     Attributes:
         mission: Content of the mission file, before expansion.
-        tree: Expanded tree with paths; an `UnknownNode` if the tree could not be expanded.
+        tree: Expanded tree with paths; an `InvalidNode` if the tree could not be expanded.
         unused_subtrees: Expanded subtrees that the tree does not use.
         skills: Installed skills by name.
         node_classes: Installed control nodes by keyword.

@@ -12,7 +12,7 @@ from executive.mission.findings import Finding, make_error, make_warning
 from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_path_name
-from executive.mission.model.nodes import InnerNode, KeyValue, Node, SectionNode, SkillNode, iterate_keys
+from executive.mission.model.nodes import InnerNode, KeyValue, Node, NodeSection, SkillNode, iterate_keys
 from executive.mission.model.values import FailureName, Literal, Reference
 from executive.skill import Skill
 from executive.tree.failure import Reason
@@ -27,10 +27,10 @@ def check_constants(context: CheckContext) -> Iterator[Finding]:
         yield from _check_keys(context, node, node.declaring_class.keyword)
 
 
-def _check_keys(context: CheckContext, owner: InnerNode | SectionNode, name: str) -> Iterator[Finding]:
+def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str) -> Iterator[Finding]:
     for key, value in iterate_keys(owner):
         for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, SectionNode):
+            if isinstance(item, NodeSection):
                 yield from _check_keys(context, item, key.name)
         if key.kind is KeyKind.CONSTANT:
             max_value = find_upper_bound(owner, key)

@@ -8,7 +8,7 @@ from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.flow.analysis import FlowAnalysis
 from executive.mission.model import grammar
-from executive.mission.model.nodes import InnerNode, Node, SectionNode, SkillNode, iterate_keys, list_nodes
+from executive.mission.model.nodes import InnerNode, Node, NodeSection, SkillNode, iterate_keys, list_nodes
 from executive.mission.model.values import FailureName
 from executive.mission.source import Span
 from executive.tree.flow import UNKNOWN_NAME, PossibleFailure
@@ -69,13 +69,13 @@ def _find_names_with_bodies(node: Node) -> Iterator[tuple[FailureName, str, Node
             yield name, node.declaring_class.keyword, body
 
 
-def _find_failure_names(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, FailureName]]:
+def _find_failure_names(owner: InnerNode | NodeSection) -> Iterator[tuple[Key, FailureName]]:
     """Yield the names of failures in the keys of a node and of its sections."""
     for key, value in iterate_keys(owner):
         for item in value if isinstance(value, tuple) else (value,):
             if isinstance(item, FailureName):
                 yield key, item
-            elif isinstance(item, SectionNode):
+            elif isinstance(item, NodeSection):
                 yield from _find_failure_names(item)
 
 

@@ -13,7 +13,7 @@ from typing import TypeVar, cast
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.node_paths import get_type_name
-from executive.mission.model.nodes import Node, SectionNode, SkillNode, SubtreeNode, UnknownNode
+from executive.mission.model.nodes import InvalidNode, Node, NodeSection, SkillNode, SubtreeNode
 from executive.mission.model.values import LocatedName, Reference, Setting, Value
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
 from executive.mission.source import Span
@@ -56,7 +56,7 @@ def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> ExpandedMissi
     subtree_nodes = [node for subtree in mission.subtrees.values() for node in subtree.body.walk()]
     names_in_subtrees = {node.name for node in subtree_nodes if isinstance(node, SubtreeNode)}
     for subtree in mission.subtrees.values():
-        if subtree.name in expander.used_names or subtree.library or isinstance(subtree.body, UnknownNode):
+        if subtree.name in expander.used_names or subtree.library or isinstance(subtree.body, InvalidNode):
             continue
         if subtree.name not in names_in_subtrees:
             message = f'the subtree "{subtree.name}" is never used'
@@ -106,7 +106,7 @@ class _Expander:
             if ("", name) not in self._used_values and f"${name}" not in param.span.source.text:
                 yield make_warning(param.span, "unused-param", f'the param "{name}" is never used')
         for subtree in self.mission.subtrees.values():
-            if isinstance(subtree.body, UnknownNode) or not self._use_counts[subtree.name]:
+            if isinstance(subtree.body, InvalidNode) or not self._use_counts[subtree.name]:
                 continue
             for name, argument in subtree.arguments.items():
                 if (subtree.name, name) not in self._used_values:
@@ -272,7 +272,7 @@ def _map_parts(part: PartT, change: Callable[[object], object]) -> PartT:
         mapped = tuple([change(item) for item in part])
     elif isinstance(part, dict):
         mapped = {key: change(item) for key, item in part.items()}
-    elif isinstance(part, Node | Setting | SectionNode):
+    elif isinstance(part, Node | Setting | NodeSection):
         values = {field.name: change(getattr(part, field.name)) for field in fields(part)}
         mapped = replace(part, **values)  # type: ignore[arg-type] # `change` keeps the type of each field.
     return cast("PartT", mapped)

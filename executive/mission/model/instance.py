@@ -12,7 +12,7 @@ from py_trees.common import Status
 
 from executive.cell.protocols import Clock
 from executive.mission.model.conversion import WrongType, convert_constant
-from executive.mission.model.nodes import InnerNode, KeyValue, Node, SectionNode, list_nodes
+from executive.mission.model.nodes import InnerNode, KeyValue, Node, NodeOrSection, NodeSection, list_nodes
 from executive.mission.model.values import FailureName, Literal, LocatedName
 from executive.tree.blackboard import Blackboard
 from executive.tree.keys import Child, Key, KeyKind, VariableName
@@ -70,30 +70,26 @@ def has_valid_constants(node: InnerNode) -> bool:
     return True
 
 
-def find_upper_bound(owner: InnerNode | SectionNode, key: Key) -> int | None:
+def find_upper_bound(owner: NodeOrSection, key: Key) -> int | None:
     """Return the maximum of a constant: the number of nodes under `key.max_key`; None for no maximum."""
     return len(list_nodes(owner.values[key.max_key])) if key.max_key in owner.values else None
 
 
-def _make_attributes(owner: InnerNode | SectionNode, build_child: BuildChild) -> Mapping[str, object]:
+def _make_attributes(owner: NodeOrSection, build_child: BuildChild) -> Mapping[str, object]:
     """Return the values of all attributes that the constructor of a control node or section needs."""
     keys = (key for key in owner.declaring_class.keys.values() if key.is_required or key.name in owner.values)
-    return {
-        key.attribute: _make_attribute(owner, key, owner.values.get(key.name), build_child) for key in keys
-    }
+    return {key.attribute: _make_value(owner, key, owner.values.get(key.name), build_child) for key in keys}
 
 
-def _make_attribute(
-    owner: InnerNode | SectionNode, key: Key, value: KeyValue | None, build_child: BuildChild
-) -> object:
-    """Return the attribute for `key`; `value` is None if the mission lacks the required key."""
+def _make_value(owner: NodeOrSection, key: Key, value: KeyValue | None, build_child: BuildChild) -> object:
+    """Return the value of the attribute for `key`; `value` is None if the mission lacks the required key."""
     if isinstance(value, Node):
         return build_child(value)
-    if isinstance(value, SectionNode):
+    if isinstance(value, NodeSection):
         return value.declaring_class(**_make_attributes(value, build_child))
     if isinstance(value, tuple):
         return tuple(
-            item if isinstance(item, FailureName) else _make_attribute(owner, key, item, build_child)
+            item if isinstance(item, FailureName) else _make_value(owner, key, item, build_child)
             for item in value
         )
     if isinstance(value, LocatedName):
@@ -109,7 +105,7 @@ def _make_attribute(
         return _make_valid_constant(key)
 
 
-def _convert_constant(owner: InnerNode | SectionNode, key: Key, value: KeyValue | None) -> object:
+def _convert_constant(owner: NodeOrSection, key: Key, value: KeyValue | None) -> object:
     """Return the converted value of a constant, or raise WrongType."""
     constant = value.value if isinstance(value, Literal) else None
     return convert_constant(key, constant, find_upper_bound(owner, key))

@@ -11,12 +11,13 @@ from dataclasses import replace
 
 from executive.mission.model.nodes import (
     InnerNode,
+    InvalidNode,
     KeyValue,
     Node,
-    SectionNode,
+    NodeOrSection,
+    NodeSection,
     SkillNode,
     SubtreeNode,
-    UnknownNode,
     iterate_keys,
 )
 from executive.tree.keys import KeyKind
@@ -44,13 +45,13 @@ def get_type_name(node: Node) -> str:
     return "unknown"
 
 
-def _assign_path(node: Node, parent_path: str, slot: str, name: str | None = None) -> Node:
+def _assign_path(node: Node, parent_path: str, key_path: str, name: str | None = None) -> Node:
     """Return the node with its path and the paths of its descendants.
 
-    `slot` is the key of the parent that contains the node, or "". `name` is the last part of the path;
-    the default is `get_path_name(node)`, and for a list no name.
+    `key_path` is the part of the path for the key of the parent that contains the node, or "". `name` is the
+    last part of the path; the default is `get_path_name(node)`, and for a list no name.
     """
-    path = _join(parent_path, slot)
+    path = _join(parent_path, key_path)
     if name is not None or not _is_list(node):
         path = _join(path, name or get_path_name(node))
     match node:
@@ -58,32 +59,30 @@ def _assign_path(node: Node, parent_path: str, slot: str, name: str | None = Non
             return replace(node, path=path, values=_assign_value_paths(node, path))
         case SubtreeNode(body=Node() as body):
             return replace(node, path=path, body=_assign_path(body, path, "do" if node.label else ""))
-        case UnknownNode():
+        case InvalidNode():
             return replace(node, path=path, parts=_assign_list_paths(node.parts, path))
     return replace(node, path=path)
 
 
-def _assign_value_paths(
-    owner: InnerNode | SectionNode, path: str, section_slot: str = ""
-) -> dict[str, KeyValue]:
+def _assign_value_paths(owner: NodeOrSection, path: str, section_path: str = "") -> dict[str, KeyValue]:
     """Return the values by key, with paths for the nodes in the values; `path` is that of the control node.
 
-    If `owner` is a section, `section_slot` is the key of the control node that contains the section.
+    If `owner` is a section, `section_path` is its path in the control node: `backoff`, or `cases/2`.
     """
     values: dict[str, KeyValue] = {}
     for key, value in iterate_keys(owner):
         # In the path of a child below `do` of a section, the key `do` is omitted.
-        slot = section_slot if section_slot and key.name == "do" else _join(section_slot, key.name)
+        key_path = section_path if section_path and key.name == "do" else _join(section_path, key.name)
         if isinstance(value, Node):
-            value = _assign_path(value, path, slot if key.is_in_path or _is_list(value) else "")
-        elif isinstance(value, SectionNode):
-            value = replace(value, values=_assign_value_paths(value, path, slot))
+            value = _assign_path(value, path, key_path if key.is_in_path or _is_list(value) else "")
+        elif isinstance(value, NodeSection):
+            value = replace(value, values=_assign_value_paths(value, path, key_path))
         elif isinstance(value, tuple) and key.kind is KeyKind.NODES:
             value = _assign_list_paths(tuple(item for item in value if isinstance(item, Node)), path)
         elif isinstance(value, tuple):
             value = tuple(
-                replace(item, values=_assign_value_paths(item, path, f"{slot}/{index}"))
-                if isinstance(item, SectionNode)
+                replace(item, values=_assign_value_paths(item, path, f"{key_path}/{index}"))
+                if isinstance(item, NodeSection)
                 else item
                 for index, item in enumerate(value, 1)
             )

@@ -57,7 +57,7 @@ class SkillNode(Node):
 
 
 @dataclass(frozen=True)
-class UnknownNode(Node):
+class InvalidNode(Node):
     """A node with an error that a finding reports; `parts` are the valid nodes below this node."""
 
     parts: tuple[Node, ...] = ()
@@ -69,7 +69,7 @@ class UnknownNode(Node):
 
 
 @dataclass(frozen=True)
-class SectionNode:
+class NodeSection:
     """A mapping below a key of a control node, such as `backoff` of `retry`.
 
     Attributes:
@@ -127,13 +127,14 @@ class SubtreeNode(Node):
         return () if self.body is None else (self.body,)
 
 
-KeyValue: TypeAlias = (
-    "Value | LocatedName | Node | SectionNode | tuple[Node | FailureName | SectionNode, ...]"
-)
+KeyValue: TypeAlias = Value | LocatedName | Node | NodeSection | tuple[Node | FailureName | NodeSection, ...]
 """Value of a key of a control node."""
 
+NodeOrSection: TypeAlias = InnerNode | NodeSection
+"""Control node, or a section of a control node."""
 
-def iterate_keys(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, KeyValue]]:
+
+def iterate_keys(owner: NodeOrSection) -> Iterator[tuple[Key, KeyValue]]:
     """Yield every key that has a value, and the value, in the order of the declarations."""
     for name, key in owner.declaring_class.keys.items():
         if name in owner.values:
@@ -142,7 +143,7 @@ def iterate_keys(owner: InnerNode | SectionNode) -> Iterator[tuple[Key, KeyValue
 
 def list_nodes(value: KeyValue) -> list[Node]:
     """Return the nodes in the value of a key, without the descendants of these nodes."""
-    if isinstance(value, SectionNode):
+    if isinstance(value, NodeSection):
         return [node for _, inner_value in iterate_keys(value) for node in list_nodes(inner_value)]
     if isinstance(value, tuple):
         return [node for item in value if not isinstance(item, FailureName) for node in list_nodes(item)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
-from executive.mission.model.nodes import InnerNode, KeyValue, Node, SectionNode, UnknownNode, list_nodes
+from executive.mission.model.nodes import InnerNode, InvalidNode, KeyValue, Node, NodeSection, list_nodes
 from executive.mission.model.values import LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
 from executive.mission.source import Span
@@ -25,11 +25,6 @@ if TYPE_CHECKING:
 
 KeyClass: TypeAlias = type[ControlNode] | type[KeySection]
 """Class that declares the keys of a control node or of a section."""
-
-
-def make_unknown_node(span: Span) -> UnknownNode:
-    """Return a placeholder for an invalid node; the caller adds a finding with the reason."""
-    return UnknownNode(span, "")
 
 
 def find_shorthand_key(owner: KeyClass) -> Key | None:
@@ -57,7 +52,7 @@ def find_sibling_keys(owner: KeyClass) -> Mapping[str, Key]:
 def read_control_node(
     parser: NodeParser, mapping: YamlMapping, entry: YamlEntry, label: str, node_class: type[ControlNode]
 ) -> Node:
-    """Return the control node of a mapping, or an unknown node if the children or a variable are invalid.
+    """Return the control node of a mapping, or an invalid node if the children or a variable are invalid.
 
     `entry` is the entry of the mapping with the keyword; the other entries have sibling keys.
     """
@@ -76,10 +71,10 @@ def read_control_node(
         parser.add_error(span, "missing-key", f"{keyword} needs {alternatives}{level}")
     missing = {key.kind for name, key in node_class.keys.items() if key.is_required and name not in values}
     if KeyKind.NODES in missing:
-        return make_unknown_node(span)
+        return InvalidNode(span, "")
     if missing & {KeyKind.VARIABLE, KeyKind.ELEMENTS}:
         children = [node for value in values.values() for node in list_nodes(value)]
-        return UnknownNode(span, label, tuple(children))
+        return InvalidNode(span, label, tuple(children))
     return InnerNode(span, label, node_class, values)
 
 
@@ -115,7 +110,7 @@ class _KeyReader:
             if key_value is not None:
                 self.read_key(reader, key, key_value, reader.get_key_span(key.name), values)
             elif key.kind is KeyKind.NODE and key.is_required:
-                values[key.name] = make_unknown_node(span)
+                values[key.name] = InvalidNode(span, "")
         return values
 
     def read_key(
@@ -163,15 +158,15 @@ class _KeyReader:
         name = variable.name.removeprefix("$")
         return LocatedName(name, variable.span) if NAME_PATTERN.fullmatch(name) else None
 
-    def _read_section(self, key: Key, value: YamlNode, span: Span) -> SectionNode | None:
+    def _read_section(self, key: Key, value: YamlNode, span: Span) -> NodeSection | None:
         """Return the section below a key, or None if the section lacks a required constant."""
         values = self.read_inner_keys(key.name, span, value, key.section)
         for name, inner_key in key.section.keys.items():
             if inner_key.is_required and inner_key.kind is KeyKind.CONSTANT and name not in values:
                 return None
-        return SectionNode(key.section, span, values)
+        return NodeSection(key.section, span, values)
 
-    def _read_sections(self, key: Key, value: YamlNode) -> Iterable[SectionNode]:
+    def _read_sections(self, key: Key, value: YamlNode) -> Iterable[NodeSection]:
         """Yield the sections of a list, or a single section."""
         section_kind = "mapping with " + " and ".join(f'"{name}"' for name in key.section.keys)
         if not isinstance(value, YamlSequence | YamlMapping):

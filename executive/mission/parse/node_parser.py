@@ -8,12 +8,11 @@ from dataclasses import replace
 
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model import grammar
-from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode, UnknownNode
+from executive.mission.model.nodes import InnerNode, InvalidNode, Node, SkillNode, SubtreeNode
 from executive.mission.parse.control import (
     find_inner_keys,
     find_sibling_keys,
     has_optional_body,
-    make_unknown_node,
     read_control_node,
 )
 from executive.mission.parse.mapping_reader import is_empty, read_settings
@@ -36,7 +35,7 @@ _SKILL_PATTERN = re.compile(r"[A-Z][A-Za-z0-9]*")
 
 
 class NodeParser:
-    """Parser of nodes, which adds errors to `findings` and replaces an invalid node by an unknown node."""
+    """Parser of nodes, which adds errors to `findings` and returns `InvalidNode`s for invalid YAML nodes."""
 
     def __init__(self, findings: list[Finding], skills: Skills, node_classes: ControlNodes) -> None:
         self.findings, self._skills, self._node_classes = findings, skills, node_classes
@@ -47,12 +46,12 @@ class NodeParser:
         return NodeParser([], self._skills, self._node_classes)
 
     def read_node(self, node: YamlNode | None, span: Span) -> Node:
-        """Return the mission node for a YAML node; for a missing or empty node, an unknown node at `span`."""
+        """Return the mission node for a YAML node; for a missing or empty node, an invalid node at `span`."""
         if node is None:
-            return make_unknown_node(span)
+            return InvalidNode(span, "")
         if is_empty(node):
             self.add_error(span, "missing-node", "a node is missing here")
-            return make_unknown_node(span)
+            return InvalidNode(span, "")
         if isinstance(node, YamlSequence):
             return self._read_list(node)
         if isinstance(node, YamlScalar):
@@ -76,7 +75,7 @@ class NodeParser:
     def _read_list(self, node: YamlSequence) -> Node:
         nodes = self.read_nodes(node, "a list of nodes")
         if not nodes:
-            return make_unknown_node(node.span)
+            return InvalidNode(node.span, "")
         node_class = self._node_classes[grammar.SEQUENCE_KEYWORD]
         return InnerNode(node.span, "", node_class, {"do": nodes}, is_list=True)
 
@@ -91,7 +90,7 @@ class NodeParser:
             self.add_error(node.span, "missing-node", f'"{word}" needs a body: write {word}: ...')
         else:
             self._add_keyword_error(node.span, word)
-        return make_unknown_node(node.span)
+        return InvalidNode(node.span, "")
 
     def _read_mapping(self, node: YamlMapping) -> Node:
         """Return the node of a mapping, which has one entry with a keyword or skill, and sibling entries."""
@@ -104,7 +103,7 @@ class NodeParser:
                 self._add_keyword_error(entry.key.span, entry.key.text)
             if not siblings:
                 self.add_error(node.span, "missing-node", "a node is missing here: the mapping names no node")
-            return make_unknown_node(node.span)
+            return InvalidNode(node.span, "")
         node_entry, *surplus_entries = node_entries
         name, span = node_entry.key.text, node_entry.key.span
         for entry in surplus_entries:
@@ -113,7 +112,7 @@ class NodeParser:
         if surplus_entries:
             # Errors in surplus nodes are discarded, because the author must correct the mapping first.
             parts = [self.make_silent_parser()._read_entry(node, entry, "") for entry in surplus_entries]
-            return UnknownNode(span, label, (self._read_entry(node, node_entry, ""), *parts))
+            return InvalidNode(span, label, (self._read_entry(node, node_entry, ""), *parts))
         node_class = self._node_classes.get(name)
         sibling_keys = find_sibling_keys(node_class) if node_class else {}
         allowed_keys = ("as", *(grammar.USE_SIBLINGS if name == grammar.USE_KEYWORD else sibling_keys))
@@ -145,13 +144,13 @@ class NodeParser:
         return SkillNode(entry.key.span, label, name, settings)
 
     def _read_use(self, node: YamlMapping, entry: YamlEntry, label: str) -> Node:
-        """Return the use of a subtree, or an unknown node if the name of the subtree is no text."""
+        """Return the use of a subtree, or an invalid node if the name of the subtree is no text."""
         siblings = [(key, value) for key in grammar.USE_SIBLINGS if (value := node.get(key)) is not None]
         settings = {key: read_settings(value, key, self.findings) for key, value in siblings}
         if not (isinstance(entry.value, YamlScalar) and isinstance(entry.value.value, str)):
             message = f"use must be the name of a subtree, not {describe_node(entry.value)}"
             self.add_error(entry.value.span, "wrong-type", message)
-            return make_unknown_node(entry.key.span)
+            return InvalidNode(entry.key.span, "")
         arguments, returns = settings.get("with", {}), settings.get("returns", {})
         return SubtreeNode(entry.value.span, label, entry.value.text, arguments, returns)
 
