@@ -13,7 +13,7 @@ from executive.cell.workcell import CellKind
 from executive.errors import InputError
 from executive.mission.check.checks import run_checks
 from executive.mission.check.context import CheckContext
-from executive.mission.expand.expand import expand
+from executive.mission.expand import expand
 from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
 from executive.mission.flow.unhandled_failures import UnhandledFailure, find_unhandled_failures
 from executive.mission.model.mission import Mission

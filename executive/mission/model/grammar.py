@@ -23,6 +23,9 @@ class GrammarKey:
     is_required: bool = False
 
 
+GrammarKeys = Mapping[str, GrammarKey]
+"""The keys of a mapping by name."""
+
 LABEL_PATTERN = "[a-z_][a-z0-9_]*"
 """Regular expression that every label matches."""
 
@@ -35,7 +38,7 @@ SEQUENCE_KEYWORD = "sequence"
 USE_KEYWORD = "use"
 """Keyword of a node that uses a subtree."""
 
-USE_SIBLINGS: Mapping[str, GrammarKey] = {
+USE_SIBLINGS: GrammarKeys = {
     "with": GrammarKey("values", "Values of the subtree's arguments."),
     "returns": GrammarKey("variables", "Variables of the caller for the returned values: `returned: $mine`."),
 }
@@ -49,7 +52,7 @@ KEYWORD_HINTS: Mapping[str, str] = {
 }
 """Hints for words that authors write as keywords by mistake; control nodes declare more hints."""
 
-MISSION_KEYS: Mapping[str, GrammarKey] = {
+MISSION_KEYS: GrammarKeys = {
     "mission": GrammarKey("word", "Name of the mission.", is_required=True),
     "description": GrammarKey("text", "Purpose of the mission, one sentence."),
     "cell": GrammarKey(
@@ -63,14 +66,14 @@ MISSION_KEYS: Mapping[str, GrammarKey] = {
 }
 """The keys of a mission file."""
 
-LIBRARY_KEYS: Mapping[str, GrammarKey] = {
+LIBRARY_KEYS: GrammarKeys = {
     "library": GrammarKey("word", "Name of the library.", is_required=True),
     "description": GrammarKey("text", "Content of the library, one sentence."),
     "trees": GrammarKey("trees", "Subtrees by name.", is_required=True),
 }
 """The keys of a library file."""
 
-SUBTREE_KEYS: Mapping[str, GrammarKey] = {
+SUBTREE_KEYS: GrammarKeys = {
     "doc": GrammarKey("text", "Purpose of the subtree, one sentence."),
     "args": GrammarKey("args", "Arguments of the subtree: a list of names, or names with defaults."),
     "returns": GrammarKey("words", "Variables that the caller gets; all other variables are then local."),
@@ -78,7 +81,7 @@ SUBTREE_KEYS: Mapping[str, GrammarKey] = {
 }
 """The keys of a subtree."""
 
-PARAM_KEYS: Mapping[str, GrammarKey] = {
+PARAM_KEYS: GrammarKeys = {
     "default": GrammarKey("value", "Default value; a param without a default must be set with `--set`."),
     "type": GrammarKey(
         "word", "text, integer, number, boolean or list; by default the type of the default value."

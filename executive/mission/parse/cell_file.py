@@ -83,9 +83,9 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
     if root is None:
         return CellFile(None, source, None, tuple(reader.findings))
     root, override_findings = override_cell(root, overrides)
-    override_findings += _find_overridden_base(overrides)
     config, validation_errors = validate(root, CellConfig)
-    findings = (*reader.findings, *override_findings, *validation_errors)
+    base_errors = _find_overridden_base(overrides)
+    findings = (*reader.findings, *override_findings, *base_errors, *validation_errors)
     file = CellFile(config, source, root, findings)
     if config is None:
         return file
@@ -172,17 +172,13 @@ def _merge_detector(detector: YamlNode, base_detector: YamlNode | None) -> YamlN
     if not isinstance(detector, YamlMapping) or not isinstance(base_detector, YamlMapping):
         return detector
     kind, base_kind = detector.get("kind"), base_detector.get("kind")
-    is_same_kind = kind is None or (
-        base_kind is not None and to_python_value(kind) == to_python_value(base_kind)
-    )
+    is_same_kind = kind is None or (base_kind and to_python_value(kind) == to_python_value(base_kind))
     return _inherit_entries(detector, base_detector) if is_same_kind else detector
 
 
-def _inherit_entries(
-    mapping: YamlMapping, base: YamlMapping, excluded_keys: tuple[str, ...] = ()
-) -> YamlMapping:
-    """Return a mapping with its missing entries from the base, except entries with an excluded key."""
-    keys = {*mapping.keys, *excluded_keys}
+def _inherit_entries(mapping: YamlMapping, base: YamlMapping, excluded: tuple[str, ...] = ()) -> YamlMapping:
+    """Return a mapping with its missing entries from the base, except those with a key in `excluded`."""
+    keys = {*mapping.keys, *excluded}
     base_entries = (entry for entry in base.entries if entry.key.text not in keys)
     return replace(mapping, entries=(*mapping.entries, *base_entries))
 

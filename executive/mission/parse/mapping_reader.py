@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from pydantic import JsonValue
@@ -110,15 +110,21 @@ class MappingReader:
             return node.items
         return () if node is None else (node,)
 
-    def read_entries(self, key: str, read_entry: Callable[[str, Span, YamlNode], None]) -> None:
-        """Call `read_entry` with name, position of the name, and value of each entry below `key`."""
+    def iterate_entries(self, key: str) -> Iterator[tuple[str, Span, YamlNode]]:
+        """Yield name, position of the name, and value of each entry below `key`."""
         node = self.get(key)
         if isinstance(node, YamlMapping):
             for entry in node.entries:
-                read_entry(entry.key.text, entry.key.span, entry.value)
+                yield entry.key.text, entry.key.span, entry.value
         elif node is not None and not is_empty(node):
             message = f"{self._describe_key(key)} must be a mapping, not {describe_node(node)}"
             self.add_error(node.span, "wrong-type", message)
+
+    def check_name(self, name: str, span: Span, owner: str, hint: str = "") -> None:
+        """Add an error if `name` is no valid name of `owner`: `a param`."""
+        if not NAME_PATTERN.fullmatch(name):
+            hint = hint or 'Use letters, digits and "_", and begin with no digit.'
+            self.add_error(span, "bad-name", f'"{name}" is no valid name of {owner}', hint)
 
     def add_error(self, span: Span, code: str, message: str, hint: str = "") -> None:
         """Add an error to the findings."""

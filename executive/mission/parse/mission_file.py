@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from executive.mission.model import grammar
-from executive.mission.model.grammar import GrammarKey
+from executive.mission.model.grammar import GrammarKeys
 from executive.mission.model.mission import Argument, Mission, Route, Subtree
 from executive.mission.model.values import LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
@@ -38,9 +38,7 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
     )
 
 
-def _make_file_reader(
-    owner: str, root: YamlNode, keys: Mapping[str, GrammarKey], parser: NodeParser
-) -> MappingReader:
+def _make_file_reader(owner: str, root: YamlNode, keys: GrammarKeys, parser: NodeParser) -> MappingReader:
     """Return the reader of a file with the mapping `root`; add errors about missing keys."""
     reader = MappingReader(owner, replace(root.span, length=1), root, keys, parser.findings)
     for name, key in keys.items():
@@ -66,16 +64,13 @@ def _read_cell(reader: MappingReader) -> LocatedName:
 
 
 def _read_routes(reader: MappingReader) -> tuple[Route, ...]:
-    routes: list[Route] = []
-
-    def read_route(label: str, span: Span, node: YamlNode) -> None:
+    routes = []
+    for label, span, node in reader.iterate_entries("routes"):
         items = node.items if isinstance(node, YamlSequence) else (node,)
         if not items:
             reader.add_error(node.span, "empty-list", "a route needs at least one bin")
         bins = _read_names(reader, items, "a route must be a bin or a list of bins")
         routes.append(Route(label, span, bins))
-
-    reader.read_entries("routes", read_route)
     return tuple(routes)
 
 
@@ -99,12 +94,8 @@ def parse_library(root: YamlNode, parser: NodeParser) -> dict[str, Subtree]:
 def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "") -> dict[str, Subtree]:
     """Return the subtrees below `trees`; `library` is the name of their library, "" for the mission file."""
     subtrees: dict[str, Subtree] = {}
-
-    def read_subtree(name: str, span: Span, node: YamlNode) -> None:
-        if not NAME_PATTERN.fullmatch(name):
-            message = f'"{name}" is no valid name of a subtree'
-            hint = 'Use letters, digits and "_", and begin with no digit.'
-            parser.add_error(span, "bad-name", message, hint)
+    for name, span, node in reader.iterate_entries("trees"):
+        reader.check_name(name, span, "a subtree")
         if isinstance(node, YamlMapping) and set(grammar.SUBTREE_KEYS) & set(node.keys):
             has_body = node.get("do") is not None
             if not has_body:
@@ -113,8 +104,6 @@ def _read_subtrees(reader: MappingReader, parser: NodeParser, library: str = "")
             subtrees[name] = _parse_subtree(name, span, node, subtree_parser, library)
         else:
             subtrees[name] = Subtree(name, span, "", {}, None, parser.read_node(node, span), library)
-
-    reader.read_entries("trees", read_subtree)
     return subtrees
 
 
@@ -135,29 +124,30 @@ def _parse_subtree(name: str, span: Span, node: YamlMapping, parser: NodeParser,
 def _read_arguments(reader: MappingReader) -> dict[str, Argument]:
     """Return the arguments below `args`, which is a list of names, or a mapping of names to defaults."""
     arguments: dict[str, Argument] = {}
-
-    def read_argument(name: str, span: Span, value: YamlNode) -> None:
-        if not NAME_PATTERN.fullmatch(name):
-            hint = "Write the name without $; in the subtree, $name is the value."
-            reader.add_error(span, "bad-name", f'"{name}" is no valid name of an argument', hint)
-            name = name.removeprefix("$")
+    hint = "Write the name without $; in the subtree, $name is the value."
+    for argument_name, span, value in _iterate_arguments(reader):
+        reader.check_name(argument_name, span, "an argument", hint)
+        name = argument_name.removeprefix("$")
         if name in arguments:
             first_line = arguments[name].span.line
             message = f'the argument "{name}" occurs twice; the first is in line {first_line}'
             reader.add_error(span, "duplicate-key", message)
         default = None if is_empty(value) else read_value(value, reader.findings)
         arguments[name] = Argument(span, default)
+    return arguments
 
+
+def _iterate_arguments(reader: MappingReader) -> Iterator[tuple[str, Span, YamlNode]]:
+    """Yield name, position of the name, and default of each argument; without a default, an empty scalar."""
     if not isinstance(reader.get("args"), YamlSequence):
-        reader.read_entries("args", read_argument)
-        return arguments
+        yield from reader.iterate_entries("args")
+        return
     for item in reader.list_items("args"):
         if isinstance(item, YamlScalar):
-            read_argument(item.text, item.span, YamlScalar(item.span, None, ""))
+            yield item.text, item.span, YamlScalar(item.span, None, "")
         else:
             message = "a list of arguments contains names only; for defaults, write a mapping"
             reader.add_error(item.span, "wrong-type", message)
-    return arguments
 
 
 def _read_returns(reader: MappingReader) -> dict[str, Span] | None:

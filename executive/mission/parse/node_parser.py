@@ -95,9 +95,8 @@ class NodeParser:
     def _read_mapping(self, node: YamlMapping) -> Node:
         """Return the node of a mapping, which has one entry with a keyword or skill, and sibling entries."""
         label = self._read_label(node)
-        siblings = [entry for entry in node.entries if entry.key.text != "as"]
-        node_entries = [entry for entry in siblings if self._is_node_name(entry.key.text)]
-        siblings = [entry for entry in siblings if entry not in node_entries]
+        node_entries = [entry for entry in node.entries if self._is_node_name(entry.key.text)]
+        siblings = [entry for entry in node.entries if entry.key.text != "as" and entry not in node_entries]
         if not node_entries:
             for entry in siblings:
                 self._add_keyword_error(entry.key.span, entry.key.text)

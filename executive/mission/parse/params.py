@@ -15,41 +15,31 @@ from executive.mission.model import grammar
 from executive.mission.model.conversion import WrongType, convert_value
 from executive.mission.model.mission import MissionParam
 from executive.mission.model.values import Literal
-from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, make_literal
+from executive.mission.parse.mapping_reader import MappingReader, make_literal
 from executive.mission.parse.overrides import CELL_PREFIX, make_override_source, parse_override
-from executive.mission.source import Span
-from executive.mission.text.yaml_text import YamlMapping, YamlNode, to_python_value
+from executive.mission.text.yaml_text import YamlMapping, to_python_value
 
-PARAM_TYPES: Mapping[str, object] = {
-    "text": str,
-    "integer": int,
-    "number": float,
-    "boolean": bool,
-    "list": list[Any],
-}
+PARAM_TYPES = {"text": str, "integer": int, "number": float, "boolean": bool, "list": list[Any]}
 """Python types of params, by their names in a mission."""
 
 
 def parse_params(reader: MappingReader, overrides: Mapping[str, str]) -> dict[str, MissionParam]:
     """Return the params of a mission file by name, with the values of the overrides."""
     params: dict[str, MissionParam] = {}
-
-    def read_entry(name: str, span: Span, node: YamlNode) -> None:
-        if not NAME_PATTERN.fullmatch(name):
-            message = f'"{name}" is no valid name of a param'
-            hint = 'Use letters, digits and "_", and begin with no digit.'
-            reader.add_error(span, "bad-name", message, hint)
+    for name, span, node in reader.iterate_entries("params"):
+        reader.check_name(name, span, "a param")
         if isinstance(node, YamlMapping):
             keys = grammar.PARAM_KEYS
             param_reader = MappingReader(f'the param "{name}"', span, node, keys, reader.findings)
             params[name] = _read_declaration(name, param_reader, name in overrides)
         else:
             params[name] = MissionParam(span, make_literal(node), _infer_type(to_python_value(node)))
-
-    reader.read_entries("params", read_entry)
     for name, text in overrides.items():
         if name in params:
-            params[name] = _apply_override(name, text, params[name], reader)
+            override, findings = parse_override(name, text, is_text=params[name].type == "text")
+            reader.findings += findings
+            if override and (param := _set_value(name, params[name], make_literal(override), reader)):
+                params[name] = param
         elif not name.startswith(CELL_PREFIX):
             span = make_override_source(name, text).make_span(1, 1, max(1, len(name)))
             hint = suggest_choice(name, params, "Params of the mission")
@@ -73,10 +63,13 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
     )
     # After an error, the param has a valid value, so that references to the param cause no other errors.
     fallback = replace(param, value=Literal(_choose_valid_value(param), reader.span))
-    if contradiction := _find_contradiction(param):
-        code, key = ("empty-list", "choices") if param.choices == () else ("out-of-range", "min")
-        message = f"no value is allowed for {name}: {contradiction}"
-        reader.add_error(reader.get_value_span(key), code, message)
+    problem = f"no value is allowed for {name}"
+    if param.choices == ():
+        reader.add_error(reader.get_value_span("choices"), "empty-list", f"{problem}: choices is empty")
+        return fallback
+    if param.minimum is not None and param.maximum is not None and param.minimum > param.maximum:
+        problem = f"{problem}: min {param.minimum:g} is greater than max {param.maximum:g}"
+        reader.add_error(reader.get_value_span("min"), "out-of-range", problem)
         return fallback
     if default is not None:
         return _set_value(name, param, param.value, reader) or fallback
@@ -84,15 +77,6 @@ def _read_declaration(name: str, reader: MappingReader, is_overridden: bool) -> 
         message = f'the param "{name}" has neither a default nor a value'
         reader.add_error(reader.span, "missing-param", message, f"Set it with --set {name}=...")
     return fallback
-
-
-def _find_contradiction(param: MissionParam) -> str:
-    """Return the reason why the declaration of a param allows no value, or ""."""
-    if param.choices == ():
-        return "choices is empty"
-    if param.minimum is not None and param.maximum is not None and param.minimum > param.maximum:
-        return f"min {param.minimum:g} is greater than max {param.maximum:g}"
-    return ""
 
 
 def _choose_valid_value(param: MissionParam) -> JsonValue:
@@ -137,13 +121,6 @@ def _read_bound(reader: MappingReader, key: str) -> float | None:
     message = f"{key} of {reader.owner} must be a number, not {describe_value(value)}"
     reader.add_error(node.span, "wrong-type", message)
     return None
-
-
-def _apply_override(name: str, text: str, param: MissionParam, reader: MappingReader) -> MissionParam:
-    """Return the param with the value of `--set`; after an error, return the unchanged param."""
-    node, findings = parse_override(name, text, is_text=param.type == "text")
-    reader.findings += findings
-    return (node and _set_value(name, param, make_literal(node), reader)) or param
 
 
 def _set_value(name: str, param: MissionParam, value: Literal, reader: MappingReader) -> MissionParam | None:

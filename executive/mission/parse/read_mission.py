@@ -74,8 +74,7 @@ def read_mission(
     parser = NodeParser(findings, skills, node_classes)
     mission = parse_mission(root, overrides, parser)
     subtrees = dict(mission.subtrees)
-    references = mission.libraries
-    texts = {library.name: _add_library(library, path.parent, parser, subtrees) for library in references}
+    texts = {file.name: _add_library(file, path.parent, parser, subtrees) for file in mission.libraries}
     libraries = {name: text for name, text in texts.items() if text is not None}
     mission = replace(mission, subtrees=subtrees, is_complete=len(libraries) == len(texts))
     cell_path: Path | None = None

@@ -88,7 +88,9 @@ def _make_finding(root: YamlNode, model: type[BaseModel], error: ErrorDetails) -
         span = find_span(root, path, at_key=True)
         return make_error(span, "unknown-key", f'{owner} has no key "{key}"', hint)
     if error_type == "missing" and isinstance(key, int):
-        message = f"{owner} needs {_find_tuple_length(model, parent)} values, not {len(error['input'])}"
+        # The declared type is a tuple, whose type arguments are the types of its values.
+        length = len(get_args(_find_type(model, parent)))
+        message = f"{owner} needs {length} values, not {len(error['input'])}"
         return make_error(find_span(root, parent), "wrong-length", message)
     if error_type == "missing":
         return make_error(find_span(root, parent), "missing-key", f'{owner} needs the key "{key}"')
@@ -129,12 +131,6 @@ def _list_keys(model: type[BaseModel], path: KeyPath) -> list[str]:
     if isinstance(declared_type, type) and issubclass(declared_type, BaseModel):
         return list(declared_type.model_fields)
     return []
-
-
-def _find_tuple_length(model: type[BaseModel], path: KeyPath) -> int:
-    """Return the number of values of the tuple at `path`; 0 if the value at `path` is no tuple."""
-    declared_type = _find_type(model, path)
-    return len(get_args(declared_type)) if get_origin(declared_type) is tuple else 0
 
 
 def _find_infinite_numbers(node: YamlNode) -> Iterator[Finding]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 from executive.mission.model import grammar
-from executive.mission.model.grammar import GrammarKey
+from executive.mission.model.grammar import GrammarKeys
 from executive.mission.parse.control import find_inner_keys, find_shorthand_key, has_optional_body
 from executive.mission.parse.mapping_reader import NAME_PATTERN
 from executive.mission.parse.params import PARAM_TYPES
@@ -41,9 +41,7 @@ def make_library_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     return _make_file_schema("A library", grammar.LIBRARY_KEYS, skills, node_classes)
 
 
-def _make_file_schema(
-    title: str, keys: Mapping[str, GrammarKey], skills: Skills, node_classes: ControlNodes
-) -> Schema:
+def _make_file_schema(title: str, keys: GrammarKeys, skills: Skills, node_classes: ControlNodes) -> Schema:
     control_nodes = {word: _make_control_node_schema(node_class) for word, node_class in node_classes.items()}
     use = {"title": grammar.USE_KEYWORD, "description": "A subtree by its name.", **_SCHEMAS_BY_KIND["word"]}
     subtree = {"title": "A subtree", **_make_mapping_schema(grammar.SUBTREE_KEYS)}
@@ -191,7 +189,7 @@ def _make_param_schema() -> Schema:
     return {**declaration, "type": ["object", "array", "string", "number", "boolean", "null"]}
 
 
-def _make_mapping_schema(keys: Mapping[str, GrammarKey]) -> Schema:
+def _make_mapping_schema(keys: GrammarKeys) -> Schema:
     return {
         "type": "object",
         "properties": _make_properties(keys),
@@ -200,7 +198,7 @@ def _make_mapping_schema(keys: Mapping[str, GrammarKey]) -> Schema:
     }
 
 
-def _make_properties(keys: Mapping[str, GrammarKey]) -> Schema:
+def _make_properties(keys: GrammarKeys) -> Schema:
     return {name: {"description": key.doc, **_SCHEMAS_BY_KIND[key.kind]} for name, key in keys.items()}
 
 

@@ -56,10 +56,8 @@ def find_file_below(folder: Path, reference: str, shipped_subfolders: Sequence[s
         InputError: The reference leaves the folder, or the file does not exist.
     """
     if is_outside_path(reference):
-        raise InputError(
-            f'"{reference}" is outside the folder of the file that names it; '
-            'give a relative path without ".."'
-        )
+        advice = 'give a relative path without ".."'
+        raise InputError(f'"{reference}" is outside the folder of the file that names it; {advice}')
     roots = (folder, *(get_shipped_folder() / subfolder for subfolder in shipped_subfolders))
     for root in roots:
         path = root / reference
@@ -91,9 +89,8 @@ def read_source(path: Path) -> Source:
         if path.exists() and not path.is_file():
             raise InputError(f"{path} is {_describe_kind(path)}, not a file")
         if path.stat().st_size > _MAX_FILE_SIZE:
-            raise InputError(
-                f"{path} is larger than {_MAX_FILE_SIZE} bytes, the maximum size of a mission or a cell"
-            )
+            limit = f"{_MAX_FILE_SIZE} bytes, the maximum size of a mission or a cell"
+            raise InputError(f"{path} is larger than {limit}")
         return Source(_shorten_path(path), path.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"there is no file {path}") from None

@@ -251,9 +251,8 @@ class _Composer:
 
 def _compute_height(node: YamlNode) -> int:
     """Return the depth of the nesting in a node; 0 for a scalar."""
-    if isinstance(node, YamlScalar):
-        return 0
-    return 1 + max(map(_compute_height, list_children(node)), default=0)
+    height_below = max(map(_compute_height, list_children(node)), default=0)
+    return 0 if isinstance(node, YamlScalar) else 1 + height_below
 
 
 def _make_syntax_error(source: Source, error: yaml.MarkedYAMLError) -> Finding:

@@ -117,9 +117,8 @@ class _Expander:
         """Return the expanded node; `callers` are the subtrees that contain the node, the outermost first."""
         self._node_count += 1
         if depth > _MAX_DEPTH or self._node_count > _MAX_NODE_COUNT:
-            is_too_deep = depth > _MAX_DEPTH
             depth_problem = f"is more than {_MAX_DEPTH} levels deep"
-            problem = depth_problem if is_too_deep else f"has more than {_MAX_NODE_COUNT} nodes"
+            problem = depth_problem if depth > _MAX_DEPTH else f"has more than {_MAX_NODE_COUNT} nodes"
             message = f"after the expansion of subtrees, the tree {problem}"
             self.findings.append(make_error(self._outermost_span or node.span, "too-large", message))
             raise _TooLargeError

@@ -1,1 +1,0 @@
-"""Expansion of the subtrees, params and arguments of a mission."""
