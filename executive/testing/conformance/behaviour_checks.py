@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any, Union, get_args, get_origin
 
 from executive.mission.model.port_types import describe_type, find_element_type
-from executive.skill import ANY, EMPTY, HOLDING, ToolState
+from executive.skill import ANY, EMPTY, HOLDING, Skill, ToolState
 from executive.testing.conformance.declaration_checks import HALT
 from executive.testing.conformance.situations import ArrangementFailed
 from executive.testing.conformance.skill_runs import SkillRuns, TickNotReturned
@@ -109,34 +110,22 @@ def uses_only_declared_parts(runs: SkillRuns) -> Iterator[str]:
 
 def leaves_tool_as_declared(runs: SkillRuns) -> Iterator[str]:
     """After success, each failure and a halt at any tick, the tool is in the declared state."""
-    for test_run in _find_first_violations(
-        [*runs.complete_runs, *runs.halted_runs],
-        lambda test_run: bool(_describe_tool_problem(runs, test_run)),
-    ):
-        yield _describe_tool_problem(runs, test_run)
+    yield from _list_first_problems(runs.ended_runs, partial(_describe_tool_problem, runs.skill))
 
 
 def leaves_arm_at_rest(runs: SkillRuns) -> Iterator[str]:
     """If the skill started the arm, the arm is at rest after the end or a halt of the skill."""
-    for test_run in _find_first_violations([*runs.complete_runs, *runs.halted_runs], _is_arm_left_moving):
-        yield (
-            f"{test_run.ending}, and the arm still moves. "
-            "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
-        )
+    yield from _list_first_problems(runs.ended_runs, _describe_arm_problem)
 
 
 def halts_in_one_tick(runs: SkillRuns) -> Iterator[str]:
     """A halt at any tick ends the skill in the same tick, without an exception."""
-    for test_run in _find_first_violations(runs.halted_runs, lambda test_run: test_run.status == "FAULT"):
-        yield (
-            f"{test_run.description} at tick {test_run.ticks} {test_run.message}. "
-            "The code in finally must take no control step and raise no exception."
-        )
+    yield from _list_first_problems(runs.halted_runs, _describe_halt_fault)
 
 
 def is_deterministic(runs: SkillRuns) -> Iterator[str]:
     """Two runs in the same situation make the same calls at the same ticks, and end with the same result."""
-    for _, run, rerun in runs.repeated_runs:
+    for run, rerun in runs.repeated_runs:
         if difference := _describe_difference(run, rerun):
             yield (
                 f"{run.description}, in two equal runs, {difference}. "
@@ -146,7 +135,7 @@ def is_deterministic(runs: SkillRuns) -> Iterator[str]:
 
 def has_short_ticks(runs: SkillRuns) -> Iterator[str]:
     """No tick computes for longer than 50 ms in the faster of two equal runs."""
-    for _, run, rerun in runs.repeated_runs:
+    for run, rerun in runs.repeated_runs:
         durations = list(map(min, run.tick_durations, rerun.tick_durations))
         longest = max(durations, default=0.0)
         if longest > MAX_TICK_DURATION:
@@ -169,27 +158,33 @@ def _describe_difference(run: SkillTestRun, rerun: SkillTestRun) -> str:
     return "" if has_equal_pickle(run.outputs, rerun.outputs) else "it set its outputs to different values"
 
 
-def _find_first_violations(
-    test_runs: Iterable[SkillTestRun], is_violation: Callable[[SkillTestRun], bool]
-) -> Iterable[SkillTestRun]:
-    """Return, for each situation, the first run that violates a rule."""
-    runs_by_situation: dict[str, SkillTestRun] = {}
-    for test_run in filter(is_violation, test_runs):
-        runs_by_situation.setdefault(test_run.description, test_run)
-    return runs_by_situation.values()
+def _list_first_problems(
+    test_runs: Iterable[SkillTestRun], describe_problem: Callable[[SkillTestRun], str]
+) -> Iterable[str]:
+    """Return the first problem of each situation; `describe_problem` returns "" for a run without one."""
+    problems: dict[str, str] = {}
+    for test_run in test_runs:
+        if problem := describe_problem(test_run):
+            problems.setdefault(test_run.description, problem)
+    return problems.values()
 
 
-def _is_arm_left_moving(test_run: SkillTestRun) -> bool:
-    """Return True if the skill started the arm, and the arm moves after the end or a halt of the skill."""
-    has_ended = test_run.status in ("SUCCESS", "FAILURE", "HALTED")
-    return has_ended and test_run.has_moved and not test_run.is_at_rest
+def _describe_halt_fault(test_run: SkillTestRun) -> str:
+    advice = "The code in finally must take no control step and raise no exception."
+    problem = f"{test_run.description} at tick {test_run.ticks} {test_run.message}. {advice}"
+    return problem if test_run.status == "FAULT" else ""
 
 
-def _describe_tool_problem(runs: SkillRuns, test_run: SkillTestRun) -> str:
+def _describe_arm_problem(test_run: SkillTestRun) -> str:
+    advice = "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
+    has_started_arm = any(call.name == "arm.start" for call in test_run.calls)
+    is_moving = has_started_arm and not test_run.is_at_rest
+    return f"{test_run.ending}, and the arm still moves. {advice}" if is_moving else ""
+
+
+def _describe_tool_problem(skill: type[Skill], test_run: SkillTestRun) -> str:
     """Return the violation of the declared tool state at the end of a run, or ""."""
-    if test_run.status not in ("SUCCESS", "FAILURE", "HALTED"):
-        return ""
-    required, requirement = _find_required_tool_state(runs, test_run)
+    required, requirement = _find_required_tool_state(skill, test_run)
     if required is not ANY and (required is HOLDING) != test_run.holds_after:
         actual = "holds something" if test_run.holds_after else "is empty"
         expected = "hold something" if required is HOLDING else "be empty"
@@ -205,16 +200,15 @@ def _describe_tool_problem(runs: SkillRuns, test_run: SkillTestRun) -> str:
     return ""
 
 
-def _find_required_tool_state(runs: SkillRuns, test_run: SkillTestRun) -> tuple[ToolState, str]:
+def _find_required_tool_state(skill: type[Skill], test_run: SkillTestRun) -> tuple[ToolState, str]:
     """Return the required state of the tool at the end of a run, and the declaration that requires it."""
     initial_state = HOLDING if test_run.holds_before else EMPTY
     if test_run.status == "SUCCESS":
-        declared_state = runs.skill.tool_state[1]
-        is_unchanged = declared_state is ANY
-        return (initial_state, "as before") if is_unchanged else (declared_state, "by tool_state")
+        state_after = skill.tool_state[1]
+        return (initial_state, "as before") if state_after is ANY else (state_after, "by tool_state")
     name = HALT if test_run.status == "HALTED" else test_run.reason
-    if name in runs.skill.tool_state_after_failure:
-        return runs.skill.tool_state_after_failure[name], f'by tool_state_after_failure["{name}"]'
+    if name in skill.tool_state_after_failure:
+        return skill.tool_state_after_failure[name], f'by tool_state_after_failure["{name}"]'
     return initial_state, f'as before, because tool_state_after_failure has no "{name}"'
 
 

@@ -97,7 +97,7 @@ def calls_take_effect(runs: SkillRuns) -> Iterator[str]:
     """Each call has an effect: generators are executed with `yield from`, and failures are raised."""
     for function in source_code.walk_functions(runs.skill):
         for call in _find_unused_calls(function):
-            callee, text = function.resolve_callee(call), f"{ast.unparse(call.func)}(...)"
+            callee, text = function.resolve(call.func), f"{ast.unparse(call.func)}(...)"
             place = function.locate(call)
             if source_code.returns_steps(callee):
                 yield f'{place} calls {text} without executing its steps. Write "yield from {text}".'
@@ -140,13 +140,11 @@ def _find_unused_calls(function: source_code.FunctionSource) -> Iterator[ast.Cal
     # The executive ignores the return value of a generator `run`; other functions may return a value.
     is_run = function.function.__name__ == "run" and inspect.isgeneratorfunction(function.function)
     for node in nodes:
-        if isinstance(node, ast.Expr) or (is_run and isinstance(node, ast.Return)):
-            is_unused = True
-        elif isinstance(node, ast.Assign):
-            is_unused = not any(
-                not isinstance(target, ast.Name) or target.id in read_names for target in node.targets
-            )
-        else:
-            continue
-        if is_unused and isinstance(node.value, ast.Call):
-            yield node.value
+        match node:
+            case ast.Expr(ast.Call() as call):
+                yield call
+            case ast.Return(ast.Call() as call) if is_run:
+                yield call
+            case ast.Assign(targets, ast.Call() as call):
+                if all(isinstance(target, ast.Name) and target.id not in read_names for target in targets):
+                    yield call

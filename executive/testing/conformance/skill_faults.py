@@ -10,12 +10,10 @@ from executive.skill import Skill
 from executive.testing import faults
 from executive.testing.faults.effect import Effect, Occurrence
 
-SEAL_BREAK_INTERVALS = 20
-"""Number of equal intervals into which a run is divided; at each boundary the seal breaks in a test run."""
+RUN_INTERVALS = 20
+"""Number of equal intervals of a run; the seal breaks at each boundary, in a test run of its own."""
 PRECEDING_MOTION_STEPS = 24
 """Duration of a motion that is still in progress when the skill starts [control steps]."""
-MAX_REMOVED_OBJECTS = 10
-"""Number of removals that empties the table; more than there are objects."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,6 @@ class NamedFault:
         effect: Effect of the fault on the cell.
         resource: Resource that affected skills use: `arm`, `tool` or `camera`; "" if all skills are affected.
         requires_holding: True if the fault affects only runs with an object in the tool at the start.
-        count: Number of equal faults that are injected together.
         tick: Control step before which the fault begins.
     """
 
@@ -35,7 +32,6 @@ class NamedFault:
     effect: Effect
     resource: str = ""
     requires_holding: bool = False
-    count: int = 1
     tick: int = 0
 
 
@@ -49,9 +45,8 @@ def list_skill_faults(skill: type[Skill], ticks: int, *, is_holding: bool) -> It
         if can_occur and (not fault.resource or fault.resource in skill.uses):
             yield fault
     if "tool" in skill.uses:
-        for tick in sorted(
-            {round(ticks * index / SEAL_BREAK_INTERVALS) for index in range(SEAL_BREAK_INTERVALS + 1)}
-        ):
+        break_ticks = {round(ticks * index / RUN_INTERVALS) for index in range(RUN_INTERVALS + 1)}
+        for tick in sorted(break_ticks):
             yield NamedFault(f"while the seal breaks at tick {tick}", faults.seal_breaks(None), tick=tick)
 
 
@@ -62,10 +57,18 @@ def _move_arm(occurrence: Occurrence) -> bool:
     return True
 
 
+def _empty_table(occurrence: Occurrence) -> bool:
+    """Remove all objects from the table; return False, so that also later objects are removed."""
+    context = occurrence.context
+    while (true_object := context.find_object("nearest", "")) is not None:
+        context.world.remove(true_object)
+    return False
+
+
 _FAULTS = (
     NamedFault("while the suction cup cannot seal", faults.seal_fails(), "tool"),
     NamedFault("while the tool sticks", faults.tool_sticks(), "tool", requires_holding=True),
-    NamedFault("while the table is empty", faults.object_removed("nearest"), count=MAX_REMOVED_OBJECTS),
+    NamedFault("while the table is empty", Effect("table_empty", _empty_table)),
     NamedFault("while the table has changed since the last image", faults.table_bumped()),
     NamedFault("while the arm collides", faults.arm_collides(), "arm"),
     NamedFault("while the arm still moves at the start", Effect("arm_moves", _move_arm), "arm"),

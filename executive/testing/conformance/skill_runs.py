@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -39,17 +38,17 @@ class SkillRuns:
         return list(list_situations(self.skill, self._arrange))
 
     @cached_property
-    def repeated_runs(self) -> list[tuple[Situation, SkillTestRun, SkillTestRun]]:
-        """For each situation two equal runs to the end, without a fault."""
-        return [(situation, self._run(situation), self._run(situation)) for situation in self.situations]
+    def repeated_runs(self) -> list[tuple[SkillTestRun, SkillTestRun]]:
+        """For each situation, two equal runs without a fault and without a halt."""
+        return [(self._run(situation), self._run(situation)) for situation in self.situations]
 
     @cached_property
     def complete_runs(self) -> list[SkillTestRun]:
         """Runs without a halt: for each situation, one run without a fault and one run per fault."""
-        runs_without_fault = [test_run for _, test_run, _ in self.repeated_runs]
+        runs_without_fault = [test_run for test_run, _ in self.repeated_runs]
         return runs_without_fault + [
-            self._run(situation, fault)
-            for situation, test_run, _ in self.repeated_runs
+            self._run(test_run.situation, fault)
+            for test_run in runs_without_fault
             # If the run without a fault does not end, a run with a fault would not end either.
             if test_run.status != "RUNNING"
             for fault in list_skill_faults(self.skill, test_run.ticks, is_holding=test_run.holds_before)
@@ -59,11 +58,17 @@ class SkillRuns:
     def halted_runs(self) -> list[SkillTestRun]:
         """Halted runs: for each situation, one run per tick of `_choose_halt_ticks`."""
         return [
-            self._run(situation, halt_at=tick)
-            for situation, test_run, _ in self.repeated_runs
+            self._run(test_run.situation, halt_at=tick)
+            for test_run, _ in self.repeated_runs
             if test_run.status != "RUNNING"
             for tick in _choose_halt_ticks(test_run)
         ]
+
+    @property
+    def ended_runs(self) -> list[SkillTestRun]:
+        """All runs that ended with success, with a failure or with a halt."""
+        test_runs = [*self.complete_runs, *self.halted_runs]
+        return [test_run for test_run in test_runs if test_run.status in ("SUCCESS", "FAILURE", "HALTED")]
 
     def _run(
         self, situation: Situation, fault: NamedFault | None = None, halt_at: int | None = None
@@ -84,9 +89,6 @@ class SkillRuns:
                 "and do long computations in a detector."
             )
             raise TickNotReturned(self._stuck_message)
-        if fault is not None or halt_at is not None:
-            # Only repeated runs are compared; the arguments may be large, for example frames.
-            test_run.calls = [replace(call, arguments=()) for call in test_run.calls]
         return test_run
 
 

@@ -15,8 +15,8 @@ from types import FrameType
 from typing import Any
 
 from executive.cell.clock import STEP
-from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
+from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault
 from executive.events import NodeStarted, TimedEvent
 from executive.skill import Skill, SkillFailed
@@ -43,7 +43,7 @@ class Call:
     Attributes:
         tick: Number of the control step of the call, from 0.
         name: Part and method, for instance `arm.start`.
-        arguments: Arguments of the call.
+        arguments: Arguments of the call; () in a run with a fault or a halt.
     """
 
     tick: int
@@ -62,6 +62,7 @@ class SkillTestRun:
         halt_at: Control step before which the skill is halted; None: no halt.
 
     Attributes:
+        situation: Situation in which the run began.
         description: Situation and fault, as the beginning of a sentence.
         status: `SUCCESS`; `FAILURE`; `HALTED`; `RUNNING`: no end within `MAX_RUN_TIME`; `STUCK`: a tick did
             not return; `FAULT`: the skill raised an exception or violated its declarations.
@@ -89,18 +90,16 @@ class SkillTestRun:
         scene, values = prepare_scene(skill, situation, arrange)
         fake = scene.cell
         original_values = values if halt_at else copy.deepcopy(values, {id(fake): fake})
-        script = [during("*", fault.effect)] * fault.count if fault else []
-        cell = FaultyCell(fake, script)
+        self.situation, self._skill, self._fault, self._halt_at = situation, skill, fault, halt_at
         self.description = f"{situation.name} {fault.name}" if fault else situation.name
         self.reason = self.message = ""
-        self.ticks, self._skill, self._halt_at = 0, skill, halt_at
+        self.ticks = 0
         self.outputs: Mapping[str, Any] = {}
         self.calls, self.tick_durations = list[Call](), list[float]()
         self.holds_before = fake.tool.holding
-        observed_cell = intercept(cell.cell, self._record_call, _OBSERVED_ROLES)
         try:
             with detect_stuck_ticks(skill, lambda: self.ticks):
-                self.status = self._run_skill(values, cell, observed_cell, fault.tick if fault else 0)
+                self.status = self._run_skill(values, fake)
         except TickStuck as stuck:
             self.status, self.message = "STUCK", str(stuck)
         self.changed_names = [
@@ -120,31 +119,26 @@ class SkillTestRun:
         }
         return f"{self.description} {result_texts.get(self.status, f'it ended as a fault: {self.message}')}"
 
-    @property
-    def has_moved(self) -> bool:
-        """True if the skill started the arm."""
-        return any(call.name == "arm.start" for call in self.calls)
-
     def _record_call(self, access: Access) -> Any:
         if access.is_call and access.role in _OBSERVED_ROLES:
-            self.calls.append(Call(self.ticks, access.name, access.all_arguments))
+            # Only runs without fault and halt are compared; the arguments may be large, for instance frames.
+            arguments = access.all_arguments if self._fault is None and self._halt_at is None else ()
+            self.calls.append(Call(self.ticks, access.name, arguments))
         return access.proceed()
 
-    def _run_skill(
-        self, values: Mapping[str, Any], cell: FaultyCell, observed_cell: Cell, fault_tick: int
-    ) -> str:
+    def _run_skill(self, values: Mapping[str, Any], fake: FakeCell) -> str:
         """Tick the skill until its end or halt, and return the status."""
-        skill = self._skill
-        run: SkillRun | None = None
+        fault = self._fault
+        cell = FaultyCell(fake, [during("*", fault.effect)] if fault else [])
         try:
+            run = SkillRun(self._skill(**values), intercept(cell.cell, self._record_call, _OBSERVED_ROLES))
             while self.ticks < MAX_RUN_TIME / STEP:
-                if run is not None and self.ticks == self._halt_at:
+                if self.ticks == self._halt_at:
                     run.halt()
                     return "HALTED"
-                if self.ticks == fault_tick:
+                if fault is not None and self.ticks == fault.tick:
                     cell.on_event(TimedEvent(0, 0.0, NodeStarted("skill")))
                 start_time = perf_counter()
-                run = run or SkillRun(skill(**values), observed_cell)
                 has_succeeded = run.step()
                 self.tick_durations.append(perf_counter() - start_time)
                 if has_succeeded:
@@ -156,10 +150,8 @@ class SkillTestRun:
             self.reason, self.message = failure.reason, failure.message
             return "FAILURE"
         except Exception as error:
-            frames = extract_tb(error.__traceback__)
-            place = find_skill_line(
-                skill, ((frame.filename, frame.lineno or 0) for frame in reversed(frames))
-            )
+            frames = reversed(extract_tb(error.__traceback__))
+            place = find_skill_line(self._skill, ((frame.filename, frame.lineno or 0) for frame in frames))
             kind = "" if isinstance(error, Fault) else f"{type(error).__name__}: "
             self.message = f"{kind}{error}" + (f" ({place})" if place else "")
             return "FAULT"
@@ -192,15 +184,13 @@ def detect_stuck_ticks(skill: type[Skill], count_ticks: Callable[[], int]) -> It
         tick = count_ticks()
         unchanged_checks, last_tick = (unchanged_checks + 1 if tick == last_tick else 0), tick
         if unchanged_checks >= PROGRESS_CHECKS:
-            place = find_skill_line(
-                skill, ((caller.f_code.co_filename, line) for caller, line in walk_stack(frame))
-            )
+            callers = walk_stack(frame)
+            place = find_skill_line(skill, ((caller.f_code.co_filename, line) for caller, line in callers))
             raise TickStuck(f"did not return for {STUCK_TIMEOUT:g} s{place and f', at {place}'}")
 
     old_handler = signal.signal(signal.SIGALRM, on_timer)
-    old_timer = signal.setitimer(
-        signal.ITIMER_REAL, STUCK_TIMEOUT / PROGRESS_CHECKS, STUCK_TIMEOUT / PROGRESS_CHECKS
-    )
+    period = STUCK_TIMEOUT / PROGRESS_CHECKS
+    old_timer = signal.setitimer(signal.ITIMER_REAL, period, period)
     try:
         yield
     finally:

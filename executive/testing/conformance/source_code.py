@@ -36,14 +36,10 @@ class FunctionSource:
         """Return file and line of a node of the syntax tree, for instance `wave.py:12`."""
         return f"{Path(self.function.__code__.co_filename).name}:{node.lineno}"
 
-    def resolve_callee(self, call: ast.Call) -> Any:
-        """Return the called function or class, or None if the source code does not determine it."""
-        return self._resolve(call.func)
-
-    def _resolve(self, node: ast.expr) -> Any:
-        """Return the value of an expression, or its class if the value is unknown, or None."""
+    def resolve(self, node: ast.expr) -> Any:
+        """Return the value of an expression, or the class of an unknown value; None if both are unknown."""
         if isinstance(node, ast.Attribute):
-            return _find_member(self._resolve(node.value), node.attr)
+            return _find_member(self.resolve(node.value), node.attr)
         if not isinstance(node, ast.Name):
             return None
         if node.id == "self":
@@ -85,7 +81,7 @@ def walk_functions(skill: type[Skill]) -> Iterator[FunctionSource]:
         function_source = FunctionSource(function, syntax_tree, skill)
         yield function_source
         calls = [node for node in ast.walk(syntax_tree) if isinstance(node, ast.Call)]
-        callees = map(function_source.resolve_callee, calls)
+        callees = [function_source.resolve(call.func) for call in calls]
         functions = [callee for callee in callees if isinstance(callee, FunctionType)]
         pending += [callee for callee in functions if callee.__module__.partition(".")[0] == package]
 
