@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -17,7 +18,6 @@ from executive.campaign.pool import run_jobs
 from executive.errors import InputError
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SubtreeNode
-from executive.mission.source import Span
 from executive.view.results.fault_results import Branch, FaultCampaignResults, Trial
 
 MAX_FAULTS_PER_RUN = 4
@@ -94,7 +94,7 @@ class Campaign:
         numbers = [
             number
             for number, fault in enumerate(self.faults, 1)
-            if not (fault.is_conditional or fault.replaced_number or fault.is_bug)
+            if not (fault.is_conditional or fault.replaces_previous or fault.is_bug)
         ]
         random_generator, pairs = random.Random(self.mission.seed), dict[FaultNumbers, None]()
         while len(pairs) < min(count, math.comb(len(numbers), 2)):
@@ -120,8 +120,8 @@ class Campaign:
         for number, fault in enumerate(self.faults, 1):
             if number in trials_by_number:
                 continue
-            replaced_trial = trials_by_number.get(fault.replaced_number)
-            if fault.replaced_number and (replaced_trial is None or replaced_trial.had_effect):
+            previous_trial = trials_by_number.get(number - 1)
+            if fault.replaces_previous and (previous_trial is None or previous_trial.had_effect):
                 continue
             required_faults = triggers_by_path.get(fault.location) if fault.is_conditional else ()
             if required_faults is not None and len(required_faults) < MAX_FAULTS_PER_RUN:
@@ -170,22 +170,18 @@ def find_branches(tree: Node, trials: Sequence[Trial]) -> tuple[Branch, ...]:
 
     A branch in a subtree that is used twice has two paths.
     """
-    paths_by_key: dict[tuple[str, int, int, str], list[str]] = {}
-    for span, name, node in _walk_branches(tree):
-        paths_by_key.setdefault((span.source.path, span.line, span.col, name), []).append(_find_path(node))
-    branches = []
-    for (file, line, _, name), paths in paths_by_key.items():
-        trial_count = sum(not trial.entered_paths.isdisjoint(paths) for trial in trials)
-        branches.append(Branch(f"{file}:{line}", name, tuple(paths), trial_count))
-    return tuple(branches)
-
-
-def _walk_branches(tree: Node) -> Iterator[tuple[Span, str, Node]]:
-    """Yield the position in the file, the name and the node of each branch."""
+    paths_by_place: dict[tuple[str, int, int, str], list[str]] = defaultdict(list)
     for node in tree.walk():
         if isinstance(node, InnerNode):
             for name, child in make_inspection_instance(node).list_contingencies():
-                yield get_mission_node(child).span, name, get_mission_node(child)
+                branch = get_mission_node(child)
+                place = branch.span.source.path, branch.span.line, branch.span.col, name
+                paths_by_place[place].append(_find_path(branch))
+    branches = []
+    for (file, line, _, name), paths in paths_by_place.items():
+        trial_count = sum(not trial.entered_paths.isdisjoint(paths) for trial in trials)
+        branches.append(Branch(f"{file}:{line}", name, tuple(paths), trial_count))
+    return tuple(branches)
 
 
 def _find_path(node: Node) -> str:

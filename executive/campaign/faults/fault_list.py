@@ -38,13 +38,13 @@ class Cause:
         description: Description of the effect, for the list of faults.
         required_property: Property of the affected skills: `moves`, `senses`, or an element of `uses`; "" if
             all skills are affected.
-        can_last: True if the fault can last until the end of the run; False: only in `REPEATED_ACTIVATIONS`.
+        lasting_activations: Numbers of the activations with a lasting fault; empty: all activations.
     """
 
     effect: Effect
     description: str
     required_property: str = ""
-    can_last: bool = True
+    lasting_activations: tuple[int, ...] = ()
 
     def can_affect(self, skill: type[Skill]) -> bool:
         """Return True if a skill has the required property."""
@@ -65,10 +65,12 @@ def list_causes(table: TableConfig) -> Mapping[str, Cause]:
         "unavailable": Cause(effects.detector_dead(), "the detector is dead", "camera"),
         "unsure": Cause(effects.detector_unsure(), "all confidences are low", "camera"),
         "hidden": Cause(effects.workspace_occluded(), "the arm occludes the workspace", "camera"),
-        "stale": Cause(effects.table_bumped(), "the table is bumped", can_last=False),
+        "stale": Cause(effects.table_bumped(), "the table is bumped", "", REPEATED_ACTIVATIONS),
         "no_depth": Cause(effects.no_depth(), "no detection can be localized"),
         "quit": Cause(effects.operator_quits(), "the operator quits", "senses"),
-        "rescan": Cause(effects.operator_asks_rescan(), "the operator asks for a scan", "senses", False),
+        "rescan": Cause(
+            effects.operator_asks_rescan(), "the operator asks for a scan", "senses", REPEATED_ACTIVATIONS
+        ),
     }
 
 
@@ -79,17 +81,12 @@ def list_faults(mission: MissionUnderTest, nominal_run: NominalRun) -> tuple[Pla
     faults of detectors, faults of objects, faults of the tool.
     """
     lister = _FaultLister(mission, nominal_run)
-    faults = [
+    return (
         *(fault for node in lister.nodes for fault in lister.list_failures(node)),
         *(fault for node in lister.nodes for fault in lister.list_bugs(node)),
         *lister.list_detector_faults(),
         *lister.list_object_faults(),
         *lister.list_tool_faults(),
-    ]
-    # `replaced_number` -1 marks a fault that replaces the fault directly before it in the list.
-    return tuple(
-        replace(fault, replaced_number=index) if fault.replaced_number else fault
-        for index, fault in enumerate(faults)
     )
 
 
@@ -117,12 +114,10 @@ class _FaultLister:
                 fault = self._make_node_fault(node, reason, occasion, description, skill_fault)
                 fault = replace(fault, is_failure_reason=True)
                 if cause is not None and cause.can_affect(skill):
-                    lasting_activations = () if cause.can_last else REPEATED_ACTIVATIONS
-                    cell_fault = during(
-                        node.path, cause.effect, activations=activations or lasting_activations
-                    )
-                    yield replace(fault, cause=cause.description, skill_faults=(), cell_faults=(cell_fault,))
-                    fault = replace(fault, replaced_number=-1)
+                    numbers = activations or cause.lasting_activations
+                    cell_fault = during(node.path, cause.effect, activations=numbers)
+                    yield replace(fault, cause=cause.description, injected=cell_fault)
+                    fault = replace(fault, replaces_previous=True)
                 yield fault
 
     def list_bugs(self, node: SkillNode) -> Iterator[PlannedFault]:
@@ -202,13 +197,11 @@ class _FaultLister:
     def _make_node_fault(
         self, node: SkillNode, kind: str, occasion: Occasion, cause: str, fault: ScheduledFault | SkillFault
     ) -> PlannedFault:
-        """Return a planned fault of a node that consists of one fault of the cell or of the skill."""
-        name, mission_line = node.label or node.skill, f"{node.span.source.path}:{node.span.line}"
-        planned_fault = PlannedFault(node.path, name, mission_line, kind, occasion, cause)
-        planned_fault = replace(planned_fault, is_conditional=not self._has_run(node))
-        if isinstance(fault, SkillFault):
-            return replace(planned_fault, skill_faults=(fault,))
-        return replace(planned_fault, cell_faults=(fault,))
+        """Return a planned fault that affects a node."""
+        return PlannedFault(
+            node.path, node.label or node.skill, f"{node.span.source.path}:{node.span.line}",
+            kind, occasion, cause, fault, is_conditional=not self._has_run(node),
+        )  # fmt: skip
 
     def _has_run(self, node: SkillNode) -> bool:
         """Return True if the node runs in the nominal run."""
@@ -224,7 +217,7 @@ def _make_part_fault(part: str, kind: str, occasion: Occasion, cell_fault: Sched
     """Return a fault with a time span, which affects a part of the cell but no particular node."""
     assert isinstance(cell_fault.time, TimeSpan)
     cause = f"from {cell_fault.time.start:.2f} s on"
-    return PlannedFault(part, part, "", kind, occasion, cause, cell_faults=(cell_fault,))
+    return PlannedFault(part, part, "", kind, occasion, cause, cell_fault)
 
 
 def _describe_time(fraction: float) -> str:

@@ -52,12 +52,11 @@ class PlannedFault:
         kind: Failure reason of the node, or kind of the fault, for instance `target removed`.
         occasion: Occasion of the fault in the run.
         cause: Cause of the fault, a few words.
-        cell_faults: Injected faults of the cell.
-        skill_faults: Injected faults of skills.
+        injected: Fault of the cell or of a skill that is injected.
         is_failure_reason: True if `kind` is a failure reason: the fault must let the node fail with it.
         expected_reason: Reason with which skills should fail because of a fault of a part; "": no reason.
         is_conditional: True if the node runs only after another fault.
-        replaced_number: Number of the fault that this fault replaces if the node does not fail; 0: none.
+        replaces_previous: True if the fault is tried only if the previous fault does not let the node fail.
     """
 
     location: str
@@ -66,17 +65,16 @@ class PlannedFault:
     kind: str
     occasion: Occasion
     cause: str
-    cell_faults: tuple[ScheduledFault, ...] = ()
-    skill_faults: tuple[SkillFault, ...] = ()
+    injected: ScheduledFault | SkillFault
     is_failure_reason: bool = False
     expected_reason: str = ""
     is_conditional: bool = False
-    replaced_number: int = 0
+    replaces_previous: bool = False
 
     @property
     def is_bug(self) -> bool:
         """True if the fault simulates a bug, after which the run must end with the status FAULT."""
-        return any(skill_fault.kind != "fails" for skill_fault in self.skill_faults)
+        return isinstance(self.injected, SkillFault) and self.injected.kind != "fails"
 
     def __str__(self) -> str:
         """Return a description of the fault."""

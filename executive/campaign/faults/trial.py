@@ -17,17 +17,18 @@ from executive.campaign.faults.planned_fault import (
     INJECTED_MESSAGE,
     InjectedError,
     PlannedFault,
+    SkillFault,
     make_substitutes,
 )
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
-from executive.events import FaultInjected, InputRead, NodeEnded, RunEnded, TimedEvent
+from executive.events import InputRead, NodeEnded, RunEnded, TimedEvent
 from executive.plugins import load_cell_kind
 from executive.record.recorded_run import RecordedRun, make_run_directory
 from executive.record.recorder import Recorder
 from executive.run.assembly import RunOptions, assemble
-from executive.testing.faults import FaultyCell, with_faults
+from executive.testing.faults import FaultyCell, ScheduledFault, with_faults
 from executive.view.report.page import try_write_report
 from executive.view.results.fault_results import Trial
 
@@ -75,10 +76,11 @@ class _TrialRun:
     def __init__(self, mission: MissionUnderTest, nominal_run: NominalRun, faults: FaultsByNumber) -> None:
         self._mission, self._nominal_run, self._faults = mission, nominal_run, faults
         self._events: list[TimedEvent] = []
-        self._skill_faults = [skill_fault for fault in faults.values() for skill_fault in fault.skill_faults]
+        injected_faults = [fault.injected for fault in faults.values()]
+        self._skill_faults = [fault for fault in injected_faults if isinstance(fault, SkillFault)]
         self._recorder = ActivationRecorder()
         self._is_stopped = False
-        cell_faults = [cell_fault for fault in faults.values() for cell_fault in fault.cell_faults]
+        cell_faults = [fault for fault in injected_faults if isinstance(fault, ScheduledFault)]
         skills_by_path = {node.path: mission.skills[node.skill] for node in list_skill_nodes(mission)}
         self.options = RunOptions(
             mission.seed,
@@ -87,9 +89,9 @@ class _TrialRun:
             substitutes=make_substitutes(self._skill_faults, skills_by_path),
         )
         self.run = assemble(mission.loaded, mission.skills, self.options, [self._store_event, self._recorder])
-        workcell = self.run.workcell
-        assert isinstance(workcell, FaultyCell)
-        self.run.add_observer(workcell.on_event)
+        assert isinstance(self.run.workcell, FaultyCell)
+        self._workcell = self.run.workcell
+        self.run.add_observer(self._workcell.on_event)
 
     @property
     def run_end(self) -> RunEnded:
@@ -101,7 +103,9 @@ class _TrialRun:
         run = self.run
         items, audit = run.count_items(), run.count_ground_truth()
         removed_count = trial_checks.count_injected_faults(self._events, "object_removed")
-        faults, unobserved = tuple(self._faults.values()), self._count_unobserved_objects()
+        faults, objects = tuple(self._faults.values()), self._workcell.world.objects
+        bins = self._workcell.cell.bins.values()
+        unobserved = trial_checks.count_unobserved_objects(objects, bins, self._events)
         is_bug_raised = any(fault.is_bug and self._has_effect(fault) for fault in faults)
         problems = [
             *trial_checks.check_end(run_end, faults, self._mission.loaded.unhandled_failures, is_bug_raised),
@@ -110,8 +114,8 @@ class _TrialRun:
             *trial_checks.check_ledger(run_end, items, audit, removed_count, unobserved),
             *trial_checks.check_success(run_end, audit, self._events),
             *trial_checks.check_losses(audit, self._events),
-            *check_held_item(run_end, run.workcell),
-            *check_arm_at_rest(run.workcell),
+            *check_held_item(run_end, self._workcell),
+            *check_arm_at_rest(self._workcell),
         ]
         return replace(
             make_empty_trial(self._faults),
@@ -150,25 +154,20 @@ class _TrialRun:
                 self._is_stopped = True
                 self.run.control.stop()
 
-    def _count_unobserved_objects(self) -> trial_checks.UnobservedCounts:
-        workcell = self.run.workcell
-        assert isinstance(workcell, FaultyCell)
-        objects, bins = workcell.world.objects, workcell.cell.bins.values()
-        return trial_checks.count_unobserved_objects(objects, bins, self._events)
-
     def _has_occurred(self, fault: PlannedFault) -> bool:
         """Return True if a fault was injected into the cell or into a skill."""
-        names = {cell_fault.effect.name for cell_fault in fault.cell_faults}
-        injected = {timed.event.name for timed in self._events if isinstance(timed.event, FaultInjected)}
-        return not names.isdisjoint(injected) or (bool(fault.skill_faults) and self._has_effect(fault))
+        if isinstance(fault.injected, SkillFault):
+            return self._has_effect(fault)
+        return trial_checks.count_injected_faults(self._events, fault.injected.effect.name) > 0
 
     def _has_effect(self, fault: PlannedFault) -> bool:
         """Return True if the node of the fault ended as planned, by this fault or by another fault."""
-        node_ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
-        node_ends = [end for end in node_ends if end.node == fault.location]
+        ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
+        node_ends = [end for end in ends if end.node == fault.location]
         if fault.is_bug:
             return any(end.status == "INVALID" and InjectedError.__name__ in end.message for end in node_ends)
         if not fault.is_failure_reason:
             return True
         failures = [end for end in node_ends if (end.status, end.reason) == ("FAILURE", fault.kind)]
-        return any(not fault.skill_faults or end.message == INJECTED_MESSAGE for end in failures)
+        is_cell_fault = isinstance(fault.injected, ScheduledFault)
+        return any(is_cell_fault or end.message == INJECTED_MESSAGE for end in failures)

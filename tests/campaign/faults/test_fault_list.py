@@ -8,10 +8,12 @@ import pytest
 
 from executive.campaign.faults.campaign import Campaign
 from executive.campaign.faults.fault_list import list_faults, list_skill_nodes
+from executive.campaign.faults.planned_fault import SkillFault
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cells.fake.cell import FakeCell
 from executive.mission.load import load_mission
 from executive.plugins import load_skills
+from executive.testing.faults import ScheduledFault
 
 
 @pytest.mark.parametrize(
@@ -52,18 +54,17 @@ def test_detectors_objects_and_the_tool_go_wrong_too(campaign: Campaign) -> None
 
 
 def test_a_reason_is_brought_about_in_the_cell_and_else_said_by_the_skill(campaign: Campaign) -> None:
-    for number, fault in enumerate(campaign.faults, 1):
-        if fault.replaced_number:
-            physical = campaign.faults[fault.replaced_number - 1]
-            assert fault.replaced_number == number - 1
+    for index, fault in enumerate(campaign.faults):
+        if fault.replaces_previous:
+            physical = campaign.faults[index - 1]
             assert (physical.location, physical.kind) == (fault.location, fault.kind)
             assert physical.occasion == fault.occasion
-            assert physical.cell_faults
-            assert fault.skill_faults
+            assert isinstance(physical.injected, ScheduledFault)
+            assert isinstance(fault.injected, SkillFault)
     of = {
         fault.kind: fault
         for fault in campaign.faults
-        if fault.is_failure_reason and not fault.replaced_number
+        if fault.is_failure_reason and not fault.replaces_previous
     }
     assert (of["missed"].cause, of["doubtful"].cause) == (
         "the suction cup cannot seal", "the skill fails without a cause",

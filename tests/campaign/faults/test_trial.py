@@ -24,7 +24,7 @@ def number_of(campaign: Campaign, name: str, what: str, when: str = "first", *, 
         number
         for number, fault in enumerate(campaign.faults, 1)
         if (fault.name, fault.kind, fault.occasion, fault.is_conditional) == (name, what, when, behind)
-        and not fault.replaced_number
+        and not fault.replaces_previous
     )
 
 
@@ -101,7 +101,8 @@ def test_what_cannot_happen_there_found_no_occasion(campaign: Campaign) -> None:
 def test_a_run_that_never_ends_is_ended_and_found(campaign: Campaign) -> None:
     number = number_of(campaign, "SelectTarget", "unseen", "lasting")
     fault = campaign.faults[number - 1]
-    ever = replace(fault, skill_faults=(replace(fault.skill_faults[0], activations=()),))
+    assert isinstance(fault.injected, SkillFault)
+    ever = replace(fault, injected=replace(fault.injected, activations=()))
     short = replace(campaign.nominal_run, robot_time=-5.0)
     trial = run_trial(campaign.mission, short, {number: ever})
     assert trial.problems[0] == (

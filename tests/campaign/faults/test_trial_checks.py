@@ -22,12 +22,12 @@ from executive.cell.frame import FrameCaptured
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, RunEnded
 from executive.mission.flow.unhandled_failures import UnhandledFailure
+from executive.testing.faults import during, seal_fails
 from executive.testing.faults.world_access import TrueObject
 
-BUG = PlannedFault(
-    "tree/Grasp", "Grasp", "", "raises", "first", "", skill_faults=(SkillFault("tree/Grasp", "raises"),)
-)
-MISS = PlannedFault("tree/Grasp", "Grasp", "", "missed", "first", "", is_failure_reason=True)
+BUG = PlannedFault("tree/Grasp", "Grasp", "", "raises", "first", "", SkillFault("tree/Grasp", "raises"))
+SEAL_FAILS = during("tree/Grasp", seal_fails())
+MISS = PlannedFault("tree/Grasp", "Grasp", "", "missed", "first", "", SEAL_FAILS, is_failure_reason=True)
 ENDINGS = (UnhandledFailure("Grasp", "missed", "tree/Grasp", "a.yaml", 3),)
 ITEMS = {"seen": 3, "placed": 2, "rejected": 1, "skipped": 0, "lost": 0, "phantom": 0}
 AUDIT = {"right": 2, "wrong_bin": 0, "left": 1, "elsewhere": 0, "unseen": 0}
@@ -139,7 +139,7 @@ def test_a_failure_for_another_reason_is_remarked() -> None:
     said = describe_unexpected_reason(outcome("FAILURE", "Transit.dropped"), [MISS])
     assert said == "failed because of Transit.dropped, not of missed"
     dead = PlannedFault(
-        "detector", "detector", "", "dead for ever", "first", "", expected_reason="unavailable"
+        "detector", "detector", "", "dead for ever", "first", "", SEAL_FAILS, expected_reason="unavailable"
     )
     assert describe_unexpected_reason(outcome("FAILURE", "Detect.unavailable"), [MISS, dead]) == ""
     assert describe_unexpected_reason(outcome("FAILURE", "SelectTarget.unseen"), [dead]) == (
