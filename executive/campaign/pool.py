@@ -28,8 +28,8 @@ def run_jobs(
     make_failure: Callable[[Job, BaseException], JobResult],
     *,
     workers: int,
-    progress: Callable[[int, int], None] | None = None,
-    on_halt: Callable[[], None] | None = None,
+    progress: Callable[[int, int], None] = lambda *_: None,
+    on_halt: Callable[[], None] = lambda: None,
 ) -> list[JobResult | None]:
     """Execute all jobs in worker processes and return the results in the order of the jobs.
 
@@ -73,8 +73,7 @@ def run_jobs(
                         kill_workers()
                         raise KeyboardInterrupt
                     is_halted = True
-                    if on_halt is not None:
-                        on_halt()
+                    on_halt()
                 if is_halted:
                     _halt_runs()
                 for future in ended_jobs:
@@ -83,8 +82,7 @@ def run_jobs(
                     if is_halted and isinstance(error, BrokenExecutor):
                         continue  # The signal also killed a worker.
                     results[index] = future.result() if error is None else make_failure(jobs[index], error)
-                    if progress is not None:
-                        progress(len(results), len(jobs))
+                    progress(len(results), len(jobs))
                 if is_broken and not running_jobs:
                     pool.shutdown()
                     pool, is_broken = WorkerPool(workers), False

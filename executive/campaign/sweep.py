@@ -38,8 +38,8 @@ def run_sweep(
     jobs: Sequence[SweepJob],
     *,
     workers: int = 2,
-    progress: Callable[[int, int], None] | None = None,
-    on_halt: Callable[[], None] | None = None,
+    progress: Callable[[int, int], None] = lambda *_: None,
+    on_halt: Callable[[], None] = lambda: None,
 ) -> list[Result]:
     """Execute all jobs and return the results in the order of the jobs.
 

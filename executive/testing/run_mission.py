@@ -52,14 +52,14 @@ class MissionResult(RunEnded):
 
     def list_activated_nodes(self, pattern: str) -> list[str]:
         """Return the paths of the activated nodes whose paths match the pattern, in order of activation."""
-        started_paths = (timed.event.node for timed in self.events if isinstance(timed.event, NodeStarted))
-        return [path for path in started_paths if fnmatchcase(path, pattern)]
+        paths = [timed.event.node for timed in self.events if isinstance(timed.event, NodeStarted)]
+        return [path for path in paths if fnmatchcase(path, pattern)]
 
     def list_failure_reasons(self, pattern: str = "*") -> list[str]:
         """Return the failure reasons of the skills whose paths match the pattern, in order."""
-        ends = (timed.event for timed in self.events if isinstance(timed.event, NodeEnded))
-        failures = (event for event in ends if event.skill and event.status == "FAILURE")
-        return [event.reason for event in failures if fnmatchcase(event.node, pattern)]
+        ends = [timed.event for timed in self.events if isinstance(timed.event, NodeEnded)]
+        skill_failures = [end for end in ends if end.skill and end.status == "FAILURE"]
+        return [end.reason for end in skill_failures if fnmatchcase(end.node, pattern)]
 
     def list_injected_faults(self) -> list[FaultInjected]:
         """Return the `FaultInjected` events, in order."""

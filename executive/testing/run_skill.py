@@ -105,13 +105,12 @@ def _instantiate(skill: Skill | type[Skill], inputs: Mapping[str, Any] | None) -
 def _count_braking_steps(workcell: Workcell) -> int | None:
     """Wait until the arm is at rest; return the number of control steps, or None after `MAX_BRAKING_TIME`."""
     arm, clock = workcell.cell.arm, workcell.cell.clock
-    steps, deadline = 0, clock.now + MAX_BRAKING_TIME
+    first_step, deadline = workcell.steps, clock.now + MAX_BRAKING_TIME
     while not arm.at_rest:
         if clock.now >= deadline:
             return None
         workcell.advance()
-        steps += 1
-    return steps
+    return workcell.steps - first_step
 
 
 def log_commands(cell: Cell, commands: list[str]) -> Cell:
@@ -129,11 +128,11 @@ def log_commands(cell: Cell, commands: list[str]) -> Cell:
             log(f"{access.detector or access.role}.{access.member}", *access.all_arguments)
         return access.proceed()
 
-    def log_decision(target: Target, bin: str) -> None:
+    def log_selection(target: Target, bin: str) -> None:
         log("decided", target, bin)
         cell.report_selection(target, bin)
 
-    return replace(intercept(cell, log_access, _INTERCEPTED_ROLES), report_selection=log_decision)
+    return replace(intercept(cell, log_access, _INTERCEPTED_ROLES), report_selection=log_selection)
 
 
 def describe_argument(argument: object) -> str:

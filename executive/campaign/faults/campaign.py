@@ -50,8 +50,8 @@ class Campaign:
         mission: MissionUnderTest,
         *,
         workers: int = 2,
-        progress: Callable[[int, int], None] | None = None,
-        on_halt: Callable[[], None] | None = None,
+        progress: Callable[[int, int], None] = lambda *_: None,
+        on_halt: Callable[[], None] = lambda: None,
     ) -> None:
         self.mission = mission
         self.nominal_run = execute_nominal_run(mission)
@@ -144,8 +144,7 @@ class Campaign:
         """
 
         def report_progress(ended_count: int, total: int) -> None:
-            if self._progress is not None:
-                self._progress(offset + ended_count, offset + total)
+            self._progress(offset + ended_count, offset + total)
 
         trials = run_jobs(
             list(map(self.select_faults, combinations)),
