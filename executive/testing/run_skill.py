@@ -80,9 +80,8 @@ def run_skill(
     for tick in range(max_ticks):
         if tick == halt_at:
             run.halt()
-            return SkillResult(
-                "HALTED", ticks=tick, commands=commands, braking_steps=_count_braking_steps(workcell)
-            )
+            braking_steps = _count_braking_steps(workcell)
+            return SkillResult("HALTED", ticks=tick, commands=commands, braking_steps=braking_steps)
         try:
             has_succeeded = run.step()
         except SkillFailed as failure:

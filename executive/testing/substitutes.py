@@ -29,13 +29,11 @@ def make_failing(
         InputError: The skill does not declare this reason.
     """
     if reason not in skill.reasons:
-        raise InputError(
-            f'{skill.__name__} cannot fail with "{reason}"; it declares: {", ".join(skill.reasons) or "none"}'
-        )
+        declared = ", ".join(skill.reasons) or "none"
+        raise InputError(f'{skill.__name__} cannot fail with "{reason}"; it declares: {declared}')
 
-    def run(self: Skill, cell: Cell) -> Steps:
+    def run(self: Skill, cell: Cell) -> None:
         del cell
-        yield from ()
         raise self.failure(reason, message)
 
     return make_substitute(skill, "Failing", run, _list_first_starts(start_count))

@@ -102,9 +102,7 @@ class Campaign:
         trials, is_complete = self._run_trials(list(pairs), 0)
         return self._make_results(trials, is_complete=is_complete, has_pairs=True)
 
-    def _make_results(
-        self, trials: Sequence[Trial], *, is_complete: bool, has_pairs: bool
-    ) -> FaultCampaignResults:
+    def _make_results(self, trials: list[Trial], is_complete: bool, has_pairs: bool) -> FaultCampaignResults:
         """Return the results of the campaign."""
         mission, branches = self.mission, find_branches(self.mission.loaded.tree, trials)
         return FaultCampaignResults(

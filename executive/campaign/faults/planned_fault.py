@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from executive.cell.protocols import Cell, Steps
+from executive.events import NodeEnded
 from executive.manipulation.drops import detect_and_record_drop
 from executive.skill import EMPTY, Skill
 from executive.testing.faults.script import ScheduledFault
@@ -76,17 +77,23 @@ class PlannedFault:
         """True if the fault simulates a bug, after which the run must end with the status FAULT."""
         return isinstance(self.injected, SkillFault) and self.injected.kind != "fails"
 
+    def is_cause_of(self, end: NodeEnded) -> bool:
+        """Return True if a node ended as this bug or this failure of the node requires."""
+        if self.is_bug:
+            return end.status == "INVALID" and InjectedError.__name__ in end.message
+        is_failure = (end.status, end.reason) == ("FAILURE", self.kind)
+        is_cell_fault = isinstance(self.injected, ScheduledFault)
+        return is_failure and (is_cell_fault or end.message == INJECTED_MESSAGE)
+
     def __str__(self) -> str:
         """Return a description of the fault."""
         return f"{self.location} {self.kind}, {self.occasion}: {self.cause}"
 
 
-def make_substitutes(
-    skill_faults: Iterable[SkillFault], skills: Mapping[str, type[Skill]]
-) -> dict[str, type[Skill]]:
+def make_substitutes(faults: list[SkillFault], skills: Mapping[str, type[Skill]]) -> dict[str, type[Skill]]:
     """Return substitutes of the faulty skills; the result and `skills` map the path of a node to a skill."""
     substitutes: dict[str, type[Skill]] = {}
-    for fault in skill_faults:
+    for fault in faults:
         skill = substitutes.get(fault.node, skills[fault.node])
         error = InjectedError("a bug that the campaign injected")
         if fault.kind == "fails":

@@ -13,13 +13,7 @@ from executive.campaign.end_checks import check_arm_at_rest, check_held_item, ch
 from executive.campaign.faults import trial_checks
 from executive.campaign.faults.fault_list import list_skill_nodes
 from executive.campaign.faults.nominal_run import ActivationRecorder, NominalRun
-from executive.campaign.faults.planned_fault import (
-    INJECTED_MESSAGE,
-    InjectedError,
-    PlannedFault,
-    SkillFault,
-    make_substitutes,
-)
+from executive.campaign.faults.planned_fault import PlannedFault, SkillFault, make_substitutes
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.cell.cell_wrapper import CellWrapper
 from executive.cell.workcell import Workcell
@@ -162,12 +156,7 @@ class _TrialRun:
 
     def _has_effect(self, fault: PlannedFault) -> bool:
         """Return True if the node of the fault ended as planned, by this fault or by another fault."""
-        ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
-        node_ends = [end for end in ends if end.node == fault.location]
-        if fault.is_bug:
-            return any(end.status == "INVALID" and InjectedError.__name__ in end.message for end in node_ends)
-        if not fault.is_failure_reason:
+        if not (fault.is_bug or fault.is_failure_reason):
             return True
-        failures = [end for end in node_ends if (end.status, end.reason) == ("FAILURE", fault.kind)]
-        is_cell_fault = isinstance(fault.injected, ScheduledFault)
-        return any(is_cell_fault or end.message == INJECTED_MESSAGE for end in failures)
+        ends = [timed.event for timed in self._events if isinstance(timed.event, NodeEnded)]
+        return any(end.node == fault.location and fault.is_cause_of(end) for end in ends)

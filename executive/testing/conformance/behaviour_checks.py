@@ -158,13 +158,11 @@ def _describe_difference(run: SkillTestRun, rerun: SkillTestRun) -> str:
     return "" if has_equal_pickle(run.outputs, rerun.outputs) else "it set its outputs to different values"
 
 
-def _list_first_problems(
-    test_runs: Iterable[SkillTestRun], describe_problem: Callable[[SkillTestRun], str]
-) -> Iterable[str]:
-    """Return the first problem of each situation; `describe_problem` returns "" for a run without one."""
+def _list_first_problems(runs: list[SkillTestRun], describe: Callable[[SkillTestRun], str]) -> Iterable[str]:
+    """Return the first problem of each situation; `describe` returns "" for a run without a problem."""
     problems: dict[str, str] = {}
-    for test_run in test_runs:
-        if problem := describe_problem(test_run):
+    for test_run in runs:
+        if problem := describe(test_run):
             problems.setdefault(test_run.description, problem)
     return problems.values()
 

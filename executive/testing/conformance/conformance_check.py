@@ -92,15 +92,13 @@ class Check:
             raise ConformanceError("\n".join((f"{self.doc} Violated:", *verdict.problems)))
 
 
-def arrange_nothing(scene: SkillScene) -> Mapping[str, Any]:
+def keep_scene(scene: SkillScene) -> Mapping[str, Any]:
     """Leave the scene unchanged and return no values of params and inputs."""
     del scene
     return {}
 
 
-def list_conformance_checks(
-    skill: type[Skill], arrange: Arrange = arrange_nothing, name: str = ""
-) -> list[Check]:
+def list_conformance_checks(skill: type[Skill], arrange: Arrange = keep_scene, name: str = "") -> list[Check]:
     """Return one check per rule for a skill; the skill is run only when a check is called.
 
     Args:

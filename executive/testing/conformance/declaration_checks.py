@@ -67,11 +67,9 @@ def declares_reasons(runs: SkillRuns) -> Iterator[str]:
 def declares_resources(runs: SkillRuns) -> Iterator[str]:
     """`uses` has only arm, tool, camera; `moves` needs arm; `tool_state_after_failure` only reasons."""
     skill, name = runs.skill, runs.name
-    unknown_resources = (
-        [repr(skill.uses)] if isinstance(skill.uses, str) else sorted(set(skill.uses) - set(RESOURCES))
-    )
-    if unknown_resources:
-        yield f"{name} uses {', '.join(unknown_resources)}. Write a tuple of {', '.join(RESOURCES)}."
+    unknown_uses = [repr(skill.uses)] if isinstance(skill.uses, str) else sorted({*skill.uses} - {*RESOURCES})
+    if unknown_uses:
+        yield f"{name} uses {', '.join(unknown_uses)}. Write a tuple of {', '.join(RESOURCES)}."
     if skill.moves and "arm" not in skill.uses:
         yield f'{name} moves the arm but does not use it. Add "arm" to uses, or remove moves.'
     allowed_keys = (*skill.reasons, HALT)

@@ -111,7 +111,7 @@ def prepare_scene(
     except Exception as error:
         raise ArrangementFailed(f"the function `arrange` raised {type(error).__name__}: {error}") from error
     declarations: list[Param | Port] = [*skill.params.values(), *list_input_ports(skill)]
-    missing_values = []
+    missing = []
     for declared in declarations:
         needs_value = declared.is_required or (situation.has_all_inputs and isinstance(declared, Port))
         if declared.name in values or not needs_value:
@@ -119,12 +119,10 @@ def prepare_scene(
         if (value := _generate_value(declared, scene)) is not None:
             values[declared.name] = value
         elif declared.is_required:
-            missing_values.append(declared)
-    if missing_values:
-        names = " and ".join(
-            f'"{declared.name}" ({describe_type(declared.type)})' for declared in missing_values
-        )
-        example = ", ".join(f'"{declared.name}": ...' for declared in missing_values)
+            missing.append(declared)
+    if missing:
+        names = " and ".join(f'"{declared.name}" ({describe_type(declared.type)})' for declared in missing)
+        example = ", ".join(f'"{declared.name}": ...' for declared in missing)
         raise ArrangementFailed(
             f"no value can be generated for {names}. Return it from a function in a test: "
             f"list_conformance_checks({skill.__name__}, lambda scene: {{{example}}}); "

@@ -89,7 +89,7 @@ class SkillTestRun:
     ) -> None:
         scene, values = prepare_scene(skill, situation, arrange)
         fake = scene.cell
-        original_values = values if halt_at else copy.deepcopy(values, {id(fake): fake})
+        originals = values if halt_at else copy.deepcopy(values, {id(fake): fake})
         self.situation, self._skill, self._fault, self._halt_at = situation, skill, fault, halt_at
         self.description = f"{situation.name} {fault.name}" if fault else situation.name
         self.reason = self.message = ""
@@ -97,14 +97,8 @@ class SkillTestRun:
         self.outputs: Mapping[str, Any] = {}
         self.calls, self.tick_durations = list[Call](), list[float]()
         self.holds_before = fake.tool.holding
-        try:
-            with detect_stuck_ticks(skill, lambda: self.ticks):
-                self.status = self._run_skill(values, fake)
-        except TickStuck as stuck:
-            self.status, self.message = "STUCK", str(stuck)
-        self.changed_names = [
-            name for name in values if not has_equal_pickle(values[name], original_values[name])
-        ]
+        self.status = self._run_skill(values, fake)
+        self.changed_names = [name for name in values if not has_equal_pickle(values[name], originals[name])]
         self.holds_after, self.is_item_held = fake.tool.holding, fake.ledger.find_held_item() is not None
         self.is_at_rest = fake.arm.at_rest
 
@@ -132,20 +126,24 @@ class SkillTestRun:
         cell = FaultyCell(fake, [during("*", fault.effect)] if fault else [])
         try:
             run = SkillRun(self._skill(**values), intercept(cell.cell, self._record_call, _OBSERVED_ROLES))
-            while self.ticks < MAX_RUN_TIME / STEP:
-                if self.ticks == self._halt_at:
-                    run.halt()
-                    return "HALTED"
-                if fault is not None and self.ticks == fault.tick:
-                    cell.on_event(TimedEvent(0, 0.0, NodeStarted("skill")))
-                start_time = perf_counter()
-                has_succeeded = run.step()
-                self.tick_durations.append(perf_counter() - start_time)
-                if has_succeeded:
-                    self.outputs = run.read_outputs()
-                    return "SUCCESS"
-                cell.advance()
-                self.ticks += 1
+            with detect_stuck_ticks(self._skill, lambda: self.ticks):
+                while self.ticks < MAX_RUN_TIME / STEP:
+                    if self.ticks == self._halt_at:
+                        run.halt()
+                        return "HALTED"
+                    if fault is not None and self.ticks == fault.tick:
+                        cell.on_event(TimedEvent(0, 0.0, NodeStarted("skill")))
+                    start_time = perf_counter()
+                    has_succeeded = run.step()
+                    self.tick_durations.append(perf_counter() - start_time)
+                    if has_succeeded:
+                        self.outputs = run.read_outputs()
+                        return "SUCCESS"
+                    cell.advance()
+                    self.ticks += 1
+        except TickStuck as stuck:
+            self.message = str(stuck)
+            return "STUCK"
         except SkillFailed as failure:
             self.reason, self.message = failure.reason, failure.message
             return "FAILURE"

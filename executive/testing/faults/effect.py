@@ -74,8 +74,7 @@ class FaultContext:
             return next(iter(self.world.objects[choice - 1 : choice]), None)
         if choice == "nearest" or not item:
             return self._find_nearest(self.cell.arm.tool_pose.position, np.inf)
-        summaries = {summary.item: summary for summary in self._workcell.accounts.list_items()}
-        summary = summaries.get(item)
+        summary = next((entry for entry in self._workcell.accounts.list_items() if entry.item == item), None)
         if summary is None or summary.state == "placed":
             return None
         if summary.state == "held":

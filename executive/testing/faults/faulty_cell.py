@@ -53,8 +53,8 @@ class FaultyCell(CellWrapper):
         super().__init__(inner)
         self._context = FaultContext(inner, open_world, emit)
         self._timeout = timeout
-        self._node_faults = [(f.effect, f.time) for f in faults if isinstance(f.time, NodeActivations)]
-        self._time_faults = [(f.effect, f.time) for f in faults if isinstance(f.time, TimeSpan)]
+        self._node_faults = [(effect, time) for effect, time in faults if isinstance(time, NodeActivations)]
+        self._time_faults = [(effect, time) for effect, time in faults if isinstance(time, TimeSpan)]
         self._activation_counts: Counter[int] = Counter()
         self._occurrences: list[Occurrence] = []
         self._cell = intercept(inner.cell, self._intercept_access, _INTERCEPTED_ROLES)

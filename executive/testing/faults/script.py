@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,8 +49,7 @@ class TimeSpan:
     end: float
 
 
-@dataclass(frozen=True)
-class ScheduledFault:
+class ScheduledFault(NamedTuple):
     """A fault of a script: an effect on the cell, and the time of the effect."""
 
     effect: Effect

@@ -13,7 +13,7 @@ from executive.cell.protocols import Cell, Steps
 from executive.plugins import load_skills
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, param, port
 from executive.testing.conformance import SkillScene
-from executive.testing.conformance.conformance_check import arrange_nothing
+from executive.testing.conformance.conformance_check import keep_scene
 from executive.testing.conformance.situations import (
     Arrange,
     ArrangementFailed,
@@ -50,16 +50,16 @@ class Everything(Skill):
         yield
 
 
-def names(skill: type[Skill], arrange: Arrange = arrange_nothing) -> list[str]:
+def names(skill: type[Skill], arrange: Arrange = keep_scene) -> list[str]:
     return [situation.name for situation in list_situations(skill, arrange)]
 
 
 def values_of(skill: type[Skill], situation: Situation) -> dict[str, Any]:
-    return prepare_scene(skill, situation, arrange_nothing)[1]
+    return prepare_scene(skill, situation, keep_scene)[1]
 
 
 def test_what_a_skill_needs_is_made_up() -> None:
-    scene, values = prepare_scene(Everything, Situation("", False), arrange_nothing)
+    scene, values = prepare_scene(Everything, Situation("", False), keep_scene)
     assert [target.label for target in scene.targets] == ["cube", "sphere", "duck"]
     assert values["targets"] == scene.targets and values["targets"] is not scene.targets
     assert (values.pop("target"), values.pop("targets")[0]) == (scene.targets[0], scene.targets[0])
@@ -92,10 +92,10 @@ def test_a_skill_is_tried_in_every_situation_that_it_may_begin_in() -> None:
 @pytest.mark.parametrize(("needs", "held"), [(EMPTY, [False]), (HOLDING, [True]), (ANY, [False, True])])
 def test_the_tool_holds_what_the_skill_needs(needs: Any, held: list[bool]) -> None:
     skill = type("Needy", (faulty.Pause,), {"tool_state": (needs, ANY), "__annotations__": {}})
-    found = list(list_situations(skill, arrange_nothing))
+    found = list(list_situations(skill, keep_scene))
     assert [situation.is_holding for situation in found] == held
     for situation in found:
-        scene, _ = prepare_scene(skill, situation, arrange_nothing)
+        scene, _ = prepare_scene(skill, situation, keep_scene)
         assert scene.cell.tool.holding is situation.is_holding
         assert (scene.cell.ledger.find_held_item() is not None) is situation.is_holding
         assert (scene.item == scene.cell.ledger.find_held_item()) is (needs is HOLDING)
@@ -103,7 +103,7 @@ def test_the_tool_holds_what_the_skill_needs(needs: Any, held: list[bool]) -> No
 
 def test_a_skill_without_arm_finds_the_cup_on_its_target() -> None:
     for name, touches in (("Grasp", True), ("Approach", False)):
-        scene, _ = prepare_scene(load_skills()[name], Situation("", False), arrange_nothing)
+        scene, _ = prepare_scene(load_skills()[name], Situation("", False), keep_scene)
         assert scene.cell.tool.touching is touches
 
 
@@ -114,8 +114,8 @@ def broken(scene: SkillScene) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("state", "arrange", "text"),
     [
-        ("empty", arrange_nothing, "its tool_state is 'empty'; it must begin with ANY, EMPTY or HOLDING"),
-        ((), arrange_nothing, "its tool_state is (); it must begin with ANY, EMPTY or HOLDING"),
+        ("empty", keep_scene, "its tool_state is 'empty'; it must begin with ANY, EMPTY or HOLDING"),
+        ((), keep_scene, "its tool_state is (); it must begin with ANY, EMPTY or HOLDING"),
         ((EMPTY, EMPTY), broken, "the function `arrange` raised KeyError: 'cube'"),
     ],
 )
@@ -138,8 +138,8 @@ class Patient(faulty.Pause):
 
 
 def test_a_skill_is_halted_at_its_calls_and_now_and_then() -> None:
-    short = SkillRuns("Pause", faulty.Pause, arrange_nothing)
+    short = SkillRuns("Pause", faulty.Pause, keep_scene)
     assert [test_run.ticks for test_run in short.halted_runs] == [1, 2, 1, 2]
-    ticks = [test_run.ticks for test_run in SkillRuns("Patient", Patient, arrange_nothing).halted_runs]
+    ticks = [test_run.ticks for test_run in SkillRuns("Patient", Patient, keep_scene).halted_runs]
     assert {1, 201, 202, 400} <= set(ticks)
     assert MAX_HALTS <= len(set(ticks)) <= MAX_HALTS + 2
