@@ -66,8 +66,8 @@ def command(
 
     The detector belongs to a cell (--cell), or is a model file (--weights) or the shipped model. The images
     come from --dataset, or are rendered scenes of the cell (by default of the shipped cell overhead). The
-    error rates of the detector of a cell are stored for runs, except with --weights, --threshold, --varied,
-    --scene, --view full, or with --set without --out.
+    error rates of a cell's detector are stored in a file that runs read; nothing is stored with --weights,
+    --threshold, --varied, --scene or --view full, or with --set but without --out.
     """
     unknown_key = next((key for key in overrides if not key.startswith("cell.")), "")
     has_image_suffix = sheet is None or sheet.suffix.lower() in IMAGE_SUFFIXES

@@ -30,7 +30,17 @@ class FilmSource:
     """
 
     def __init__(self, directory: RunDirectory) -> None:
-        _require_world_log(directory)
+        if not directory.world_log.exists():
+            raise InputError(
+                f'the run in "{directory.path}" cannot be filmed: it has no world.log, from which its world '
+                "is simulated again; sweeps do not keep this file. Run the mission again with "
+                "`executive run` and the same seed, and film that run"
+            )
+        if not is_command_log(directory.world_log):
+            raise InputError(
+                f'the run in "{directory.path}" cannot be filmed: its cell has no simulated world; '
+                "film a run on a cell of `kind: sim`"
+            )
         events = read_journal(directory.journal)
         self.directory = directory
         self.start = find_run_start(events, directory.path, "there is nothing to film")
@@ -44,18 +54,3 @@ class FilmSource:
         changes = (timed.event for timed in self.events if isinstance(timed.event, ItemChanged))
         self.item_count = len({change.item for change in changes})
         self.result = read_result(directory, events) or find_run_end(events)
-
-
-def _require_world_log(directory: RunDirectory) -> None:
-    """Raise an InputError if the record does not contain the log of a simulated world."""
-    if not directory.world_log.exists():
-        raise InputError(
-            f'the run in "{directory.path}" cannot be filmed: it has no world.log, from which its world is '
-            "simulated again; sweeps do not keep this file. Run the mission again with `executive run` and "
-            "the same seed, and film that run"
-        )
-    if not is_command_log(directory.world_log):
-        raise InputError(
-            f'the run in "{directory.path}" cannot be filmed: its cell has no simulated world; '
-            "film a run on a cell of `kind: sim`"
-        )

@@ -31,8 +31,7 @@ _STATUS_COLOUR_WEIGHT = 60
 def write_mp4(path: Path, frames: Iterable[Image.Image], frame_rate: float) -> None:
     """Write frames as an MP4 file with H.264, `frame_rate` frames per second."""
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
-        codec_options = {"crf": "20", "preset": "medium"}
-        stream = container.add_stream("libx264", rate=round(frame_rate), options=codec_options)
+        stream = container.add_stream("libx264", round(frame_rate), {"crf": "20", "preset": "medium"})
         stream.pix_fmt = "yuv420p"
         for number, image in enumerate(frames):
             if number == 0:
@@ -61,9 +60,8 @@ def _compute_palette(frames: list[Image.Image]) -> Image.Image:
     colours.
     """
     pixels = np.concatenate([np.asarray(frame).reshape(-1, 3) for frame in frames])
-    coarse_pixels = pixels.astype(np.int32) >> _IGNORED_BITS
     # np.unique is faster for one integer per colour than for rows of three channels.
-    colour_numbers = coarse_pixels @ [1 << 16, 1 << 8, 1]
+    colour_numbers = (pixels.astype(np.int32) >> _IGNORED_BITS) @ [1 << 16, 1 << 8, 1]
     _, first_indices, counts = np.unique(colour_numbers, return_index=True, return_counts=True)
     status_colours = np.array([ImageColor.getrgb(colour) for colour in (RUNNING, SUCCESS, FAILURE)], np.uint8)
     frame_samples = np.repeat(pixels[first_indices], np.sqrt(counts).astype(int), axis=0)

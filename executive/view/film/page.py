@@ -16,14 +16,14 @@ from executive.record.result import Result
 from executive.view.film import panel, style
 from executive.view.film.film_source import FilmSource
 from executive.view.film.run_state import FilmRunState
-from executive.view.film.style import BACKGROUND, FAILURE, LINE, MINOR_TEXT, RUNNING, SUCCESS, TEXT
+from executive.view.film.style import BACKGROUND, FAILURE, LINE, RUNNING, SECONDARY_TEXT, SUCCESS, TEXT
 
 WIDTH, HEIGHT = 1280, 720
 """Size of a frame [pixel]."""
 SCENE_SIZE = (800, 720)
 """Width and height of the image of the cell [pixel]."""
 PANEL_LEFT, PANEL_RIGHT = SCENE_SIZE[0] + 28, WIDTH - 28
-"""Left and right end of header, tree and items in a frame [pixel]."""
+"""Left and right edge of header, tree and items in a frame [pixel]."""
 MAX_INSET_SIZE = (224, 168)
 """Maximum width and height of the camera image over the image of the cell [pixel]."""
 MAX_CAPTION_WIDTH, MAX_RESULT_WIDTH = 620, 620
@@ -79,8 +79,7 @@ def add_result(frame: Image.Image, result: Result | RunEnded | None) -> Image.Im
     lines = [*message_lines, *style.wrap_text(counts, _RESULT_FONT_SIZE, max_text_width, 2)]
     height = 2 * _RESULT_PADDING + _STATUS_FONT_SIZE + _RESULT_LINE_HEIGHT * len(lines) + (10 if lines else 0)
     font, status_font = style.load_font(_RESULT_FONT_SIZE), style.load_font(_STATUS_FONT_SIZE)
-    text_widths = [status_font.getlength(status), *(font.getlength(line) for line in lines)]
-    width = max(text_widths) + 2 * _RESULT_PADDING
+    width = max(status_font.getlength(status), *map(font.getlength, lines)) + 2 * _RESULT_PADDING
     left, top = SCENE_SIZE[0] - width - _MARGIN, SCENE_SIZE[1] - height - _MARGIN
     text_left = left + _RESULT_PADDING
     colour = _RESULT_COLOURS.get(status, RUNNING)
@@ -92,7 +91,7 @@ def add_result(frame: Image.Image, result: Result | RunEnded | None) -> Image.Im
     draw.text((text_left, y), status, colour, status_font, "lm")
     y = top + _RESULT_PADDING + _STATUS_FONT_SIZE + 10 + _RESULT_LINE_HEIGHT / 2
     for number, line in enumerate(lines):
-        colour = TEXT if number < len(message_lines) else MINOR_TEXT
+        colour = TEXT if number < len(message_lines) else SECONDARY_TEXT
         draw.text((text_left, y + _RESULT_LINE_HEIGHT * number), line, colour, font, "lm")
     return frame
 
@@ -117,7 +116,7 @@ def _draw_header(frame: Image.Image, title: str, subtitle: str, time: float, dur
     draw.text((PANEL_LEFT, _TITLE_BASELINE), title, TEXT, title_font, "ls")
     draw.text((PANEL_RIGHT, _TITLE_BASELINE), f"{time:.1f} s", TEXT, title_font, "rs")
     subtitle = style.truncate_text(subtitle, _SUBTITLE_FONT_SIZE, PANEL_RIGHT - PANEL_LEFT)
-    draw.text((PANEL_LEFT, _SUBTITLE_BASELINE), subtitle, MINOR_TEXT, subtitle_font, "ls")
+    draw.text((PANEL_LEFT, _SUBTITLE_BASELINE), subtitle, SECONDARY_TEXT, subtitle_font, "ls")
     progress = time / duration if duration else 1.0
     draw.rectangle((PANEL_LEFT, _BAR_TOP, PANEL_RIGHT, _BAR_BOTTOM), LINE)
     bar_right = PANEL_LEFT + round(progress * (PANEL_RIGHT - PANEL_LEFT))
@@ -151,7 +150,7 @@ def _draw_camera_image(frame: Image.Image, picture: Path | None) -> None:
     label = "camera:  " + picture.stem.partition("_")[2].replace("_", " ")
     label = style.truncate_text(label, _LABEL_FONT_SIZE, width - 8)
     position = (_MARGIN + 10, _MARGIN + height + 17)
-    draw.text(position, label, MINOR_TEXT, style.load_font(_LABEL_FONT_SIZE), "lm")
+    draw.text(position, label, SECONDARY_TEXT, style.load_font(_LABEL_FONT_SIZE), "lm")
 
 
 @lru_cache(maxsize=2)

@@ -11,7 +11,7 @@ from executive.events import ItemChanged
 from executive.mission.outline import OutlineNode
 from executive.view.film import style
 from executive.view.film.run_state import FilmRunState
-from executive.view.film.style import FAILURE, INACTIVE, LINE, MINOR_TEXT, RUNNING, SUCCESS, TEXT
+from executive.view.film.style import FAILURE, INACTIVE, LINE, RUNNING, SECONDARY_TEXT, SUCCESS, TEXT
 from executive.view.tree.tree_text import draw_line_prefixes, select_active_nodes
 
 TEXT_SIZE, HEADING_SIZE, MARK_SIZE = 14, 12, 11
@@ -23,11 +23,11 @@ MAX_ITEM_ROWS = 9
 _CHARACTERS_PER_LEVEL = 3
 """Number of characters per tree level in a prefix from `draw_line_prefixes`."""
 _COLUMN_STARTS = {"item": 0.0, "class": 0.32, "state": 0.53, "bin": 0.74}
-"""Left end of each column [fraction of the width of the panel]."""
+"""Left edge of each column [fraction of the width of the panel]."""
 _STATE_COLOURS = {
     "placed": SUCCESS, "rejected": FAILURE, "lost": FAILURE, "held": RUNNING, "dropped": RUNNING,
 }  # fmt: skip
-"""Colour of the text of an item state; the text of any other state has the colour `MINOR_TEXT`."""
+"""Colour of the text of an item state; the text of any other state has the colour `SECONDARY_TEXT`."""
 _FINAL_STATES = ("placed", "rejected", "skipped", "lost", "phantom")
 """States of items that the run has finished."""
 _SWATCH_SIZE = 9
@@ -47,14 +47,14 @@ def draw_tree(image: Image.Image, box: Box, nodes: Sequence[OutlineNode], state:
         x = left + INDENT * (len(prefix) // _CHARACTERS_PER_LEVEL)
         style.draw_mark(image, status, (x + MARK_SIZE / 2, middle), MARK_SIZE)
         x += MARK_SIZE + 8
-        colour = MINOR_TEXT if status in ("SUCCESS", "FAILURE") else INACTIVE
+        colour = SECONDARY_TEXT if status in ("SUCCESS", "FAILURE") else INACTIVE
         if status == "RUNNING":
             colour = RUNNING if node.skill else TEXT
         name = style.truncate_text(node.name, TEXT_SIZE, right - x)
         draw.text((x, middle), name, colour, font, "lm")
         x += font.getlength(name) + 10
         note = style.truncate_text(activation.reason_or_item if activation else "", TEXT_SIZE, right - x)
-        draw.text((x, middle), note, FAILURE if status == "FAILURE" else MINOR_TEXT, font, "lm")
+        draw.text((x, middle), note, FAILURE if status == "FAILURE" else SECONDARY_TEXT, font, "lm")
 
 
 def select_nodes(nodes: Sequence[OutlineNode], state: FilmRunState, max_count: int) -> list[OutlineNode]:
@@ -96,8 +96,9 @@ def draw_items(
     for number, item in enumerate(select_items(items), start=1):
         middle = top + ITEM_ROW_HEIGHT * (number + 0.5)
         texts = (item.item, item.label, item.state, item.bin)
-        name_colour = MINOR_TEXT if item.state in _FINAL_STATES else TEXT
-        colours = (name_colour, MINOR_TEXT, _STATE_COLOURS.get(item.state, MINOR_TEXT), MINOR_TEXT)
+        name_colour = SECONDARY_TEXT if item.state in _FINAL_STATES else TEXT
+        state_colour = _STATE_COLOURS.get(item.state, SECONDARY_TEXT)
+        colours = (name_colour, SECONDARY_TEXT, state_colour, SECONDARY_TEXT)
         offsets = (0, 0, 0, _SWATCH_SIZE + 6)
         for text, colour, offset, start, end in zip(texts, colours, offsets, starts, ends, strict=True):
             visible_text = style.truncate_text(text, TEXT_SIZE, end - start - offset)
@@ -105,7 +106,7 @@ def draw_items(
         if item.bin:
             x, y = starts[-1], round(middle) - _SWATCH_SIZE // 2
             swatch = (x, y, x + _SWATCH_SIZE - 1, y + _SWATCH_SIZE - 1)
-            draw.rectangle(swatch, bin_colours.get(item.bin, MINOR_TEXT))
+            draw.rectangle(swatch, bin_colours.get(item.bin, SECONDARY_TEXT))
 
 
 def select_items(items: Sequence[ItemChanged]) -> list[ItemChanged]:

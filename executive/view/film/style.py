@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 BACKGROUND, LINE = "#14181D", "#2E3742"
 """Colours of the background and of lines."""
-TEXT, MINOR_TEXT, INACTIVE = "#F3F6F8", "#9AA6B2", "#66727F"
+TEXT, SECONDARY_TEXT, INACTIVE = "#F3F6F8", "#9AA6B2", "#66727F"
 """Colours of primary text, of secondary text, and of inactive nodes."""
 RUNNING, SUCCESS, FAILURE = "#F2A71B", "#45BD70", "#F0685C"
 """Colours of the statuses: the colours in `view/tree/tree.svg`, lightened for the dark background."""
@@ -64,9 +64,8 @@ def draw_mark(image: Image.Image, status: str, centre: tuple[float, float], size
 
     `centre` is the position of the mark, `size` the width and height of the mark [pixel].
     """
-    left, top = round(centre[0] - size / 2), round(centre[1] - size / 2)
-    box = (left, top, left + size, top + size)
-    image.paste(STATUS_COLOURS.get(status, INACTIVE), box, _draw_mask(status, size))
+    corner = round(centre[0] - size / 2), round(centre[1] - size / 2)
+    image.paste(STATUS_COLOURS.get(status, INACTIVE), corner, _draw_mask(status, size))
 
 
 @lru_cache(maxsize=16)

@@ -47,7 +47,7 @@ class CameraImage:
     """Frame without its depth image, and the event with the detections in this frame."""
 
     frame: Frame
-    search: FrameSearched
+    search_event: FrameSearched
 
 
 BodyPoses = Mapping[str, Sequence[float]]

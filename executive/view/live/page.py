@@ -77,7 +77,7 @@ class LivePage:
         self._queue: queue.SimpleQueue[tuple[str, int] | messages.Message | None] = queue.SimpleQueue()
         self._run: Run | None = None
         self._visuals: Visuals | None = None
-        self._is_closed = False
+        self._has_server_ended = False
         self._browser_count = 0
         self._next_pose_time = 0.0
         self._pose_period = POSE_PERIOD
@@ -171,7 +171,7 @@ class LivePage:
 
     def _enqueue(self, message: messages.Message) -> None:
         """Queue a message for the server, unless the server has ended."""
-        if not self._is_closed:
+        if not self._has_server_ended:
             self._queue.put(message)
 
     @contextlib.contextmanager
@@ -196,7 +196,7 @@ class LivePage:
                 pipe.flush()
                 if not is_last_batch:
                     time.sleep(BATCH_PERIOD)
-        self._is_closed = True
+        self._has_server_ended = True
 
     def _read_last_error(self) -> str:
         """Return the last line that the server wrote to stderr, or the exit status of the server."""
@@ -210,7 +210,7 @@ class LivePage:
         for line in self._server.stdout:
             with self._catch_errors():
                 self._run_command(messages.PageCommand(**json.loads(line)))
-        self._browser_count, self._is_closed = 0, True
+        self._browser_count, self._has_server_ended = 0, True
 
     def _run_command(self, command: messages.PageCommand) -> None:
         """Run a command of a browser; most command names are the names of methods of `RunControl`."""

@@ -106,6 +106,6 @@ def _encode_camera_image(camera_image: CameraImage) -> JsonObject:
     return {
         "source": "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode(),
         "width": width, "height": height, "frame": frame.id, "camera": frame.camera,
-        "detector": camera_image.search.detector, "stamp": frame.stamp,
-        "detections": list(map(vars, camera_image.search.confident)),
+        "detector": camera_image.search_event.detector, "stamp": frame.stamp,
+        "detections": list(map(vars, camera_image.search_event.confident)),
     }  # fmt: skip

@@ -226,10 +226,10 @@ def _summarize_verdicts(trials: Sequence[Trial]) -> str:
 def _list_count_lines(trials: Sequence[Trial]) -> Iterator[str]:
     """Yield the number of trials by verdict, and the number of failed trials by reason."""
     counts = Counter(trial.verdict for trial in trials)
-    reduced_count = sum(trial.verdict.startswith("ok -") for trial in trials)
+    shortfall_count = sum(trial.verdict.startswith("ok -") for trial in trials)
     reasons = Counter(trial.reason for trial in trials if trial.verdict.startswith("FAILURE"))
     yield (
-        f"  as without faults: {counts['ok']}; fewer objects sorted: {reduced_count}; "
+        f"  as without faults: {counts['ok']}; fewer objects sorted: {shortfall_count}; "
         f"failed: {reasons.total()}; ended as FAULT: {counts['FAULT']}; "
         f"fault did not occur: {counts['-']}; wrong: {counts['!!']}"
     )
