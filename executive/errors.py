@@ -34,7 +34,7 @@ class ExecutiveError(Exception):
 
 
 class InputError(ExecutiveError):
-    """An input of the user is invalid; the message states its position, the problem and a remedy."""
+    """An input of the user is invalid; the message states the place, the problem and a remedy."""
 
     exit_code = ExitCode.INVALID_INPUT
 
@@ -52,7 +52,7 @@ class Fault(ExecutiveError):
 
 
 class RecordLost(Fault):
-    """The record of the run cannot be written or was deleted; nobody could explain a run without record."""
+    """The record of the run cannot be written or was deleted; a run without a record has no explanation."""
 
 
 class Unreachable(ExecutiveError):

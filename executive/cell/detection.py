@@ -46,7 +46,8 @@ class Answer:
         detector: Name of the detector in the cell file.
         confident: Confident detections of known classes, most confident first.
         error_rates: Error rates of the detector.
-        doubtful: Detections below the threshold, or with a second class of over half their confidence.
+        doubtful: Detections with a confidence below the threshold, or with a second class that has more than
+            half of the confidence of the first class.
         unknown: Detections with labels that the cell file does not declare, above the threshold.
     """
 
@@ -57,10 +58,7 @@ class Answer:
     unknown: tuple[Detection, ...] = ()
 
     def describe_doubt(self, detection: Detection) -> str:
-        """Return the message for an answer without confident detections.
-
-        `detection` is the doubtful detection with the highest confidence on the table.
-        """
+        """Return the message for an answer without confident detections; `detection` is the best detection."""
         confidence, threshold = detection.confidence, self.error_rates.threshold
         doubt = f"with another class at {detection.second_confidence:.2f}"
         doubt = f"< {threshold:.2f}" if confidence < threshold else doubt
@@ -82,16 +80,16 @@ class Detections(Answer):
     view: str
     area: Box
 
-    def is_in_area(self, points: Array, margin: float = 0.0) -> NDArray[np.bool_]:
+    def compute_area_mask(self, points: Array, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the world points `(N, 3)` [m] in the searched region of the image.
 
         `margin` is the minimum distance of a projected point from the border of the region [pixel].
         """
-        return self.frame.is_in_area(points, self.area, margin)
+        return self.frame.compute_area_mask(points, self.area, margin)
 
-    def is_searched(self, points: Array) -> NDArray[np.bool_]:
+    def compute_searched_mask(self, points: Array) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the world points `(N, 3)` [m] that are searched and unoccluded."""
-        return self.is_in_area(points) & self.frame.is_unoccluded(points)
+        return self.compute_area_mask(points) & self.frame.compute_unoccluded_mask(points)
 
 
 @dataclass(frozen=True, eq=False)

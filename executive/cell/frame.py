@@ -52,7 +52,7 @@ class Frame:
         crop = self.visible[top:bottom, left:right]
         return float(crop.mean()) if crop.size else 0.0
 
-    def is_in_area(self, points: Array, area: Box, margin: float = 0.0) -> NDArray[np.bool_]:
+    def compute_area_mask(self, points: Array, area: Box, margin: float = 0.0) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the points whose projections lie in a region of the image.
 
         Args:
@@ -65,7 +65,7 @@ class Frame:
         is_inside = (pixels >= (left + margin, top + margin)) & (pixels < (right - margin, bottom - margin))
         return np.asarray(is_in_front & is_inside.all(axis=1))
 
-    def is_unoccluded(self, points: Array) -> NDArray[np.bool_]:
+    def compute_unoccluded_mask(self, points: Array) -> NDArray[np.bool_]:
         """Return a mask `(N,)` of the world points `(N, 3)` [m] where the arm hides no part of an object."""
         mask = np.ones(len(points), dtype=bool)
         height, width = self.visible.shape

@@ -26,7 +26,7 @@ class Ledger(Protocol):
         """Update all items with the detections in a frame, and return the targets (`find_targets`).
 
         The ledger ignores all detections in a frame of an earlier call, and detections at positions where the
-        robot has moved objects since the capture of the frame.
+        robot may have moved objects since the capture of the frame.
 
         Args:
             detections: Detections with their frame, its searched region, and the detector's error rates.

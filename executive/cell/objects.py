@@ -42,14 +42,14 @@ class ObjectClass:
         label: Class name that the detectors use.
         height: Height of the object as it lies on the table [m].
         radius: Radius of the circle around the outline of the object, seen from above [m].
-        ring: Distance of the contact point from the centre [m]; above 0 only for parts with a hole.
+        contact_radius: Distance of the contact point from the centre [m]; above 0 only for parts with a hole.
         mass: Mass of the object [kg].
     """
 
     label: str
     height: float
     radius: float
-    ring: float = 0.0
+    contact_radius: float = 0.0
     mass: float = 0.1
 
 
@@ -58,11 +58,11 @@ class Load:
     """Object in the tool.
 
     Attributes:
-        kind: Class of the object.
+        object_class: Class of the object.
         holding_force: Maximum force that the seal of the suction cup withstands [N].
     """
 
-    kind: ObjectClass
+    object_class: ObjectClass
     holding_force: float = math.inf
 
 

@@ -19,7 +19,7 @@ from executive.ledger.staleness import Staleness
 MAX_STANDARD_DEVIATIONS = 3.5
 """Number of standard deviations within which two measurements of a position agree with probability 0.999."""
 AMBIGUITY_FACTOR = 1.5
-"""Maximum distance of an observation from an item it may show, as a multiple of the association distance."""
+"""Maximum distance of an observation from an item that it may show [association distances]."""
 MAX_PUSH_DISTANCE = 0.12
 """Maximum distance by which a person may push an item that still counts as the same item [m]."""
 MAX_MISS_PROBABILITY_OF_MOVED_ITEM = 0.05
@@ -102,7 +102,7 @@ def find_duplicate(record: ItemRecord, records: Iterable[ItemRecord], gate: floa
 def _may_be_same_object(
     old_item: ItemRecord, new_item: ItemRecord, staleness: Staleness, config: LedgerConfig
 ) -> bool:
-    """Return True if a new item may be the object of an old item that is missing at its position.
+    """Return True if a new item may be the object of an old item, which looks miss at its position.
 
     The robot may push an object anywhere, a person by at most `MAX_PUSH_DISTANCE`. An item that became a
     phantom after an attempt to pick it may be an object that the attempt pushed away.

@@ -104,7 +104,7 @@ class BinContents:
         """Return True if a look shows the whole floor of a bin without occlusion by the arm."""
         bin = self.bins[bin_name]
         half_size = np.append(bin.size[:2] / 2 - WALL_MARGIN, 0.0)
-        return bool(look.is_searched(bin.position + half_size * FLOOR_POINTS).all())
+        return bool(look.compute_searched_mask(bin.position + half_size * FLOOR_POINTS).all())
 
 
 def find_probable_bin(record: ItemRecord) -> str | None:

@@ -73,7 +73,7 @@ class Coverage:
 
         Points near the positions `(3,)` [m] of low-confidence detections do not count as searched.
         """
-        visible_mask = look.is_searched(self._points)
+        visible_mask = look.compute_searched_mask(self._points)
         for position in uncertain_positions:
             visible_mask &= self._compute_distances(position) > GRID_PITCH
         searched_mask = visible_mask & (self._last_change_numbers <= look.frame.change_count)
@@ -90,7 +90,7 @@ class Coverage:
         if look.view == "full":
             self._full_look_count += 1
             # Points at the border of the image do not count as visible, because no later look may show them.
-            shown_mask = visible_mask & look.is_in_area(self._points, BORDER_WIDTH)
+            shown_mask = visible_mask & look.compute_area_mask(self._points, BORDER_WIDTH)
             self._last_full_look_numbers[shown_mask] = self._full_look_count
 
     def reset_near(self, centre: Array, radius: float, change_number: int) -> None:

@@ -21,8 +21,6 @@ SAME_POSITION_TOLERANCE = 0.01
 """Maximum distance between two measurements of the same position [m]."""
 REASON_NOT_FOUND = "more looks missed it than saw it"
 """Reason of the state PHANTOM of an item whose position was empty in most looks."""
-REASON_UNTRACKED = "its position is unknown: the journal lacks actions of the tool; no look showed it since"
-"""Reason for the rejection of an item that the tool may have moved while the journal was incomplete."""
 REASON_UNCERTAIN = "no look is certain of it"
 """Reason for the rejection of an item with low-confidence or contradicted detections only."""
 
@@ -175,7 +173,7 @@ class ItemRecord:
             self.first_position = self.position
         self.belief.miss_probability = 1.0
 
-    def observe(self, observation: Observation, frame: Frame, bias_std: float, *, is_unmoved: bool) -> None:
+    def store(self, observation: Observation, frame: Frame, bias_std: float, *, is_unmoved: bool) -> None:
         """Store an observation as the last detection of the item, and update the position.
 
         `bias_std` is the standard deviation of the systematic error along each axis [m]; `is_unmoved` is True

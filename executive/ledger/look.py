@@ -105,7 +105,7 @@ class LookUpdate:
             label = observation.detection.label
             is_ambiguous = self._may_show_any_item(observation, unmatched_items)
             record.belief.add_detection(label, rates, viewpoint, is_ambiguous=is_ambiguous)
-            record.observe(observation, self.look.frame, rates.bias, is_unmoved=is_unmoved)
+            record.store(observation, self.look.frame, rates.bias, is_unmoved=is_unmoved)
             detected_items.append(record)
         return detected_items
 
@@ -131,7 +131,7 @@ class LookUpdate:
                 if prior_odds <= max_miss_probability:
                     continue
                 record = self._add_item(observation, prior_odds)
-                record.observe(observation, self.look.frame, 0.0, is_unmoved=True)
+                record.store(observation, self.look.frame, 0.0, is_unmoved=True)
             if record not in updated_items:
                 record.belief.uncertain_look_count += 1
                 # A contradiction of the detected class is no evidence about an item of another class.
@@ -146,7 +146,7 @@ class LookUpdate:
         records = [record for record in records if self._is_unmoved_since_capture(record.position)]
         positions = np.array([record.position for record in records]).reshape(-1, 3)
         phantoms = []
-        for record in compress(records, self.look.is_searched(positions)):
+        for record in compress(records, self.look.compute_searched_mask(positions)):
             record.belief.add_miss(self.look.error_rates)
             if record.belief.existence_probability <= self.config.max_miss_probability:
                 record.set_state(State.PHANTOM, REASON_NOT_FOUND)

@@ -6,15 +6,10 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 
 from executive.ledger.certainty import Certainty
-from executive.ledger.item import (
-    ON_TABLE,
-    REASON_NOT_FOUND,
-    REASON_UNCERTAIN,
-    REASON_UNTRACKED,
-    ItemRecord,
-    State,
-)
+from executive.ledger.item import ON_TABLE, REASON_NOT_FOUND, REASON_UNCERTAIN, ItemRecord, State
 
+REASON_UNTRACKED = "its position is unknown: the journal lacks actions of the tool; no look showed it since"
+"""Reason for the rejection of an item that the tool may have moved while the journal was incomplete."""
 MIN_EMPTY_PROBES = 3
 """Minimum number of descents that touched only the table (`ItemRecord.empty_probe_count`) at a phantom."""
 FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
@@ -90,17 +85,6 @@ def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[Ite
             lost_item.set_state(State.PHANTOM, f"it is {new_item.item}")
             new_items.remove(new_item)
             phantoms.append(lost_item)
-    return phantoms
-
-
-def discard_rejected_items(records: Iterable[ItemRecord]) -> list[ItemRecord]:
-    """Set each rejected or skipped item to PHANTOM, and return these items.
-
-    The next look adds a new item, without evidence, for each object that is still on the table.
-    """
-    phantoms = [record for record in records if record.state in (State.REJECTED, State.SKIPPED)]
-    for record in phantoms:
-        record.set_state(State.PHANTOM, "the run was resumed, and the next look adds its object again")
     return phantoms
 
 

@@ -268,7 +268,9 @@ class Tracker:
 
     def reopen(self) -> None:
         """Discard the items on the table; the next look adds a new item for each visible object."""
-        self._records.emit(*outcomes.discard_rejected_items(self.records))
+        for record in self._records.filter_by_state(State.REJECTED, State.SKIPPED):
+            record.set_state(State.PHANTOM, "the run was resumed, and the next look adds its object again")
+            self._records.emit(record)
 
     def count_states(self) -> dict[str, int]:
         """Return the number of items by final state; the key `seen` counts all items except phantoms."""

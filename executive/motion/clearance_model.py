@@ -60,9 +60,9 @@ def make_tool_discs(config: CellConfig, load: Load | None) -> Discs:
     if load is None:
         radii = np.array([config.tool.cup_radius, TOOL_RADIUS])
         return Discs(np.array([0.0, -NECK_LENGTH]), radii, MIN_COSINE_UNLOADED)
-    load_radius = load.kind.radius + load.kind.ring + POSITION_TOLERANCE
+    load_radius = load.object_class.radius + load.object_class.contact_radius + POSITION_TOLERANCE
     # The load has a disc at its bottom and one at its top, because the tool may tilt.
-    offsets = np.array([load.kind.height, 0.0, -NECK_LENGTH])
+    offsets = np.array([load.object_class.height, 0.0, -NECK_LENGTH])
     return Discs(offsets, np.array([load_radius, load_radius, TOOL_RADIUS]), MIN_COSINE_LOADED)
 
 

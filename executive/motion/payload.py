@@ -36,8 +36,8 @@ class PayloadLimit:
 
     def __init__(self, load: Load, kinematics: Kinematics) -> None:
         # Maximum of |a + g| [m/s²].
-        self._max_specific_force = load.holding_force / SAFETY_FACTOR / load.kind.mass
-        self._centre_offset = load.kind.height / 2
+        self._max_specific_force = load.holding_force / SAFETY_FACTOR / load.object_class.mass
+        self._centre_offset = load.object_class.height / 2
         self._kinematics = kinematics
 
     @property

@@ -8,7 +8,7 @@ from at_hand import look, pick
 from executive.cell.objects import Target
 from executive.cells.fake.cell import FakeCell
 from executive.errors import Fault
-from executive.ledger.item import REASON_UNTRACKED
+from executive.ledger.outcomes import REASON_UNTRACKED
 from executive.run.scene_recovery import recover_scene
 
 

@@ -147,8 +147,8 @@ def _is_visible(position: Array, frame: Frame) -> bool:
     """Return True if an object with its centre at `position` `(3,)` [m] would be visible in the frame."""
     height, width = frame.visible.shape
     positions = position[np.newaxis]
-    is_inside = frame.is_in_area(positions, (0, 0, width, height), MIN_BORDER_DISTANCE)
-    return bool((is_inside & frame.is_unoccluded(positions))[0])
+    is_inside = frame.compute_area_mask(positions, (0, 0, width, height), MIN_BORDER_DISTANCE)
+    return bool((is_inside & frame.compute_unoccluded_mask(positions))[0])
 
 
 def count_injected_faults(events: Sequence[TimedEvent], name: str) -> int:

@@ -6,13 +6,7 @@ Each field is a key of `missions/cells/*.yaml`, in SI units. Values of keys that
 from __future__ import annotations
 
 from executive.cell.config.arm import ArmConfig, LimitsConfig, MotionConfig, ToolConfig
-from executive.cell.config.cameras import (
-    CalibrationConfig,
-    CameraConfig,
-    DepthConfig,
-    NoiseConfig,
-    TransformConfig,
-)
+from executive.cell.config.cameras import CalibrationConfig, CameraConfig, DepthConfig, NoiseConfig
 from executive.cell.config.cell import CellConfig, DetectorConfig, LedgerConfig
 from executive.cell.config.objects import BinConfig, ObjectConfig, TableConfig
 from executive.cell.config.section import Colour, Section
@@ -20,5 +14,5 @@ from executive.cell.config.section import Colour, Section
 __all__ = [
     "ArmConfig", "BinConfig", "CalibrationConfig", "CameraConfig", "CellConfig", "Colour", "DepthConfig",
     "DetectorConfig", "LedgerConfig", "LimitsConfig", "MotionConfig", "NoiseConfig", "ObjectConfig",
-    "Section", "TableConfig", "ToolConfig", "TransformConfig",
+    "Section", "TableConfig", "ToolConfig",
 ]  # fmt: skip

@@ -179,7 +179,7 @@ class FakeArm:
         return self._obstacles.find_collision(tip_positions, self._world.classes[held.label])
 
     def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> FakeMotion:
-        load = task.load.kind if task.load else None
+        load = task.load.object_class if task.load else None
         message = ""
         for path in self._generate_paths(start, goal):
             tip_positions = np.array([start, *(pose.position for pose in path)])

@@ -58,7 +58,7 @@ class FakeObstacles:
             tip_positions: Positions of the tool tip along the path `(N, 3)` [m], from the current position.
             load: Class of the held object, whose lower end is checked instead of the tool tip, or None.
         """
-        height, radius = (load.height, load.radius + load.ring) if load else (0.0, self._cup_radius)
+        height, radius = (load.height, load.radius + load.contact_radius) if load else (0.0, self._cup_radius)
         positions = tip_positions[:, None, :2]
         # Offsets beyond the nearer side along x and along y, then distances from the box; negative inside.
         offsets = np.maximum(self._lower_corners[:, :2] - positions, positions - self._upper_corners[:, :2])

@@ -119,7 +119,7 @@ class FakeWorld:
         for fake_object in self.objects:
             object_class = self.classes[fake_object.label]
             distance = float(np.linalg.norm(fake_object.position[:2] - tip_position[:2]))
-            seal_offset = abs(distance - object_class.ring)
+            seal_offset = abs(distance - object_class.contact_radius)
             top_height = float(fake_object.position[2]) + object_class.height / 2
             is_touched = (
                 seal_offset <= MAX_SEAL_OFFSET and abs(top_height - tip_position[2]) <= TOUCH_DISTANCE

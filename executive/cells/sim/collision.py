@@ -137,7 +137,7 @@ class ClearanceChecker:
             for point in get_points(arm, arm, self._margin, linkIndexA=link_a, linkIndexB=link_b):
                 yield ClosestApproach(name_link(link_a), name_link(link_b), point[DISTANCE], self._margin)
         if load is not None:
-            yield from self._find_load_approaches(load.kind, bodies)
+            yield from self._find_load_approaches(load.object_class, bodies)
 
     def _find_load_approaches(
         self, load: ObjectClass, bodies: Sequence[tuple[str, int]]
@@ -185,7 +185,7 @@ class ClearanceChecker:
     def _get_load_body(self, load: ObjectClass) -> int:
         """Return the body that models a held object of a class, created at the first call."""
         if load not in self._load_bodies:
-            client, radius = self.world.client, load.radius + load.ring
+            client, radius = self.world.client, load.radius + load.contact_radius
             shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=load.height)
             self._load_bodies[load] = int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION))
         return self._load_bodies[load]

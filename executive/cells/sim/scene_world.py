@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, ObjectConfig, TransformConfig
-from executive.cell.config.cameras import POSE_AND_FOV_KEYS
+from executive.cell.config import CalibrationConfig, CameraConfig, CellConfig, ObjectConfig
+from executive.cell.config.cameras import POSE_AND_FOV_KEYS, TransformConfig
 from executive.cells.sim.arrangements import DAMAGED_MODEL_NUMBER, load_unknown_model, scale_model
 from executive.cells.sim.camera import Light
 from executive.cells.sim.scene_file import (

@@ -192,7 +192,7 @@ def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
     item = targets[0].item
     if is_holding or _starts_at_target(skill):
         object_class = fake.cell.classes[targets[0].label]
-        top = targets[0].position + np.array([object_class.ring, 0.0, object_class.height / 2])
+        top = targets[0].position + np.array([object_class.contact_radius, 0.0, object_class.height / 2])
         fake.arm.set_tool_pose(make_tool_down_pose(top, 0.0))
     if is_holding:
         fake.tool.close()
