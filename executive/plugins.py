@@ -62,8 +62,8 @@ def load_cell_kind(name: str) -> CellKind:
             f'no installed package offers cells of kind "{name}"; '
             f"installed: {', '.join(sorted(entries)) or 'none'}"
         )
-    kind: CellKind = entries[name].load()
-    return kind
+    cell_kind: CellKind = entries[name].load()
+    return cell_kind
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,13 @@ class PluginEntry:
     Attributes:
         name: Name of the entry point.
         value: Import path of the class: `module:Class`.
-        kind: Kind of the plugin, for error messages, for instance `skill`.
+        noun: Noun for the class in error messages, for instance `skill`.
         remedy: Clause that tells the user how to unregister the class.
     """
 
     name: str
     value: str
-    kind: str
+    noun: str
     remedy: str
 
     def load(self) -> Any:
@@ -92,43 +92,43 @@ class PluginEntry:
             return EntryPoint(self.name, self.value, "").load()
         except Exception as error:  # The import runs third-party code, which may raise any exception.
             raise InputError(
-                f'the {self.kind} "{self.name}" ({self.value}) cannot be loaded: {type(error).__name__}: '
+                f'the {self.noun} "{self.name}" ({self.value}) cannot be loaded: {type(error).__name__}: '
                 f"{error}{_locate_error(error)}; correct it, or {self.remedy}"
             ) from error
 
 
-def list_entries(group: str, kind: str) -> dict[str, PluginEntry]:
+def list_entries(group: str, noun: str) -> dict[str, PluginEntry]:
     """Return the entries of an entry-point group by name, sorted by name, without importing their classes.
 
     The folder of the project in the working directory (`find_project`) is appended to `sys.path`. If the
-    project is also installed, the entries in its pyproject.toml replace the installed entries. `kind` is the
-    kind of the plugins for error messages.
+    project is also installed, the entries in its pyproject.toml replace the installed entries. `noun` is the
+    noun for a class of the group in error messages.
 
     Raises:
         InputError: Two packages register the same name, or the pyproject.toml of the project is invalid.
     """
     project = find_project()
-    entries = (*_list_installed_entries(group, kind, project), *_enable_project_entries(group, kind, project))
+    entries = (*_list_installed_entries(group, noun, project), *_enable_project_entries(group, noun, project))
     entry_by_name: dict[str, PluginEntry] = {}
     for entry in sorted(entries, key=lambda entry: (entry.name, entry.value)):
         first_entry = entry_by_name.setdefault(entry.name, entry)
         if first_entry.value != entry.value:
             raise InputError(
-                f'the {kind} "{entry.name}" is registered twice, by {first_entry.value} and '
+                f'the {noun} "{entry.name}" is registered twice, by {first_entry.value} and '
                 f"{entry.value}; uninstall or rename one of them"
             )
     return entry_by_name
 
 
-def _list_installed_entries(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
+def _list_installed_entries(group: str, noun: str, project: Project | None) -> Iterator[PluginEntry]:
     """Yield the entries of all installed packages except the project itself."""
     for entry in entry_points(group=group):
         package = entry.dist.name if entry.dist else entry.module.partition(".")[0]
         if project is None or _normalize(package) != _normalize(project.name):
-            yield PluginEntry(entry.name, entry.value, kind, f"uninstall the package {package}")
+            yield PluginEntry(entry.name, entry.value, noun, f"uninstall the package {package}")
 
 
-def _enable_project_entries(group: str, kind: str, project: Project | None) -> Iterator[PluginEntry]:
+def _enable_project_entries(group: str, noun: str, project: Project | None) -> Iterator[PluginEntry]:
     """Append the folder of the project to `sys.path`, and yield the entries of the project."""
     if project is None or not (entries := project.read_entries(group)):
         return
@@ -137,7 +137,7 @@ def _enable_project_entries(group: str, kind: str, project: Project | None) -> I
         # The folder is the last entry of the path, so that its modules do not shadow installed modules.
         sys.path.append(folder)
     for name, value in entries.items():
-        yield PluginEntry(name, value, kind, f"remove it from {project.file}")
+        yield PluginEntry(name, value, noun, f"remove it from {project.file}")
 
 
 def _normalize(package: str) -> str:

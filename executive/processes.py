@@ -41,12 +41,12 @@ class WorkerPool(ProcessPoolExecutor):
             signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self, cls: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> bool | None:
         """Wait for all submitted calls; after an exception, kill the processes instead."""
-        if kind is not None:
+        if error is not None:
             kill_workers()
-        return super().__exit__(kind, error, trace)
+        return super().__exit__(cls, error, traceback)
 
 
 def kill_workers() -> None:

@@ -133,8 +133,7 @@ class SkillFailed(Exception):
 
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)
-        self.reason = reason
-        self.message = message
+        self.reason, self.message = reason, message
 
 
 class Skill:
@@ -198,12 +197,11 @@ class Skill:
         """Set the params and inputs in `values`, and all other params and inputs to their defaults."""
         inputs = {name: port for name, port in self.ports.items() if port.direction is Direction.IN}
         settings: dict[str, Param | Port] = {**self.params, **inputs}
-        for name in values:
-            if name not in settings:
-                raise InputError(
-                    f'{type(self).__name__} has no param or input "{name}"; '
-                    f"it has: {', '.join(settings) or 'none'}"
-                )
+        if (unknown_name := next((name for name in values if name not in settings), None)) is not None:
+            raise InputError(
+                f'{type(self).__name__} has no param or input "{unknown_name}"; '
+                f"it has: {', '.join(settings) or 'none'}"
+            )
         for name, setting in settings.items():
             value = values.get(name, setting.default)
             if value is ...:
