@@ -34,9 +34,9 @@ class Approach(Skill):
     detection from an object.
 
     A touch at a wrong height contradicts the class of the target, unless an earlier touch matched the class.
-    The first touch that is too low is no contradiction either if its height matches no other class and the
-    detections alone prove the class. A touch below the middle of the object, or more than `overtravel` too
-    low, missed the target; the skill then fails with `no_contact` if an earlier touch matched the class.
+    If the detections alone prove the class, the first touch that is too low does not contradict the class,
+    except at the height of another class. A touch below the middle of the object, or more than `overtravel`
+    too low, missed the target; the skill then fails with `no_contact` if an earlier touch matched the class.
     """
 
     target: In[Target] = port(doc="the target to touch")

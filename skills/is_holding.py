@@ -33,7 +33,5 @@ class IsHolding(Skill):
         if item is not None:
             cell.ledger.record_drop(item)
             raise self.failure("empty", f"the sensor detects no seal; {item} was dropped")
-        seal = (
-            "a seal, but the ledger has no item in the tool; the tool was opened" if is_sealed else "no seal"
-        )
+        seal = "a seal, but the ledger knows no held item; the tool was opened" if is_sealed else "no seal"
         raise self.failure("empty", f"the sensor detects {seal}")

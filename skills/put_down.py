@@ -8,7 +8,7 @@ import numpy as np
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.motions import release_item, transport
+from executive.manipulation.motions import release, transport
 from executive.manipulation.tool_goals import make_put_down_goal
 from executive.skill import ANY, EMPTY, HOLDING, In, Metres, Seconds, Skill, SkillFailed, param, port
 
@@ -35,17 +35,15 @@ class PutDown(Skill):
 
     def run(self, cell: Cell) -> Steps:
         """Transport the item to a free position, and release the item."""
-        object_class = cell.classes[cell.ledger.get_label(self.held)]
-        goal = make_put_down_goal(cell, object_class, self.drop, self.held)
+        item, object_class = self.held, cell.classes[cell.ledger.get_label(self.held)]
+        goal = make_put_down_goal(cell, object_class, self.drop, item)
         top_height = float(cell.safe_place[2]) + object_class.height
         try:
-            yield from transport(self, cell, self.held, goal, "the safe place")
+            yield from transport(self, cell, item, goal, "the safe place")
         except SkillFailed as failure:
             # An item that still lies on the table is released there.
             if failure.reason != "blocked" or cell.arm.tool_pose.position[2] > top_height + MIN_LIFT_HEIGHT:
                 raise
         x, y, _ = cell.arm.tool_pose.position
         centre = np.array((x, y, top_height - object_class.height / 2))
-        yield from release_item(
-            self, cell, self.held, self.settle, lambda: cell.ledger.record_put_down(self.held, centre)
-        )
+        yield from release(self, cell, item, self.settle, lambda: cell.ledger.record_put_down(item, centre))

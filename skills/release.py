@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from executive.cell.objects import Item
 from executive.cell.protocols import Cell, Steps
-from executive.manipulation.motions import release_item
+from executive.manipulation.motions import release
 from executive.skill import ANY, EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 
 
@@ -30,9 +30,7 @@ class Release(Skill):
         """Open the tool, wait, and read the vacuum sensor."""
         item, bin = self.held, self.bin
         if cell.ledger.find_held_item() == item:
-            yield from release_item(
-                self, cell, item, self.settle, lambda: cell.ledger.record_placement(item, bin)
-            )
+            yield from release(self, cell, item, self.settle, lambda: cell.ledger.record_placement(item, bin))
         elif cell.ledger.is_open(item):
             raise self.failure("dropped", f"{item} is not in the tool any more")
         # A skill that is started again after a halt may find its item already placed.

@@ -13,7 +13,7 @@ from executive.manipulation.obstacles import list_obstacles
 from executive.skill import Skill, SkillFailed
 
 MAX_PLANNING_ATTEMPTS = 3
-"""Maximum number of planning attempts for one motion; the ledger may change goal or task during each."""
+"""Maximum number of planning attempts for one motion; a look during an attempt may change goal or task."""
 
 
 def wait_for_rest(arm: Arm) -> Steps:
@@ -97,10 +97,8 @@ def transport(skill: Skill, cell: Cell, item: Item, goal: Goal, goal_name: str) 
         raise skill.failure("dropped", message)
 
 
-def release_item(
-    skill: Skill, cell: Cell, item: Item, settle_time: float, record_release: Callable[[], None]
-) -> Steps:
-    """Switch the vacuum off, and yield for `settle_time` [s] until the item lies still.
+def release(skill: Skill, cell: Cell, item: Item, settle: float, record_release: Callable[[], None]) -> Steps:
+    """Switch the vacuum off, and yield for `settle` [s] until the item lies still.
 
     `record_release` records the new position of the item in the ledger, even if the skill is halted
     during the wait, provided that the tool is empty.
@@ -110,12 +108,12 @@ def release_item(
     """
     cell.tool.open()
     try:
-        yield from cell.clock.sleep(settle_time)
+        yield from cell.clock.sleep(settle)
     finally:
         if not cell.tool.holding:
             record_release()
     if cell.tool.holding:
-        raise skill.failure("stuck", f"{item} hangs on the tool {settle_time:.2f} s after release")
+        raise skill.failure("stuck", f"{item} hangs on the tool {settle:.2f} s after release")
 
 
 def make_task(cell: Cell) -> Task:

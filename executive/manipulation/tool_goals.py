@@ -33,7 +33,7 @@ SPIRAL_SPACING = 0.0025
 """Default scale of the Vogel spiral on which the contact points of the attempts lie [m]."""
 MIN_GAP = 0.02
 """Minimum gap between the object in the tool and other objects after a put-down [m]."""
-POSITIONS_PER_SIDE = 2
+GRID_HALF_WIDTH = 2
 """Half width of the grid of candidate positions around the safe place [grid steps]."""
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 """Angle between two successive points of a Vogel spiral [rad]."""
@@ -82,7 +82,7 @@ def make_object_goal(
         spacing: Scale of the spiral of contact points [m].
     """
     x, y, z = map(float, position)
-    dx, dy = _compute_attempt_offset(failed_attempts, object_class.ring, spacing)
+    dx, dy = _compute_offset(failed_attempts, object_class.contact_radius, spacing)
     end_height = compute_min_contact_height(object_class, z, overtravel)
     if failed_attempts >= ATTEMPTS_BEFORE_PROBE:
         end_height = min(end_height, z - object_class.height / 2 + PROBE_CLEARANCE)
@@ -144,17 +144,15 @@ def make_slot_goal(
     return Goal((x, y, compute_layer_height(bin, layer, max_object_height) + height + drop_height))
 
 
-def make_put_down_goal(
-    cell: Cell, object_class: ObjectClass, drop_height: float, item: Item | None = None
-) -> Goal:
+def make_put_down_goal(cell: Cell, object_class: ObjectClass, drop_height: float, item: Item | None) -> Goal:
     """Return the goal of a put-down: an object at `drop_height` [m] above a free position on the table.
 
     The position is the free candidate nearest to the safe place; if no candidate is free, the safe place.
-    `item` is the object in the tool, which is no obstacle.
+    `item` is the item in the tool, which is no obstacle; None if the ledger knows no item there.
     """
     x, y, table_height = map(float, cell.safe_place)
     grid_spacing = 2 * object_class.radius + MIN_GAP
-    offsets = [step * grid_spacing for step in range(-POSITIONS_PER_SIDE, POSITIONS_PER_SIDE + 1)]
+    offsets = [step * grid_spacing for step in range(-GRID_HALF_WIDTH, GRID_HALF_WIDTH + 1)]
     sorted_offsets = sorted(product(offsets, offsets), key=lambda offset: math.hypot(*offset))
     candidates = ((x + dx, y + dy) for dx, dy in sorted_offsets)
     free_positions = (xy for xy in candidates if _is_free(cell, xy, object_class.radius + MIN_GAP, item))
@@ -171,12 +169,12 @@ def _is_free(cell: Cell, position: tuple[float, float], min_distance: float, ite
     )
 
 
-def _compute_attempt_offset(failed_attempts: int, ring_radius: float, spacing: float) -> tuple[float, float]:
+def _compute_offset(failed_attempts: int, contact_radius: float, spacing: float) -> tuple[float, float]:
     """Return the offset `(x, y)` [m] of the contact point from the centre of the object.
 
     After n failed attempts, the contact point on a solid object lies on a Vogel spiral, at the distance
-    spacing * sqrt(n) and the angle n * GOLDEN_ANGLE. On a part with a hole, the distance is `ring_radius`.
+    spacing * sqrt(n) and the angle n * GOLDEN_ANGLE. If `contact_radius` is above 0, it is the distance.
     """
     angle = failed_attempts * GOLDEN_ANGLE
-    distance = ring_radius or spacing * math.sqrt(failed_attempts)
+    distance = contact_radius or spacing * math.sqrt(failed_attempts)
     return distance * math.cos(angle), distance * math.sin(angle)

@@ -57,7 +57,7 @@ def recover_scene(cell: Cell) -> Steps:
 def _put_down(cell: Cell) -> Steps:
     """Transport the object in the tool, whose class is unknown, to a free position on the table."""
     tallest_class = max(cell.classes.values(), key=lambda object_class: object_class.height)
-    goal = make_put_down_goal(cell, tallest_class, DROP_HEIGHT)
+    goal = make_put_down_goal(cell, tallest_class, DROP_HEIGHT, None)
     problems = []
     # The tallest load may collide at the start although the real load does not; the second plan has no load.
     for load in (Load(tallest_class, cell.tool.holding_force), None):

@@ -62,7 +62,7 @@ def test_what_is_put_down_one_after_another_stands_side_by_side(fake: FakeCell, 
 def test_where_nothing_is_free_it_is_the_safe_place_all_the_same(
     fake: FakeCell, held: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("executive.manipulation.tool_goals.POSITIONS_PER_SIDE", 0)
+    monkeypatch.setattr("executive.manipulation.tool_goals.GRID_HALF_WIDTH", 0)
     run_skill(PutDown(held=held), fake)
     fake.world.put("cube", 0.5, 0.1)
     item, cube = picked(fake, "cube"), fake.cell.classes["cube"]
@@ -78,7 +78,7 @@ def test_the_goal_of_an_approach_lies_below_the_surface_and_the_last_part_is_slo
 
 
 def test_an_approach_never_feels_below_the_middle_of_what_it_is_to_touch() -> None:
-    washer = ObjectClass("washer", 0.006, 0.025, ring=0.017)
+    washer = ObjectClass("washer", 0.006, 0.025, contact_radius=0.017)
     goal = make_object_goal(washer, np.array([0.5, 0.1, 0.013]), 0.02, 0.05)  # on another one
     assert goal.position == pytest.approx((0.517, 0.1, 0.013))
     assert (goal.guarded_length, goal.guarded_speed) == pytest.approx((0.003 + 0.02, 0.05))

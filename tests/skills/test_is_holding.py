@@ -22,8 +22,8 @@ def test_an_object_that_the_ledger_does_not_know_is_released(fake: FakeCell, hel
     fake.ledger.record_drop(held)
     result = run_skill(IsHolding(), fake)
     assert (result.status, result.reason, fake.tool.holding) == ("FAILURE", "empty", False)
-    assert result.message == (
-        "the sensor detects a seal, but the ledger has no item in the tool; the tool was opened"
+    assert (
+        result.message == "the sensor detects a seal, but the ledger knows no held item; the tool was opened"
     )
 
 
