@@ -58,7 +58,7 @@ class Answer:
     unknown: tuple[Detection, ...] = ()
 
     def describe_doubt(self, detection: Detection) -> str:
-        """Return the message for an answer without confident detections; `detection` is the best detection."""
+        """Return the message for an answer whose best detection, `detection`, is doubtful."""
         confidence, threshold = detection.confidence, self.error_rates.threshold
         doubt = f"with another class at {detection.second_confidence:.2f}"
         doubt = f"< {threshold:.2f}" if confidence < threshold else doubt
