@@ -48,7 +48,7 @@ def command(
 
         from executive.view.tree.dot import format_dot
         from executive.view.tree.svg import draw_svg
-        from executive.view.tree.tree_text import draw_outline, fold_subtrees
+        from executive.view.tree.tree_text import draw_text, fold_subtrees
 
         name, nodes = _load_outline(mission, overrides)
         nodes = fold_subtrees(nodes) if fold else nodes
@@ -59,7 +59,7 @@ def command(
         elif as_json:
             output = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
         else:
-            output = draw_outline(nodes, shows_ports=ports, shows_reasons=reasons)
+            output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
     print_json(output) if as_json else click.echo(output)
 
 

@@ -52,7 +52,7 @@ def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> 
     times: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     # The dictionary without values is used as an ordered set.
     skill_activities: dict[str, None] = {}
-    retries = _find_retries(activations, skills, selections)
+    retries = _find_retries(activations, skills, timeline)
     for start, end, running in _split_time(activations, timeline.clock):
         item_activation = next((activation for activation in running if activation.item), None)
         if item_activation is not None:
@@ -94,9 +94,7 @@ def _find_next_item(selections: Sequence[tuple[float, str]], time: float) -> str
 
 
 def _find_retries(
-    activations: Sequence[Activation],
-    skills: Mapping[str, OutlineNode],
-    selections: Sequence[tuple[float, str]],
+    activations: Sequence[Activation], skills: Mapping[str, OutlineNode], timeline: Timeline
 ) -> dict[str, tuple[float, float]]:
     """Return, for each item with a failed attempt, the start and the end of its failed attempts [s]."""
     retries = {}
@@ -104,10 +102,9 @@ def _find_retries(
         skill, item = skills[activation.node], activation.item
         # An attempt fails if a skill that acts on the item fails, not if a look fails.
         if item and activation.status == "FAILURE" and skill.uses and not skill.senses:
-            selection_times = [time for time, selected_item in selections if selected_item == item]
+            selection_times = [time for time, selected in timeline.selection_times if selected == item]
             first_start = min(other.start for other in activations if other.item == item)
-            start = min(selection_times, default=first_start)
             # Looks before the next attempt count as part of the failed attempt.
             end = next((time for time in selection_times if time > activation.end), activation.end)
-            retries[item] = start, end
+            retries[item] = min(selection_times, default=first_start), end
     return retries

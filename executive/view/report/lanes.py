@@ -108,37 +108,33 @@ def _group_by_bar(
     If there are too many bars at the scale `scale` of the drawing [pixel/s], the scale is halved repeatedly.
     """
     while True:
-        groups_by_path = {
-            path: _group_close_activations(activations, scale)
-            for path, activations in activations_by_path.items()
-        }
+        groups_by_path = {path: _group_activations(each, scale) for path, each in activations_by_path.items()}
         if sum(map(len, groups_by_path.values())) <= MAX_BAR_COUNT + len(groups_by_path):
             return groups_by_path
         scale /= 2
 
 
-def _group_close_activations(activations: Sequence[Activation], scale: float) -> list[list[Activation]]:
+def _group_activations(activations: Sequence[Activation], scale: float) -> list[list[Activation]]:
     """Return the activations of a node in groups that cannot be distinguished at a scale [pixel/s]."""
     groups: list[list[Activation]] = []
     for activation in activations:
-        is_distinct = not groups or (
-            (activation.start - groups[-1][-1].end) * scale >= MIN_GAP
-            or (activation.end - groups[-1][0].start) * scale >= MIN_BAR_WIDTH
-        )
-        if is_distinct:
-            groups.append([])
-        groups[-1].append(activation)
+        if groups and (
+            (activation.start - groups[-1][-1].end) * scale < MIN_GAP
+            and (activation.end - groups[-1][0].start) * scale < MIN_BAR_WIDTH
+        ):
+            groups[-1].append(activation)
+        else:
+            groups.append([activation])
     return groups
 
 
 def _make_bar(node: OutlineNode, group: Sequence[Activation]) -> Bar:
     """Return the bar of a group of activations of a node."""
-    earliest, end_time = group[0], group[-1].end
-    has_one_item = len({activation.item for activation in group}) == 1
-    item_text = f" of {earliest.item}" if earliest.item and has_one_item else ""
-    status_text = earliest.status if len(group) == 1 else format_counts(group)
+    start, end, items = group[0].start, group[-1].end, {activation.item for activation in group}
+    item_text = f" of {group[0].item}" if len(items) == 1 and group[0].item else ""
+    status_text = group[0].status if len(group) == 1 else format_counts(group)
     heading = f"{node.name}{item_text}: {status_text}"
-    times_text = f"{earliest.start:.2f} s to {end_time:.2f} s ({end_time - earliest.start:.2f} s)"
+    times_text = f"{start:.2f} s to {end:.2f} s ({end - start:.2f} s)"
     tooltip = "\n".join(filter(None, (heading, times_text, find_last_failure(group))))
     worst_status = min((activation.status for activation in group), key=_STATUSES_BY_SEVERITY.index)
-    return Bar(earliest.start, end_time, worst_status.lower(), tooltip)
+    return Bar(start, end, worst_status.lower(), tooltip)

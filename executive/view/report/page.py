@@ -13,7 +13,7 @@ from markupsafe import Markup
 from executive.errors import ExecutiveError
 from executive.perception.evidence import describe_unknown_labels
 from executive.record.atomic_file import write_atomically
-from executive.record.diagnosis import diagnosis_text
+from executive.record.diagnosis.diagnosis_text import list_labelled_sentences
 from executive.record.pictures.palette import PALETTE
 from executive.record.result import describe_disagreement
 from executive.record.run_directory import RunDirectory, convert_os_errors
@@ -61,9 +61,8 @@ def write_report(path: Path) -> Path:
 
 def render_report(data: ReportData) -> str:
     """Return the report of a run as HTML; texts of missions and skills are escaped."""
-    result, params = data.result, data.start.params
+    result, params, item_names = data.result, data.start.params, [item.item for item in data.items]
     diagnosis = None if result is None else result.diagnosis
-    item_names = [item.item for item in data.items]
     last_picture_file = "" if diagnosis is None else diagnosis.picture
     # A reason that repeats the status, such as "fault", is omitted.
     reason = "" if data.end is None or data.end.reason.upper() == data.status else data.end.reason
@@ -78,9 +77,7 @@ def render_report(data: ReportData) -> str:
         audit=asdict(result.audit) if result is not None and result.audit is not None else {},
         unknown_text=describe_unknown_labels({} if result is None else result.unknown_labels),
         diagnosis=diagnosis,
-        labelled_sentences=[]
-        if diagnosis is None
-        else list(diagnosis_text.list_labelled_sentences(diagnosis)),
+        labelled_sentences=[] if diagnosis is None else list(list_labelled_sentences(diagnosis)),
         last_picture=next((picture for picture in data.pictures if picture.file == last_picture_file), None),
         titles={node.path: node.title for node in data.nodes},
         describe_place_on_table=describe_place_on_table,
@@ -89,9 +86,7 @@ def render_report(data: ReportData) -> str:
         tree=Markup(draw_svg(data.nodes, data.start.mission, _make_node_results(data))),
         timeline=Markup(draw_lanes(data.timeline, data.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
-        scan_pictures=[
-            picture for picture in data.pictures if picture.reason and picture.item not in item_names
-        ],
+        scan_pictures=[each for each in data.pictures if each.reason and each.item not in item_names],
     )
 
 

@@ -12,27 +12,24 @@ from executive.view.tree.node_texts import make_node_texts
 
 def format_dot(nodes: Sequence[OutlineNode], name: str) -> str:
     """Return a tree as the text of a Graphviz digraph with the name `name`; each subtree is a cluster."""
-    child_indices = list_child_indices(nodes)
     lines = [
         f"digraph {_quote(name)} {{",
         '  ordering=out; nodesep=0.15; fontname="sans-serif"; fontsize=11;',
         '  node [fontname="sans-serif", fontsize=11]; edge [fontname="sans-serif", fontsize=9];',
-        *(f"  {line}" for line in _format_branch(0, nodes, child_indices)),
+        *(f"  {line}" for line in _format_branch(0, nodes, list_child_indices(nodes))),
         "}",
     ]
     return "\n".join(lines)
 
 
-def _format_branch(
-    index: int, nodes: Sequence[OutlineNode], child_indices: Sequence[Sequence[int]]
-) -> list[str]:
-    """Return the statements for the node with the index `index` and for its descendants."""
+def _format_branch(index: int, nodes: Sequence[OutlineNode], children: Sequence[Sequence[int]]) -> list[str]:
+    """Return the statements for a node and its descendants, given its index and the children of each node."""
     node = nodes[index]
     statements = [_format_node(node)]
-    for child in child_indices[index]:
+    for child in children[index]:
         label = f" [label={_quote(nodes[child].slot)}]" if nodes[child].slot else ""
         edge = f"{_quote(node.path)} -> {_quote(nodes[child].path)}{label};"
-        statements += [*_format_branch(child, nodes, child_indices), edge]
+        statements += [*_format_branch(child, nodes, children), edge]
     if node.subtrees:
         header = f"subgraph {_quote(f'cluster {node.path}')} {{"
         statements = [header, f"label={_quote(node.subtree)}; style=dashed; color=gray;", *statements, "}"]

@@ -138,9 +138,7 @@ def _compute_bands(children: ChildIndices, sizes: Sequence[NodeSize]) -> tuple[l
     return band_heights, node_offsets
 
 
-def _place_bands(
-    children: ChildIndices, band_heights: Sequence[float], node_offsets: Sequence[float]
-) -> list[float]:
+def _place_bands(children: ChildIndices, band_heights: list[float], node_offsets: list[float]) -> list[float]:
     """Return the y of the top of each band, given the results of `_compute_bands`."""
     band_tops = [MARGIN - NODE_GAP / 2] * len(band_heights)
     for index, node_children in enumerate(children):

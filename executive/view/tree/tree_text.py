@@ -15,9 +15,7 @@ _MIN_TEXT_LENGTH = 40
 """Minimum length of the text of a line after its prefix [characters]."""
 
 
-def draw_outline(
-    nodes: Sequence[OutlineNode], *, shows_ports: bool = False, shows_reasons: bool = False
-) -> str:
+def draw_text(nodes: Sequence[OutlineNode], *, shows_ports: bool = False, shows_reasons: bool = False) -> str:
     """Return the drawing of a tree as a text, with one line per node unless the line is too long.
 
     Args:
@@ -28,7 +26,7 @@ def draw_outline(
     lines = []
     prefixes, child_indices = draw_line_prefixes(nodes), list_child_indices(nodes)
     for node, prefix, children in zip(nodes, prefixes, child_indices, strict=True):
-        # Only vertical lines continue below the line of the node.
+        # Only the vertical strokes of the prefix continue in the lines below the name of the node.
         indent = prefix.replace("├─", "│ ").replace("└─", "  ") + ("│  " if children else "   ")
         detail = f"  ({node.detail})" if node.detail else ""
         lines += _wrap_line(f"{node.name}{detail}", prefix, indent)
@@ -84,7 +82,7 @@ def fold_subtrees(nodes: Sequence[OutlineNode]) -> list[OutlineNode]:
         end = index + 1
         while end < len(nodes) and nodes[end].depth > node.depth:
             end += 1
-        content = [(below.depth - node.depth, below.title, below.detail) for below in nodes[index:end]]
+        content = [(each.depth - node.depth, each.title, each.detail) for each in nodes[index:end]]
         repeated_subtree = next((subtree for subtree in node.subtrees if subtree in content_by_subtree), None)
         if repeated_subtree is None:
             content_by_subtree |= dict.fromkeys(node.subtrees, content)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, PassedNode
+from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, FailureNode
 from executive.record.diagnosis.diagnosis_text import MAX_LINE_WIDTH, format_diagnosis
 from executive.record.timeline.items import Sighting
 from tests.record.failed_runs import PICK, FailedRun
@@ -196,11 +196,11 @@ STORY = Diagnosis(
 
 def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
     names = [f"some_subtree_{index}: retry" for index in range(9)]
-    chain = [PassedNode(name, name, "a.yaml:1", "w" + " why" * 99) for name in names]
+    chain = [FailureNode(name, name, "a.yaml:1", "w" + " why" * 99) for name in names]
     story = replace(
         STORY,
         verdict="Grasp failed: " + "no seal, " * 90,
-        passed_nodes=[*chain, PassedNode("tree/Grasp", "Grasp", "trial.yaml:7", "")],
+        passed_nodes=[*chain, FailureNode("tree/Grasp", "Grasp", "trial.yaml:7", "")],
         last_look=Sighting(1, "c", "d", 1.0, "cube-1", 0, 1, "cube", 0.5, [0.1, 0.2, 0.3]),
         unsorted_items=[f"cube-{index}" for index in range(400)],
         advice=["do this " * 60],

@@ -16,7 +16,7 @@ from executive.tree.retry import Retry
 from executive.tree.sequence import Sequence
 from executive.tree.skill_leaf import SkillLeaf, Wiring
 from executive.tree.try_catch import Catch, TryCatch
-from executive.view.tree.tree_text import MAX_LINE_LENGTH, draw_outline, fold_subtrees
+from executive.view.tree.tree_text import MAX_LINE_LENGTH, draw_text, fold_subtrees
 
 CELL: Any = SimpleNamespace()
 MISSED = (Reason("Pick", "missed"),)
@@ -91,7 +91,7 @@ def test_a_node_knows_after_which_failures_it_runs():
 
 def test_ports_and_reasons_stand_below_the_skill():
     nodes = make_outline(Sequence(make_site("tree"), do=[pick("tree/Pick"), pick("tree/other", "other")]))
-    assert draw_outline(nodes, shows_ports=True, shows_reasons=True).splitlines() == [
+    assert draw_text(nodes, shows_ports=True, shows_reasons=True).splitlines() == [
         "tree",
         "├─ Pick  (height: 0.2, only: $item, held: $thing)",
         "│     reads $seen, only <- $item?; writes held -> $thing",
@@ -108,7 +108,7 @@ def test_a_catch_tells_what_it_is_for_with_the_reasons():
         OutlineNode("tree/try/catch/1", "catch 1", 1, "", "sequence", "sequence", when="on Pick.missed"),
         OutlineNode("tree/try/catch/1/Wait", "Wait", 2, "", "skill", "Wait"),
     ]
-    assert draw_outline(nodes, shows_reasons=True).splitlines() == [
+    assert draw_text(nodes, shows_reasons=True).splitlines() == [
         "try", "└─ catch 1", "   │  on Pick.missed", "   └─ Wait",
     ]  # fmt: skip
 
@@ -118,7 +118,7 @@ def test_long_lines_are_wrapped_under_their_node():
     body = pick("tree/retry/do/Pick", wiring=wiring)
     on = [Reason("Pick", reason) for reason in ("missed", "blocked", "unreachable", "dropped", "slipped")]
     root = Retry(make_site("tree/retry"), attempts=3, on=on, do=body)
-    lines = draw_outline(make_outline(root), shows_ports=True).splitlines()
+    lines = draw_text(make_outline(root), shows_ports=True).splitlines()
     assert max(map(len, lines)) <= MAX_LINE_LENGTH
     assert lines[1] == "│    Pick.slipped)"
     assert lines[-1].startswith("        ") and lines[-1].endswith("b")
@@ -127,7 +127,7 @@ def test_long_lines_are_wrapped_under_their_node():
 def test_a_folded_tree_shows_every_subtree_once():
     nodes = make_outline(tree())
     shown = fold_subtrees(nodes)
-    assert draw_outline(shown).splitlines() == [
+    assert draw_text(shown).splitlines() == [
         "try",
         "├─ retry  (up to 3 attempts, on Pick.missed)",
         "│  ├─ recover: look",
