@@ -120,11 +120,8 @@ class Journal:
         if not os.path.samestat(status, self._path.stat()):
             raise FileExistsError(errno.EEXIST, "another program replaced it during the run")
         if status.st_size != self._file_size:
-            raise OSError(
-                errno.EIO,
-                f"another program changed its length from {self._file_size} to {status.st_size} bytes during "
-                "the run",
-            )
+            lengths = f"from {self._file_size} to {status.st_size} bytes"
+            raise OSError(errno.EIO, f"another program changed its length {lengths} during the run")
 
 
 def read_journal(path: Path) -> list[TimedEvent]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, KeysView, Mapping
 from dataclasses import fields, is_dataclass
+from operator import attrgetter
 
 from pydantic import JsonValue, TypeAdapter, ValidationError
 from pydantic_core import from_json
@@ -19,9 +20,7 @@ CLOCK_TOLERANCE = 1e-5
 """Maximum difference between the clock of an event and the time of its control step [s]."""
 
 EVENT_CLASSES: Mapping[str, type[Event]] = {
-    cls.__name__: cls
-    for cls in sorted(Event.__subclasses__(), key=lambda cls: cls.__name__)
-    if cls.is_recorded
+    cls.__name__: cls for cls in sorted(Event.__subclasses__(), key=attrgetter("__name__")) if cls.is_recorded
 }
 """Classes of the recorded events by kind, which is the name of the class."""
 
@@ -44,12 +43,11 @@ def make_journal_schema() -> dict[str, JsonValue]:
     for kind, adapter in _ADAPTER_BY_KIND.items():
         schema = adapter.json_schema(ref_template="#/definitions/{model}")
         definitions |= schema.pop("$defs", {})
-        common_properties = {
+        schema["properties"] = {
             "kind": {"const": kind},
             "tick": {"type": "integer", "minimum": 0, "maximum": MAX_TICK},
             "clock": {"type": "number", "minimum": 0},
-        }
-        schema["properties"] = common_properties | schema.get("properties", {})
+        } | schema.get("properties", {})
         definitions[kind] = schema | {"required": list(_KEYS_BY_KIND[kind]), "additionalProperties": False}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",

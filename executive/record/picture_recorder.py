@@ -22,6 +22,9 @@ MAX_STORED_LOOKS = 24
 MAX_PICTURES = 200
 """Maximum number of pictures of a run, so that a long run does not fill the disk."""
 
+StoredLook = tuple[Frame, FrameSearched]
+"""Frame without depth image, and the event with its detections."""
+
 _LISTED_STATES = ("held", "dropped", "rejected", "skipped", "lost")
 """States of items, except `placed`, that a picture lists."""
 
@@ -41,7 +44,7 @@ class PictureRecorder:
         self._drawer = PictureDrawer(folder)
         self._timeline = Timeline(has_history=False)
         self._last_frame: Frame | None = None
-        self._look_by_frame_id: dict[int, tuple[Frame, FrameSearched]] = {}
+        self._look_by_frame_id: dict[int, StoredLook] = {}
         self._selected_frame_id: int | None = None
         self._undrawn_frame_id: int | None = None
         """Number of the frame of the last look; None if a picture shows this frame."""
@@ -58,9 +61,9 @@ class PictureRecorder:
             self._add_look(event)
         elif isinstance(event, TargetSelected):
             self._selected_frame_id = event.frame
-            self._draw(timed, event.frame, event, None)
+            self._queue(timed, event, None)
         elif isinstance(event, NodeEnded) and event.skill and event.status == "FAILURE":
-            self._draw_failure(timed, event)
+            self._queue(timed, self._timeline.selections.get(event.item), event)
         # The timeline gets the event last, so that the picture shows a failed skill as running.
         self._timeline(timed)
 
@@ -85,18 +88,11 @@ class PictureRecorder:
             other_ids = (id for id in self._look_by_frame_id if id != self._selected_frame_id)
             del self._look_by_frame_id[next(other_ids)]
 
-    def _draw_failure(self, timed: TimedEvent, failure: NodeEnded) -> None:
-        """Draw the last selection of the failed skill's item; without a selection, draw an undrawn look."""
-        selection = self._timeline.selections.get(failure.item)
-        if selection is not None:
-            self._draw(timed, selection.frame, selection, failure)
-        elif self._undrawn_frame_id is not None:
-            self._draw(timed, self._undrawn_frame_id, None, failure)
-
-    def _draw(
-        self, timed: TimedEvent, frame_id: int, selection: TargetSelected | None, failure: NodeEnded | None
-    ) -> None:
-        """Queue the picture of a frame; the picture shows `selection` and `failure` if they are not None."""
+    def _queue(self, timed: TimedEvent, selection: TargetSelected | None, failure: NodeEnded | None) -> None:
+        """Queue a picture of the frame of the selection; without a selection, of the last undrawn frame."""
+        frame_id = selection.frame if selection else self._undrawn_frame_id
+        if frame_id is None:
+            return
         if frame_id == self._undrawn_frame_id:
             self._undrawn_frame_id = None
         look = self._look_by_frame_id.get(frame_id)
@@ -112,15 +108,11 @@ class PictureRecorder:
             self._picture_count += 1
 
     def _make_content(
-        self,
-        timed: TimedEvent,
-        look: tuple[Frame, FrameSearched],
-        selection: TargetSelected | None,
-        failure: NodeEnded | None,
+        self, timed: TimedEvent, look: StoredLook, selection: TargetSelected | None, failure: NodeEnded | None
     ) -> PictureContent:
         """Return the content of the picture of `look` in the current state of the run."""
         frame, look_event = look
-        timeline = self._timeline
+        timeline, running = self._timeline, self._timeline.find_running_activations()
         item = selection.item if selection else ""
         history = timeline.items.by_name.get(item)
         position = history.last_change.position if history else None
@@ -128,18 +120,16 @@ class PictureRecorder:
             image=frame.image,
             visible=frame.visible,
             detections=[_to_detection(each) for each in look_event.confident],
-            selected=_find_selected_index(selection, look_event.confident, position),
+            selected_index=_find_selected_index(selection, look_event.confident, position),
             mission=timeline.started.mission if timeline.started else "",
             clock=timed.clock,
             camera=frame.camera,
             detector=look_event.detector,
             age=timed.clock - frame.stamp,
-            phase=" + ".join(
-                get_skill_name(last.node) for last in timeline.find_running_activations() if last.skill
-            ),
+            running_skills=[get_skill_name(each.node) for each in running if each.skill],
             item=item,
             bin=selection.bin if selection else "",
-            attempts=history.last_change.attempts if history else 0,
+            failed_attempts=history.last_change.attempts if history else 0,
             failure=f"{get_skill_name(failure.node)}.{failure.reason}" if failure else "",
             message=failure.message if failure else "",
             outcomes=_group_items(timeline),

@@ -18,14 +18,7 @@ from executive.mission.text.file_search import read_source
 from executive.record.diagnosis.diagnose import diagnose
 from executive.record.recorded_mission import format_tree
 from executive.record.recorder import Recorder
-from executive.record.result import (
-    FINAL_STATUSES,
-    ItemCounts,
-    Result,
-    list_requests,
-    make_audit,
-    write_result,
-)
+from executive.record.result import FINAL_STATUSES, Audit, ItemCounts, Result, list_requests, write_result
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
 
@@ -92,11 +85,9 @@ def record_run(
     start_time = time.perf_counter()
     run = assemble(loaded, skills, options)
     with closing(run):
-        if record.starts_paused:
-            run.control.pause()
         directory = make_run_directory(run, loaded, options, runs_folder)
         recorder = Recorder(directory, saves_pictures=record.saves_pictures)
-        recorded_run = RecordedRun(run, loaded, skills, directory, recorder, record.views)
+        recorded_run = RecordedRun(run, loaded, skills, directory, recorder, record)
         result = recorded_run.execute(options.seed, start_time)
     if not record.saves_pictures and result.status in FINAL_STATUSES:
         # Only a resumption and a film need the log of the simulated world.
@@ -111,9 +102,7 @@ def make_run_directory(run: Run, loaded: LoadedMission, options: RunOptions, fol
         InputError: The directory cannot be made, or a file cannot be written.
     """
     scene = "" if options.scene is None else read_source(options.scene).text
-    directory = RunDirectory.create(
-        folder, mission=loaded.mission.name, seed=options.seed, start_time=datetime.now()
-    )
+    directory = RunDirectory.create(folder, loaded.mission.name, options.seed, datetime.now())
     directory.save_inputs(
         mission=loaded.text,
         params=loaded.params,
@@ -136,7 +125,7 @@ class RecordedRun:
         skills: Installed skills by name.
         directory: The run directory.
         recorder: Recorder of the run.
-        views: Views of the run.
+        options: Views of the run, and whether the run starts paused.
         earlier_events: Events from before the resumption of the run; the observers receive them first.
         start_message: Message that the views show at the start of the run, or "".
     """
@@ -146,7 +135,7 @@ class RecordedRun:
     skills: Mapping[str, type[Skill]]
     directory: RunDirectory
     recorder: Recorder
-    views: Sequence[View]
+    options: RecordOptions = RecordOptions()
     earlier_events: Iterable[TimedEvent] = ()
     start_message: str = ""
 
@@ -154,7 +143,7 @@ class RecordedRun:
         self._timeline = Timeline(has_history=False)
 
     def execute(self, seed: int, start_time: float) -> Result:
-        """Execute the run, write and return its result; `start_time` is from `time.perf_counter()` [s].
+        """Execute the run, write and return its result; `start_time` is a `time.perf_counter()` value [s].
 
         Raises:
             ExecutiveError: The result cannot be written.
@@ -170,7 +159,7 @@ class RecordedRun:
                 # Without a result file, the output of `--json` must report the problem.
                 result = replace(result, status="FAULT", reason="fault", message=str(error), node="")
         if any(problems):
-            for view in self.views:
+            for view in self.options.views:
                 view.show_message("; ".join(filter(None, problems)))
         return result
 
@@ -179,7 +168,7 @@ class RecordedRun:
     ) -> Result:
         """Return the result of the run from its end, its true object counts `audit`, and `wall_time` [s]."""
         workcell, path, timeline = self.run.workcell, self.directory.path, self._timeline
-        accounts = workcell.accounts
+        accounts, arm = workcell.accounts, workcell.cell.arm
         item_counts = accounts.count_states()
         return Result(
             mission=self.loaded.mission.name,
@@ -193,7 +182,7 @@ class RecordedRun:
             unknown_labels=accounts.unknown_labels,
             assumption_reasons=accounts.assumption_reasons,
             is_table_empty=run_end.is_table_empty,
-            audit=None if audit is None else make_audit(item_counts, audit, run_end.is_table_empty),
+            audit=None if audit is None else Audit.from_counts(item_counts, audit, run_end.is_table_empty),
             planning=timeline.planning,
             requests=list_requests(timeline),
             ticks=run_end.ticks,
@@ -201,17 +190,17 @@ class RecordedRun:
             wall_time_s=round(wall_time, 3),
             trace=self.recorder.trace,
             run=str(path),
-            diagnosis=diagnose(
-                timeline, run_end, self.loaded, self.skills, path, lambda: workcell.cell.arm.at_rest
-            ),
+            diagnosis=diagnose(timeline, run_end, self.loaded, self.skills, path, lambda: arm.at_rest),
         )
 
     def _execute_with_observers(self) -> tuple[RunEnded, Mapping[str, int] | None]:
         """Execute the run with all observers, close the observers, and return end and audit of the run."""
-        run, has_completed = self.run, False
-        observers: list[Observer] = [self._timeline, *self.views]
+        run, views, has_completed = self.run, self.options.views, False
+        observers: list[Observer] = [self._timeline, *views]
+        if self.options.starts_paused:
+            run.control.pause()
         try:
-            for view in self.views:
+            for view in views:
                 view.open(run)
                 if self.start_message:
                     view.show_message(self.start_message)
@@ -227,6 +216,6 @@ class RecordedRun:
             with contextlib.ExitStack() as exit_stack:
                 # An exception is reported at once, without waiting for the pictures.
                 exit_stack.callback(self.recorder.close, wait=has_completed)
-                for view in self.views:
+                for view in views:
                     exit_stack.callback(view.close)
         return end_and_audit

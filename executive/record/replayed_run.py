@@ -8,17 +8,9 @@ from pathlib import Path
 
 from pydantic import JsonValue
 
+from executive import events
 from executive.errors import InputError, escape_control_characters, shorten_quotations
-from executive.events import (
-    BranchChosen,
-    ItemChanged,
-    NodeEnded,
-    NodeStarted,
-    RunEnded,
-    TargetSelected,
-    TimedEvent,
-    ToolCommanded,
-)
+from executive.events import NodeEnded, NodeStarted, RunEnded, TimedEvent
 from executive.mission.load import LoadedMission
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.timeline.activation import get_skill_name
@@ -71,7 +63,7 @@ class ReplayResult:
 
 
 def replay_run(
-    path: Path, events: Iterable[TimedEvent], skills: Mapping[str, type[Skill]], mission: Path | None = None
+    path: Path, journal: Iterable[TimedEvent], skills: Mapping[str, type[Skill]], mission: Path | None = None
 ) -> ReplayResult:
     """Replay a recorded run with the installed skills, and compare its decisions with the journal.
 
@@ -79,7 +71,7 @@ def replay_run(
 
     Args:
         path: The run directory.
-        events: Events of the journal.
+        journal: Events of the journal.
         skills: Installed skills by name.
         mission: Mission file that replaces the recorded mission, or None. If the missions differ, only
             the decisions of skills and the states of items are compared.
@@ -87,24 +79,17 @@ def replay_run(
     Raises:
         InputError: The directory contains no run that can be replayed.
     """
-    log = InputLog.from_events(events)
+    log = InputLog.from_events(journal)
     start = log.start
     if start is None or not log.inputs:
-        raise InputError(
-            f'"{path}" contains no run that can be replayed: its journal contains no inputs of a run'
-        )
+        raise InputError(f'"{path}" contains no run that can be replayed: its journal has no inputs of a run')
     loaded = read_mission_of_run(path, start, skills, mission)
     edited = mission is not None and loaded.text != (path / "mission.yaml").read_text(encoding="utf-8")
     return replay_and_compare(loaded, skills, log, start.seed, edited=edited)
 
 
 def replay_and_compare(
-    loaded: LoadedMission,
-    skills: Mapping[str, type[Skill]],
-    log: InputLog,
-    seed: int,
-    *,
-    edited: bool = False,
+    loaded: LoadedMission, skills: Mapping[str, type[Skill]], log: InputLog, seed: int, edited: bool = False
 ) -> ReplayResult:
     """Replay a log with a mission, and compare the decisions with the log."""
     comparison = _Comparison(log, edited)
@@ -134,7 +119,7 @@ class _Comparison:
     def __init__(self, log: InputLog, edited: bool) -> None:
         self._log = log
         self._edited = edited
-        self._recorded_decisions = list(filter(None, (_to_decision(timed, edited) for timed in log.events)))
+        self._recorded_decisions = filter(None, (_to_decision(timed, edited) for timed in log.events))
         # If the journal lacks the end of the run, its last control step may be incomplete and is ignored.
         self._has_recorded_end = any(isinstance(timed.event, RunEnded) for timed in log.events)
         self._has_found_difference = False
@@ -144,13 +129,10 @@ class _Comparison:
         self.is_complete = True
 
     def __call__(self, timed: TimedEvent) -> None:
-        if self._has_found_difference:
-            return
         decision = _to_decision(timed, self._edited)
-        if decision is None:
+        if self._has_found_difference or decision is None:
             return
-        decisions, count = self._recorded_decisions, self.equal_count
-        recorded = decisions[count] if count < len(decisions) else None
+        recorded = next(self._recorded_decisions, None)
         if recorded == decision:
             self.equal_count += 1
             return
@@ -164,12 +146,12 @@ class _Comparison:
 
     def compare_end(self) -> None:
         """Compare the end of the replay with the end of the record; called after the replay."""
-        if self._has_found_difference or self.equal_count == len(self._recorded_decisions):
+        recorded = next(self._recorded_decisions, None)
+        if self._has_found_difference or recorded is None:
             return
         self.is_complete = False
-        next_decision = self._recorded_decisions[self.equal_count]
-        if self._is_in_complete_step(next_decision):
-            self.difference = (next_decision, None)
+        if self._is_in_complete_step(recorded):
+            self.difference = (recorded, None)
             self.missing_input_message = self.run.replayed_cell.missing_input_message
 
     def _is_in_complete_step(self, decision: TimedEvent) -> bool:
@@ -191,13 +173,13 @@ def _to_decision(timed: TimedEvent, edited: bool) -> TimedEvent | None:
             event = replace(event, node=get_skill_name(node) if edited else node)
             if isinstance(event, NodeEnded):
                 event = replace(event, message="", origin="")
-        case BranchChosen() if not edited:
+        case events.BranchChosen() if not edited:
             event = replace(event, message="")
-        case TargetSelected():
+        case events.TargetSelected():
             event = replace(event, frame=0)
-        case ItemChanged():
+        case events.ItemChanged():
             event = replace(event, position=(), looks=0, attempts=0, reason="")
-        case ToolCommanded():
+        case events.ToolCommanded():
             pass
         case _:
             return None
@@ -209,9 +191,8 @@ def _to_json(decision: TimedEvent | None) -> dict[str, JsonValue] | None:
     if decision is None:
         return None
     fields = {key: value for key, value in vars(decision.event).items() if value}
-    return {
-        "tick": decision.tick, "clock": decision.clock, "kind": type(decision.event).__name__, **fields
-    }  # fmt: skip
+    kind = type(decision.event).__name__
+    return {"tick": decision.tick, "clock": decision.clock, "kind": kind, **fields}
 
 
 def _describe_decision(decision: TimedEvent | None) -> str:

@@ -42,7 +42,8 @@ FINAL_STATUSES = ("SUCCESS", "FAILURE")
 class ItemCounts:
     """Number of items by final state.
 
-    The sum of placed, rejected, skipped and lost items is `seen`; a phantom is an item that does not exist.
+    The sum of placed, rejected, skipped and lost items is `seen`. A phantom is an item without an object:
+    all its detections were false.
     """
 
     seen: int = 0
@@ -59,8 +60,8 @@ class Audit:
 
     Attributes:
         agrees: True if the true places confirm the counts of the ledger.
-        right, wrong_bin, left, elsewhere: Number of objects in permitted bins, in other bins, on the table,
-            and at other places.
+        right, wrong_bin: Number of objects in a permitted bin, and in another bin.
+        left, elsewhere: Number of objects that are still on the table, and at other places.
         fell_in_wrong_bin, unseen: Number of objects that fell into a wrong bin; number of undetected objects.
     """
 
@@ -71,6 +72,12 @@ class Audit:
     elsewhere: int = 0
     fell_in_wrong_bin: int = 0
     unseen: int = 0
+
+    @staticmethod
+    def from_counts(items: Mapping[str, int], audit: Mapping[str, int], is_table_empty: bool) -> Audit:
+        """Return the true counts `audit`, compared with the counts `items` of the ledger."""
+        is_confirmed = is_confirmed_by_audit(items, audit, is_table_empty)
+        return Audit(is_confirmed, **{place: int(audit[place]) for place in AUDIT_KEYS})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,11 +90,11 @@ class Result:
         status, reason, message, node, is_table_empty, held_item, ticks: Fields of the event `RunEnded`.
         seed: Seed of all random numbers.
         items: Number of items by final state, from the ledger.
-        unknown_labels: Maximum number of boxes in one look, by label that the cell file does not declare.
+        unknown_labels: Maximum number of boxes in one look for each label that is not in the cell file.
         assumption_reasons: Reasons for which error rates of detectors were assumed.
         audit: True places of the objects, compared with `items`; None in a cell without ground truth.
         planning: Number of planned motions and waiting time for plans.
-        requests: Requests with which a scripted operator repeats the run.
+        requests: Requests of the operator, in order; a scripted operator repeats the run with them.
         robot_time_s, wall_time_s: Duration on the clock of the run and on a wall clock [s].
         trace: Hash of all decisions.
         run: Path of the run directory, or "".
@@ -124,10 +131,9 @@ def write_result(path: Path, result: Result) -> None:
         ExecutiveError: The file cannot be written.
     """
     advice = "the journal in the same folder and the output of --json contain the end of the run"
+    text = json.dumps(to_json(result), indent=2, ensure_ascii=False, allow_nan=False)
     with explain_os_errors(ExecutiveError, f'cannot write the result "{path}"', advice):
-        write_atomically(
-            path, json.dumps(to_json(result), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-        )
+        write_atomically(path, f"{text}\n")
 
 
 def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result | None:
@@ -145,20 +151,14 @@ def read_result(directory: RunDirectory, events: Sequence[TimedEvent]) -> Result
 
 
 def list_requests(timeline: Timeline) -> list[str]:
-    """Return the requests with which a scripted operator repeats the run.
+    """Return the requests of the operator; a scripted operator repeats the run with them.
 
-    Final requests to quit are redundant after another request: the operator quits after the last request.
+    Requests to quit at the end are omitted, because a scripted operator quits after its last request.
     """
     requests = [request or QUIT_REQUEST for request in timeline.requests]
     while len(requests) > 1 and requests[-1] == QUIT_REQUEST:
         requests.pop()
     return requests
-
-
-def make_audit(items: Mapping[str, int], audit: Mapping[str, int], is_table_empty: bool) -> Audit:
-    """Return the true counts `audit`, compared with the counts `items` of the ledger."""
-    is_confirmed = is_confirmed_by_audit(items, audit, is_table_empty)
-    return Audit(is_confirmed, **{place: int(audit[place]) for place in AUDIT_KEYS})
 
 
 def is_confirmed_by_audit(items: Mapping[str, int], audit: Mapping[str, int], is_table_empty: bool) -> bool:

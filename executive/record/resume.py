@@ -82,15 +82,11 @@ def resume_run(
         recorder.close(wait=False)
         raise
     with closing(run):
-        if record.starts_paused:
-            run.control.pause()
         replayed_events = run.replayed_cell.log.events
         recorder.add_to_trace(replayed_events)
         earlier_events = [each for each in replayed_events if isinstance(each.event, EVENTS_WITHOUT_REPLAY)]
         message = _describe_missing_commands(run.replayed_cell)
-        recorded_run = RecordedRun(
-            run, loaded, skills, directory, recorder, record.views, earlier_events, message
-        )
+        recorded_run = RecordedRun(run, loaded, skills, directory, recorder, record, earlier_events, message)
         return recorded_run.execute(start.seed, start_time)
 
 

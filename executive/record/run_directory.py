@@ -21,8 +21,6 @@ SCENE_FILE = "scene.yaml"
 """Name of the copy of the scene file."""
 NO_SPACE_ERRORS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 """Values of `errno` for a full disk, an exceeded quota and a file that is too large."""
-_OTHER_FOLDER_ADVICE = "name another folder with --runs DIR"
-"""Advice if the folder of the runs cannot be used."""
 
 
 class RunDirectory:
@@ -54,7 +52,7 @@ class RunDirectory:
         return path if path.is_file() else None
 
     @staticmethod
-    def create(runs: Path, *, mission: str, seed: int, start_time: datetime) -> RunDirectory:
+    def create(runs: Path, mission: str, seed: int, start_time: datetime) -> RunDirectory:
         """Make and return a directory below the folder `runs`, named after start time, mission and seed.
 
         If this name exists already, the new directory gets the suffix `-2`, `-3`, ....
@@ -119,12 +117,11 @@ def check_runs_folder(runs: Path) -> None:
     with convert_os_errors(f'make a run directory below "{runs}"'):
         runs.mkdir(parents=True, exist_ok=True)
         # A read-only file system is detected only when a directory is made.
-        with TemporaryDirectory(prefix=".try-", dir=runs):
-            pass
+        TemporaryDirectory(prefix=".try-", dir=runs).cleanup()
 
 
 @contextlib.contextmanager
-def convert_os_errors(action: str, advice: str = _OTHER_FOLDER_ADVICE) -> Iterator[None]:
+def convert_os_errors(action: str, advice: str = "name another folder with --runs DIR") -> Iterator[None]:
     """Convert an OSError in the `with` block to an InputError with the failed action and advice."""
     try:
         yield

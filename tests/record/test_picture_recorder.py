@@ -91,12 +91,13 @@ def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
     scene = drawn["000012_cube-1.jpg"]
     assert (scene.mission, scene.clock, scene.age) == ("sort", 0.75, 0.25)
     assert (scene.camera, scene.detector) == ("overhead", "embedded")
-    assert (scene.phase, scene.item, scene.bin, scene.attempts) == ("SelectTarget", "cube-1", "red_bin", 1)
+    assert (scene.running_skills, scene.failed_attempts) == (["SelectTarget"], 1)
+    assert (scene.item, scene.bin) == ("cube-1", "red_bin")
     assert [(seen.label, seen.box) for seen in scene.detections] == [
         ("duck", (20, 90, 50, 120)),
         ("cube", (20, 40, 50, 70)),
     ]
-    assert (scene.selected, scene.failure, scene.message) == (1, "", "")
+    assert (scene.selected_index, scene.failure, scene.message) == (1, "", "")
     assert scene.outcomes == {"yellow_bin": ["duck-1"]}
     assert scene.classes == ("cube", "duck")
 
@@ -113,7 +114,7 @@ def test_a_picture_says_what_the_run_is_about(tmp_path, drawn):
 def test_the_chosen_box_is_the_nearest_else_the_only_of_its_class(tmp_path, drawn, found, position, expected):
     known = [] if position is None else item("cube-1", "seen", position=position)
     shown(tmp_path, look(1, *found), known, decision())
-    assert drawn["000012_cube-1.jpg"].selected == expected
+    assert drawn["000012_cube-1.jpg"].selected_index == expected
 
 
 def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
@@ -124,9 +125,9 @@ def test_a_failed_attempt_is_drawn_on_what_was_decided_from(tmp_path, drawn):
     )  # fmt: skip
     scene = drawn["000090_cube-1_missed.jpg"]
     assert (scene.failure, scene.message) == ("Grasp.missed", "it was missed")
-    assert (scene.phase, scene.attempts, scene.age) == ("Grasp", 1, 1.5)
+    assert (scene.running_skills, scene.failed_attempts, scene.age) == (["Grasp"], 1, 1.5)
     assert len(scene.detections) == 1
-    assert (scene.selected, scene.item, scene.bin) == (0, "cube-1", "red_bin")
+    assert (scene.selected_index, scene.item, scene.bin) == (0, "cube-1", "red_bin")
 
 
 def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
@@ -136,7 +137,7 @@ def test_a_look_that_leads_to_nothing_is_drawn_once(tmp_path, drawn):
     )  # fmt: skip
     ((name, scene),) = drawn.items()
     assert name == "000020_unseen.jpg"
-    assert (scene.failure, scene.item, scene.selected) == ("SelectTarget.unseen", "", None)
+    assert (scene.failure, scene.item, scene.selected_index) == ("SelectTarget.unseen", "", None)
 
 
 def test_what_fails_because_a_skill_failed_is_not_drawn_again(tmp_path, drawn):

@@ -103,7 +103,7 @@ def test_where_the_record_has_no_answer_it_says_so(missions: Path, tmp_path: Pat
 
 
 def test_a_directory_without_answers_cannot_be_replayed(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="can be replayed: its journal contains no inputs"):
+    with pytest.raises(InputError, match="can be replayed: its journal has no inputs"):
         replay_run(tmp_path, [], load_skills())
 
 

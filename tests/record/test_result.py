@@ -10,12 +10,12 @@ import pytest
 from executive.cell.json_values import to_json
 from executive.errors import ExecutiveError
 from executive.record.result import (
+    Audit,
     ItemCounts,
     Result,
     describe_disagreement,
     find_exit_code,
     list_requests,
-    make_audit,
     read_result,
     write_result,
 )
@@ -30,7 +30,7 @@ def result(audit=AUDIT, status="SUCCESS", empty=True) -> Result:
     return Result(
         mission="sort", seed=7, status=status, reason="", message="", node="", is_table_empty=empty,
         items=ITEMS,
-        audit=None if audit is None else make_audit(asdict(ITEMS), audit, empty), ticks=240, run="r",
+        audit=None if audit is None else Audit.from_counts(asdict(ITEMS), audit, empty), ticks=240, run="r",
     )  # fmt: skip
 
 

@@ -51,7 +51,7 @@ def record_trial(
     run, loaded = trial_run.run, mission.loaded
     with closing(run):
         directory = make_run_directory(run, loaded, trial_run.options, runs)
-        recorded_run = RecordedRun(run, loaded, mission.skills, directory, Recorder(directory), ())
+        recorded_run = RecordedRun(run, loaded, mission.skills, directory, Recorder(directory))
         result = recorded_run.execute(mission.seed, start_time)
         try_write_report(result.run)
         return trial_run.make_trial(trial_run.run_end), directory.path

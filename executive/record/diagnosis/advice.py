@@ -64,23 +64,21 @@ def _list_changes(run: FailedRun) -> Iterator[str]:
     """Yield changes of the mission after which the failure would not end the run."""
     if not run.failure_path:
         return
+    # A control node with a `remedy` can handle failures, for instance `try`.
     changes = [
-        (entry, advice)
+        (bool(entry.control_node.remedy), entry, advice)
         for entry in reversed(run.failure_path)
         if entry.control_node
         for advice in entry.control_node.advise(entry.failure)
     ]
-    # A control node with a `remedy` can handle failures, for instance `try`.
-    handler_changes = [
-        (entry, advice) for entry, advice in changes if entry.control_node and entry.control_node.remedy
-    ]
-    if handler_changes:
-        yield _format_advice(run, *handler_changes[0])
+    handler_change = next(((entry, advice) for is_handler, entry, advice in changes if is_handler), None)
+    if handler_change:
+        yield _format_advice(run, *handler_change)
     else:
         remedy = next(node.remedy for node in load_control_nodes().values() if node.remedy)
         yield f"{remedy} {run.format_place(run.failure_path[-1].node)}"
-    for entry, advice in changes:
-        if (entry, advice) not in handler_changes:
+    for is_handler, entry, advice in changes:
+        if not is_handler:
             yield _format_advice(run, entry, advice)
             # Changes of ancestors are omitted: the innermost node with attempts should be changed first.
             if entry.attempt:

@@ -12,7 +12,7 @@ from executive.events import RunEnded
 from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import Node, SkillNode
 from executive.record.diagnosis.advice import list_advice
-from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, ItemFailure, LostItem, PassedNode
+from executive.record.diagnosis.diagnosis import DecidingNode, Diagnosis, FailureNode, ItemFailure, LostItem
 from executive.record.diagnosis.failed_run import FailedRun, describe_cause
 from executive.record.picture_recorder import find_picture
 from executive.record.result import FINAL_STATUSES
@@ -78,7 +78,7 @@ def diagnose(
         node=_make_deciding_node(run),
         item=run.item,
         passed_nodes=[
-            PassedNode(entry.node.path, entry.name, _format_source_location(entry.node), entry.explanation)
+            FailureNode(entry.node.path, entry.name, _format_source_location(entry.node), entry.explanation)
             for entry in run.failure_path
             if entry.explanation or entry is run.failure_path[-1]
         ],
@@ -146,11 +146,9 @@ def _find_picture_file(run: FailedRun, run_folder: Path) -> str:
     item = run.timeline.items.by_name.get(run.item)
     if run.lost_items and item is not None and item.failure is not None:
         reason = item.failure.reason
-    for picture_reason in (reason, ""):
-        file = find_picture(run_folder / "frames", run.item, picture_reason)
-        if file is not None:
-            return file.relative_to(run_folder).as_posix()
-    return ""
+    folder = RunDirectory(run_folder).pictures
+    file = find_picture(folder, run.item, reason) or find_picture(folder, run.item, "")
+    return file.relative_to(run_folder).as_posix() if file else ""
 
 
 def _describe_arm(is_at_rest: Callable[[], bool]) -> str:

@@ -25,7 +25,7 @@ class DecidingNode:
 
 
 @dataclass(frozen=True)
-class PassedNode:
+class FailureNode:
     """Control node that did not handle a failure, or node in which the failure began (origin).
 
     Attributes:
@@ -85,13 +85,13 @@ class Diagnosis:
         mission: Path of the mission file.
         verdict: Sentence with the cause of the end of the run.
         node: Node that determined the status, or None.
-        item: Name of the item on which `node` or a halted skill worked, or of a lost item, or "".
+        item: Name of the item of `node`, else of a halted skill, else of the first lost item; "" for none.
         passed_nodes: Nodes that did not handle the failure, from the root down, and the origin.
         readings: Inputs that the failed skill read from the cell, the latest first.
-        last_look: Last look in which `item` was detected, or else the last look; None without a look.
+        last_look: Last look with a detection of `item`, else the last look of the run; None without a look.
         lost_items: Items whose loss made the run fail.
         halted_skills: Names of the halted skills with their items: `Grasp of cube-1`.
-        unsorted_items: Names of the items that have a route and were not sorted.
+        unsorted_items: Names of the unsorted items whose class has a bin.
         arm_state: `at rest`, or a text about the state of the arm.
         held_item: Item that the tool holds, `something` for an unknown object, or "".
         raised_at: File, line and function in which the exception of a fault was raised, or "".
@@ -108,7 +108,7 @@ class Diagnosis:
     verdict: str
     node: DecidingNode | None
     item: str
-    passed_nodes: Sequence[PassedNode]
+    passed_nodes: Sequence[FailureNode]
     readings: Sequence[Reading]
     last_look: Sighting | Look | None
     lost_items: Sequence[LostItem]

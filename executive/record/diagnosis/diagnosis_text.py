@@ -40,10 +40,8 @@ def format_diagnosis(diagnosis: Diagnosis, folder: str, repeat_command: str, rep
 
     The run directory is `folder`; `report` is the path of the report, or "".
     """
-    lines = wrap_lines(
-        f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}", "", "  ", max_lines=3
-    )
-    lines += _format_failure_path(diagnosis)
+    heading = f"{diagnosis.status} after {diagnosis.clock:.2f} s: {diagnosis.verdict}"
+    lines = wrap_lines(heading, "", "  ", max_lines=3) + _format_failure_path(diagnosis)
     for label, text in list_labelled_sentences(diagnosis):
         lines += wrap_lines(text, f"{label:{_LABEL_WIDTH}}", " " * _LABEL_WIDTH, max_lines=3)
     commands = {"record": folder, "report": report, "repeat": repeat_command}
@@ -81,11 +79,8 @@ def list_labelled_sentences(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
 
 def _format_failure_path(diagnosis: Diagnosis) -> list[str]:
     """Return a line for each node that did not handle the failure, and for the origin of the failure."""
-    mission_prefix = f"{diagnosis.mission}:"
-    rows = [
-        (entry.name, entry.explanation, entry.place) for entry in diagnosis.passed_nodes if entry.explanation
-    ]
-    node = diagnosis.node
+    mission_prefix, node = f"{diagnosis.mission}:", diagnosis.node
+    rows = [(each.name, each.explanation, each.place) for each in diagnosis.passed_nodes if each.explanation]
     if not rows or node is None:
         return []
     omitted = f", {len(rows) - MAX_SHOWN_NODES} nodes omitted" if len(rows) > MAX_SHOWN_NODES else ""

@@ -27,14 +27,14 @@ class FailedRun:
         deciding_activation: Last activation of the node that determined the status, or None.
         deciding_node: Node of the mission that determined the status, or None.
         halted_skills: Paths of the skills that the end of the run or `deciding_node` halted.
-        item: Name of the item on which `deciding_node` or a halted skill worked, or of a lost item, or "".
+        item: Name of the item of `deciding_node`, else of a halted skill, else of the first lost item, or "".
         is_record_lost: True if the run ended because the journal could not be written.
     """
 
     def __init__(self, loaded: LoadedMission, timeline: Timeline, end: RunEnded) -> None:
         self.loaded, self.timeline, self.end = loaded, timeline, end
         is_failure, tree = end.status == "FAILURE", loaded.tree
-        self.failure_path = find_failure_path(tree, timeline, end.node, end.reason) if is_failure else ()
+        self.failure_path = find_failure_path(tree, timeline, end.node, end.reason) if is_failure else []
         # Lost items make a run fail after its tree has succeeded; then no node determined the status.
         self.lost_items = {
             name: item
@@ -83,10 +83,8 @@ def describe_cause(run: FailedRun) -> str:
 
 def _describe_attempt(run: FailedRun) -> str:
     """Return the number of the failed attempt of the innermost retry as text; "" for the first attempt."""
-    attempts = next((entry.attempt for entry in reversed(run.failure_path) if entry.attempt), None)
-    if attempts is None:
-        return ""
-    attempt, max_attempts = attempts
+    attempts = (entry.attempt for entry in reversed(run.failure_path) if entry.attempt)
+    attempt, max_attempts = next(attempts, (1, 1))
     if attempt == 1:
         return ""
     if attempt == max_attempts:

@@ -51,9 +51,7 @@ class FailurePathNode:
         return self.control_node.count_attempts(self.failure) if self.control_node else None
 
 
-def find_failure_path(
-    tree: Node, timeline: Timeline, origin: str, failure: str
-) -> tuple[FailurePathNode, ...]:
+def find_failure_path(tree: Node, timeline: Timeline, origin: str, failure: str) -> list[FailurePathNode]:
     """Return the nodes through which a failure propagated, from the root to the origin.
 
     `origin` is the path of the node in which the failure with the name `failure` (`Grasp.missed`) began.
@@ -72,7 +70,7 @@ def find_failure_path(
         propagated = _make_propagated_failure(timeline, node.path, control_node, child, reasons)
         failure_path.append(FailurePathNode(node, subtree, control_node, propagated))
         source_names |= {node.label} if node.label else set()
-    return tuple(reversed(failure_path))
+    return failure_path[::-1]
 
 
 def _make_propagated_failure(

@@ -24,7 +24,7 @@ CLOSE_UP_SCALE = 2.0
 LINE_WIDTH, SELECTED_LINE_WIDTH, OUTLINE_WIDTH = 2, 3, 1
 """Line widths of a box, of the selected box, and of the outline around the selected box [pixel]."""
 
-TEXT_SCALE, TEXT_PADDING = 0.36, 2
+TEXT_SCALE, PADDING = 0.36, 2
 """Font scale of captions in OpenCV, and padding around captions [pixel]."""
 
 
@@ -38,11 +38,11 @@ def draw_picture(content: PictureContent) -> NDArray[np.uint8]:
     size = (PICTURE_WIDTH, round(height * scale))
     shaded_image = _shade_occlusions(image_bgr, content.visible)
     image_with_boxes = _draw_boxes(cv2.resize(shaded_image, size).astype(np.uint8), content, scale)
-    if content.selected is None:
+    if content.selected_index is None:
         status_bar = draw_status_bar(content, PICTURE_WIDTH)
     else:
         status_bar = draw_status_bar(content, PICTURE_WIDTH, text_start=STATUS_BAR_HEIGHT)
-        selected = content.detections[content.selected]
+        selected = content.detections[content.selected_index]
         colour = choose_class_colour(selected.label, content.classes)
         status_bar[:, :STATUS_BAR_HEIGHT] = _draw_close_up(image_bgr, selected.box, colour)
     return np.vstack([image_with_boxes, status_bar])[:, :, ::-1]
@@ -83,12 +83,11 @@ def _draw_boxes(image: NDArray[np.uint8], content: PictureContent, scale: float)
         return image
     indices = np.arange(len(content.detections))
     boxes = np.array([detection.box for detection in content.detections]) * scale
-    colours = sv.ColorPalette.from_hex(
-        [choose_class_colour(detection.label, content.classes) for detection in content.detections]
-    )
+    class_colours = [choose_class_colour(each.label, content.classes) for each in content.detections]
+    colours = sv.ColorPalette.from_hex(class_colours)
     detections = sv.Detections(boxes, class_id=indices)
-    unselected = cast("sv.Detections", detections[indices != content.selected])
-    selected = cast("sv.Detections", detections[indices == content.selected])
+    unselected = cast("sv.Detections", detections[indices != content.selected_index])
+    selected = cast("sv.Detections", detections[indices == content.selected_index])
     outline = sv.Color.from_hex(OUTLINE)
     for layer, colour, line_width in (
         (unselected, colours, LINE_WIDTH), (selected, outline, SELECTED_LINE_WIDTH + 2 * OUTLINE_WIDTH),
@@ -96,17 +95,13 @@ def _draw_boxes(image: NDArray[np.uint8], content: PictureContent, scale: float)
     ):  # fmt: skip
         image = sv.BoxAnnotator(colour, line_width).annotate(image, layer)
     return sv.LabelAnnotator(
-        colours,
-        text_color=sv.Color.BLACK,
-        text_scale=TEXT_SCALE,
-        text_padding=TEXT_PADDING,
-        smart_position=True,
+        colours, text_color=sv.Color.BLACK, text_scale=TEXT_SCALE, text_padding=PADDING, smart_position=True
     ).annotate(image, detections, make_captions(content))
 
 
 def make_captions(content: PictureContent) -> list[str]:
     """Return the caption of each box: name of the item or class, and confidence of the detection."""
     names = [detection.label for detection in content.detections]
-    if content.selected is not None:
-        names[content.selected] = content.item or names[content.selected]
+    if content.selected_index is not None:
+        names[content.selected_index] = content.item or names[content.selected_index]
     return [f"{name} {each.confidence:.2f}" for name, each in zip(names, content.detections, strict=True)]

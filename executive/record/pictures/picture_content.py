@@ -19,18 +19,18 @@ class PictureContent:
         image: Camera image `(H, W, 3)`, RGB, 0 to 255.
         visible: Mask `(H, W)`, False for pixels in which the arm occludes the scene; None if unknown.
         detections: All detections in the image.
-        selected: Index in `detections` of the detection of `item`, or None.
+        selected_index: Index in `detections` of the detection of `item`, or None.
         mission: Name of the mission.
         clock: Time on the clock of the run [s].
         camera, detector: Names of the camera and of the detector.
         age: Time since the capture of the image [s].
-        phase: Names of the running skills as text: `Transit + Observe`.
+        running_skills: Names of the running skills.
         item: Name of the selected item, or "".
         bin: Name of the destination of the item, or "".
-        attempts: Number of failed attempts to pick the item.
+        failed_attempts: Number of failed attempts to pick the item.
         failure: Name of the failed skill and reason of the failure (`Grasp.missed`), or "".
         message: Message of the failure, or "".
-        outcomes: Names of items by bin of placed items or by state (`in the tool`, `rejected`, ...).
+        outcomes: Names of the items in each bin and in each other state (`in the tool`, `rejected`, ...).
         classes: Detected classes; the index of a class determines its colour.
     """
 
@@ -38,16 +38,16 @@ class PictureContent:
     visible: NDArray[np.bool_] | None = None
     _: KW_ONLY
     detections: Sequence[Detection] = ()
-    selected: int | None = None
+    selected_index: int | None = None
     mission: str = ""
     clock: float = 0.0
     camera: str = ""
     detector: str = ""
     age: float = 0.0
-    phase: str = ""
+    running_skills: Sequence[str] = ()
     item: str = ""
     bin: str = ""
-    attempts: int = 0
+    failed_attempts: int = 0
     failure: str = ""
     message: str = ""
     outcomes: Mapping[str, Sequence[str]] = field(default_factory=dict)

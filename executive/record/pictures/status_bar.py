@@ -41,30 +41,27 @@ class StatusBarText:
         title: Failure with its item; without a failure, the selected item with its bin.
         lines: One line with running skills and attempts, and one line with the message of the failure.
         notes: One line with mission, time and meaning of the shading, and one line about the image.
-        outcomes: Name of each bin or state, with the names of its items.
     """
 
     title: str
     lines: tuple[str, ...]
     notes: tuple[str, ...]
-    outcomes: tuple[tuple[str, tuple[str, ...]], ...]
 
 
 def make_status_bar_text(content: PictureContent) -> StatusBarText:
-    """Return the text of the status bar of a picture."""
-    item, count = content.item, content.attempts
+    """Return the text on the left side of the status bar of a picture."""
+    item, count = content.item, content.failed_attempts
     selection = f"{item} to {content.bin}" if content.bin else item
     title = ": ".join(filter(None, (content.failure, item))) if content.failure else selection
-    phase = f"phase: {content.phase}" if content.phase else ""
+    skills = f"phase: {' + '.join(content.running_skills)}" if content.running_skills else ""
     attempts = f"{count} failed attempt{'s' if count > 1 else ''}" if count else ""
-    lines = tuple(filter(None, (", ".join(filter(None, (phase, attempts))), content.message)))
+    lines = tuple(filter(None, (", ".join(filter(None, (skills, attempts))), content.message)))
     source = " by ".join(filter(None, (content.camera, content.detector)))
     image = f"{source}, {content.age:.2f} s old" if source else ""
     has_occlusion = content.visible is not None and not content.visible.all()
     shading = "shaded: occluded by the arm" if has_occlusion else ""
     notes = ("   ".join(filter(None, (content.mission, f"{content.clock:.2f} s", shading))), image)
-    outcomes = tuple((outcome, tuple(items)) for outcome, items in content.outcomes.items())
-    return StatusBarText(title, lines, tuple(filter(None, notes)), outcomes)
+    return StatusBarText(title, lines, tuple(filter(None, notes)))
 
 
 def draw_status_bar(content: PictureContent, width: int, text_start: int = 0) -> NDArray[np.uint8]:
@@ -84,13 +81,13 @@ def draw_status_bar(content: PictureContent, width: int, text_start: int = 0) ->
         _write(bar, line, x, row, TEXT)
     for row, note in enumerate(text.notes, start=ROW_COUNT - len(text.notes)):
         _write(bar, truncate(note, is_fitting), x, row, SECONDARY_TEXT)
-    if not text.outcomes:
+    if not content.outcomes:
         _write(bar, "no item sorted", outcome_x, 0, SECONDARY_TEXT)
     is_fitting_name = _make_width_check(_OUTCOME_NAME_WIDTH - MARGIN)
     is_fitting_list = _make_width_check(width - outcome_x - _OUTCOME_NAME_WIDTH - MARGIN)
-    for row, (outcome, items) in enumerate(_limit_outcomes(text.outcomes)):
+    for row, (outcome, items) in enumerate(_limit_outcomes(list(content.outcomes.items()))):
         _write(bar, truncate(outcome, is_fitting_name), outcome_x, row, SECONDARY_TEXT)
-        _write(bar, join_last_names(items, is_fitting_list), outcome_x + _OUTCOME_NAME_WIDTH, row, TEXT)
+        _write(bar, join_latest_names(items, is_fitting_list), outcome_x + _OUTCOME_NAME_WIDTH, row, TEXT)
     return bar
 
 
@@ -114,8 +111,8 @@ def truncate(text: str, is_fitting: Callable[[str], bool]) -> str:
     return f"{text[:length]}..."
 
 
-def join_last_names(names: Sequence[str], is_fitting: Callable[[str], bool]) -> str:
-    """Return as many of the last names as fit, followed by the number of omitted names (`+3`)."""
+def join_latest_names(names: Sequence[str], is_fitting: Callable[[str], bool]) -> str:
+    """Return as many of the latest names as fit, followed by the number of omitted names (`+3`)."""
     for omitted_count in range(len(names)):
         text = ", ".join(names[omitted_count:]) + (f" +{omitted_count}" if omitted_count else "")
         if is_fitting(text):
@@ -123,12 +120,12 @@ def join_last_names(names: Sequence[str], is_fitting: Callable[[str], bool]) -> 
     return str(len(names)) if names else ""
 
 
-def _limit_outcomes(outcomes: Sequence[tuple[str, tuple[str, ...]]]) -> Sequence[tuple[str, tuple[str, ...]]]:
+def _limit_outcomes(outcomes: Sequence[tuple[str, Sequence[str]]]) -> Sequence[tuple[str, Sequence[str]]]:
     """Return at most `ROW_COUNT` outcomes; the last row merges all outcomes that do not fit."""
     if len(outcomes) <= ROW_COUNT:
         return outcomes
     merged_items = [item for _, items in outcomes[ROW_COUNT - 1 :] for item in items]
-    return [*outcomes[: ROW_COUNT - 1], (f"{len(outcomes) - ROW_COUNT + 1} more", tuple(merged_items))]
+    return [*outcomes[: ROW_COUNT - 1], (f"{len(outcomes) - ROW_COUNT + 1} more", merged_items)]
 
 
 def _make_width_check(max_width: float, scale: float = _TEXT_SCALE) -> Callable[[str], bool]:

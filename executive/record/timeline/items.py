@@ -37,8 +37,8 @@ class Sighting:
         item: Name of the item.
         attempts: Number of failed attempts to pick the item.
         looks: Number of looks in which the item was detected, up to this look.
-        label, confidence: Class and confidence of the detection nearest to the item.
-        position: Position of that detection `(3,)` [m]; all three are None without confident detections.
+        label, confidence: Class and confidence of the detection nearest to the item, or None.
+        position: Position `(3,)` of the detection nearest to the item [m], or None.
     """
 
     frame: int
@@ -127,7 +127,7 @@ class ItemsTimeline:
         self._detected_items.clear()
 
     def find_items_in_states(self, *states: str) -> dict[str, ItemHistory]:
-        """Return the items by name that were in `states` at the tree's end and are not placed or phantoms."""
+        """Return the items whose state at the tree's end is in `states`, except placed items and phantoms."""
         return {
             name: item
             for name, item in self.by_name.items()

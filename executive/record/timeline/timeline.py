@@ -37,7 +37,7 @@ class Timeline:
         activation_by_path: Last activation of each node, by path of the node.
         end_counts: Number of ended activations by status, for each node by path.
         last_end: Activation that ended last, or None.
-        halted_skills: Paths of the skills that were halted since a node last started, succeeded or failed.
+        halted_skills: Paths of the skills halted after the last start, success or failure of a node.
         activations: All activations in the order of their starts.
         items: History of the items.
         selections: Last selection of each item as a target, by name of the item.

@@ -34,7 +34,7 @@ def edge(picture: np.ndarray, row: int, column: int) -> list[tuple[int, ...]]:
 
 
 def test_the_chosen_box_is_thick_and_rimmed_the_others_are_thin():
-    picture = draw_picture(scene(CUBE, DUCK, selected=0))
+    picture = draw_picture(scene(CUBE, DUCK, selected_index=0))
     chosen, other = edge(picture, 230, 100), edge(picture, 120, 300)
     assert chosen[5] == rgb(PALETTE[0]) and other[5] == rgb(PALETTE[1])
     assert chosen.count(chosen[5]) > other.count(other[5])
@@ -45,7 +45,7 @@ def test_the_chosen_box_is_thick_and_rimmed_the_others_are_thin():
 def test_the_strip_is_below_the_image_with_a_close_up_of_the_choice():
     image = np.full((480, 640, 3), GREY, np.uint8)
     image[200:260, 100:160] = (200, 30, 30)
-    picture = draw_picture(replace(scene(CUBE, selected=0), image=image))
+    picture = draw_picture(replace(scene(CUBE, selected_index=0), image=image))
     assert picture.shape == (480 + STATUS_BAR_HEIGHT, PICTURE_WIDTH, 3)
     assert tuple(picture[480 + STATUS_BAR_HEIGHT // 2, STATUS_BAR_HEIGHT // 2]) == (200, 30, 30)
     assert tuple(picture[480 + STATUS_BAR_HEIGHT // 8, STATUS_BAR_HEIGHT // 8]) == (GREY,) * 3
@@ -61,7 +61,7 @@ def test_without_a_choice_every_box_is_thin_and_there_is_no_close_up():
 
 def test_a_choice_at_the_edge_of_an_image_is_drawn_and_the_image_left_alone():
     cut_off = replace(CUBE, box=(-10.0, 460.0, 20.0, 490.0))
-    drawn = scene(cut_off, selected=0, visible=np.zeros((480, 640), bool))
+    drawn = scene(cut_off, selected_index=0, visible=np.zeros((480, 640), bool))
     assert draw_picture(drawn).shape == (480 + STATUS_BAR_HEIGHT, PICTURE_WIDTH, 3)
     assert (drawn.image == GREY).all()
 
@@ -89,8 +89,8 @@ def test_every_picture_is_as_wide_and_its_boxes_go_with_it(width):
 
 
 def test_a_label_says_the_class_and_the_confidence_that_of_the_choice_the_item():
-    assert make_captions(scene(CUBE, DUCK, selected=1, item="duck-3")) == ["cube 0.90", "duck-3 0.70"]
-    assert make_captions(scene(CUBE, selected=0)) == ["cube 0.90"]
+    assert make_captions(scene(CUBE, DUCK, selected_index=1, item="duck-3")) == ["cube 0.90", "duck-3 0.70"]
+    assert make_captions(scene(CUBE, selected_index=0)) == ["cube 0.90"]
 
 
 def test_the_labels_of_boxes_side_by_side_do_not_cover_each_other():

@@ -15,7 +15,7 @@ from executive.record.pictures.picture_content import PictureContent
 SCENE = PictureContent(
     np.full((480, 640, 3), 150, np.uint8),
     detections=[Detection("cube", 0.9, (100, 200, 160, 260))],
-    selected=0,
+    selected_index=0,
     classes=("cube",),
 )
 

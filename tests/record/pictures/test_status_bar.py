@@ -10,7 +10,7 @@ from executive.record.pictures.status_bar import (
     ROW_COUNT,
     STATUS_BAR_HEIGHT,
     draw_status_bar,
-    join_last_names,
+    join_latest_names,
     make_status_bar_text,
     truncate,
     wrap_text,
@@ -26,19 +26,17 @@ def at_most(count: int):
 @pytest.mark.parametrize(
     ("scene", "title", "lines"),
     [
-        ({"item": "cube-1", "bin": "red_bin", "phase": "SelectTarget"},
+        ({"item": "cube-1", "bin": "red_bin", "running_skills": ["SelectTarget"]},
          "cube-1 to red_bin", ("phase: SelectTarget",)),
-        ({"item": "cube-1", "bin": "red_bin", "phase": "Grasp", "attempts": 2, "failure": "Grasp.missed",
-          "message": "no seal on cube-1"},
+        ({"item": "cube-1", "bin": "red_bin", "running_skills": ["Grasp"], "failed_attempts": 2,
+          "failure": "Grasp.missed", "message": "no seal on cube-1"},
          "Grasp.missed: cube-1", ("phase: Grasp, 2 failed attempts", "no seal on cube-1")),
         ({"failure": "SelectTarget.unseen"}, "SelectTarget.unseen", ()),
     ],
 )  # fmt: skip
 def test_a_decision_shows_its_bin_and_a_failure_its_reason(scene, title, lines):
-    fates = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
-    said = make_status_bar_text(PictureContent(IMAGE, outcomes=fates, **scene))
+    said = make_status_bar_text(PictureContent(IMAGE, **scene))
     assert (said.title, said.lines) == (title, lines)
-    assert said.outcomes == (("red_bin", ("cube-1", "cube-2")), ("rejected", ("duck-1",)))
 
 
 def test_the_strip_says_where_and_when():
@@ -57,8 +55,8 @@ def test_the_strip_says_where_and_when():
     [(30, "a-1, a-2, a-3, a-4"), (17, "a-2, a-3, a-4 +1"), (12, "a-3, a-4 +2"), (7, "a-4 +3"), (3, "4")],
 )
 def test_a_long_list_keeps_its_newest(room, expected):
-    assert join_last_names(["a-1", "a-2", "a-3", "a-4"], at_most(room)) == expected
-    assert join_last_names([], at_most(room)) == ""
+    assert join_latest_names(["a-1", "a-2", "a-3", "a-4"], at_most(room)) == expected
+    assert join_latest_names([], at_most(room)) == ""
 
 
 def test_a_text_is_wrapped_between_words_and_cut_where_it_must():

@@ -87,9 +87,8 @@ def _make_inference_function(settings: dict[str, Any]) -> InferenceFunction:
     key = os.environ.get(KEY_VARIABLE, "").strip() or None
     client = InferenceHTTPClient(settings["url"].rstrip("/"), key)
     # By default, inference-sdk puts the key into URLs, and the URLs into error messages.
-    client.configure(
-        InferenceConfiguration(confidence_threshold=settings["confidence"], api_key_transport="header")
-    )
+    confidence = settings["confidence"]
+    client.configure(InferenceConfiguration(confidence_threshold=confidence, api_key_transport="header"))
     if settings["api"] == "v0":
         client.select_api_v0()
     elif settings["api"] == "v1":
