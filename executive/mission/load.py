@@ -20,7 +20,7 @@ from executive.mission.model.mission import Mission
 from executive.mission.model.node_paths import assign_paths
 from executive.mission.model.nodes import InvalidNode, Node
 from executive.mission.parse.cell_file import CellFile
-from executive.mission.parse.read_mission import MissionFiles, RecordedCell, read_mission
+from executive.mission.parse.read_mission import MissionFiles, read_mission
 from executive.mission.parse.validate import find_span
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
@@ -75,7 +75,7 @@ def load_mission(
     skills: Mapping[str, type[Skill]],
     overrides: Mapping[str, str] | None = None,
     find_cell_kind: CellKindFinder | None = None,
-    recorded_cell: RecordedCell | None = None,
+    recorded_cell: CellFile | None = None,
 ) -> LoadedMission:
     """Return a mission that has passed all checks.
 
@@ -84,7 +84,7 @@ def load_mission(
         skills: Installed skills by name.
         overrides: Values as text, by name of a param or by `cell.<key>.<key>` for a key of the cell.
         find_cell_kind: Function that returns the kind of a cell; None to skip the checks by the cell kind.
-        recorded_cell: Cell that replaces the cell file, or None.
+        recorded_cell: Cell of a recorded run, which replaces the cell file, or None.
 
     Raises:
         MissionError: The mission or the cell has errors; the exception contains every finding.
@@ -96,8 +96,8 @@ def load_mission(
     findings = list(files.findings)
     cell_kind = _resolve_cell_kind(files, find_cell_kind, findings)
     classes_by_detector, min_times = {}, None
-    if cell_kind is not None and files.cell is not None and files.cell_path is not None:
-        folder = files.cell_path.parent
+    if cell_kind is not None and files.cell is not None:
+        folder = files.cell.path.parent
         errors = cell_kind.check(config, folder)
         cell_findings = [files.cell.make_error(keys, "robot", message) for keys, message in errors]
         findings += cell_findings
@@ -110,22 +110,22 @@ def load_mission(
     )
     findings += (*expansion.findings, *run_checks(context))
     has_errors = expansion.tree is None or any(finding.severity == "error" for finding in findings)
-    if config is None or files.cell_path is None or has_errors:
+    if config is None or files.cell is None or has_errors:
         raise MissionError(sort_findings(findings, files.source.path))
-    if cell_kind is not None and files.cell is not None:
-        findings += _warn_about_unmeasured_detectors(files.cell, files.cell_path.parent)
+    if cell_kind is not None:
+        findings += _warn_about_unmeasured_detectors(files.cell)
     return LoadedMission(
-        mission, tree, config, files.source.text, mission_path, files.cell_path, files.libraries,
+        mission, tree, config, files.source.text, mission_path, files.cell.path, files.libraries,
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
         dict(overrides or {}),
     )  # fmt: skip
 
 
-def _warn_about_unmeasured_detectors(cell: CellFile, folder: Path) -> Iterator[Finding]:
-    """Yield a warning for each detector of the cell file in `folder` whose error rates were not measured."""
+def _warn_about_unmeasured_detectors(cell: CellFile) -> Iterator[Finding]:
+    """Yield a warning for each detector of the cell whose error rates were not measured."""
     assert cell.config is not None
-    measurement_folders = (folder, get_shipped_folder() / "cells")
-    for keys, message in find_unmeasured_detectors(cell.config, folder, measurement_folders):
+    folders = (cell.path.parent, get_shipped_folder() / "cells")
+    for keys, message in find_unmeasured_detectors(cell.config, cell.path.parent, folders):
         span = find_span(cell.root, keys, at_key=True) if cell.root else cell.source.make_span()
         yield make_warning(span, "not-measured", message)
 

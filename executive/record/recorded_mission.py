@@ -14,7 +14,8 @@ from executive.cell.config import CellConfig
 from executive.errors import InputError, explain_os_errors
 from executive.events import RunStarted
 from executive.mission.outline import OutlineNode
-from executive.mission.parse.read_mission import RecordedCell
+from executive.mission.parse.cell_file import CellFile
+from executive.mission.source import Source
 from executive.skill import Skill
 
 if TYPE_CHECKING:
@@ -43,7 +44,8 @@ def read_mission_of_run(
 
     # The recorded cell file already contains the overrides of the cell.
     overrides = {key: text for key, text in start.overrides.items() if not key.startswith("cell.")}
-    recorded_cell = RecordedCell(read_cell(path), Path(start.base) / "cell.yaml")
+    cell_path = Path(start.base) / "cell.yaml"
+    recorded_cell = CellFile(cell_path, read_cell(path), Source(str(cell_path), ""))
     return load_mission(mission or path / "mission.yaml", skills, overrides, recorded_cell=recorded_cell)
 
 

@@ -55,10 +55,8 @@ KEYWORD_HINTS: Mapping[str, str] = {
 MISSION_KEYS: GrammarKeys = {
     "mission": GrammarKey("word", "Name of the mission.", is_required=True),
     "description": GrammarKey("text", "Purpose of the mission, one sentence."),
-    "cell": GrammarKey(
-        "text", "Path of the cell file, below this file's folder or shipped.", is_required=True
-    ),
-    "library": GrammarKey("paths", "Paths of library files, below this file's folder or shipped."),
+    "cell": GrammarKey("text", "Path of the cell file, below this folder or shipped.", is_required=True),
+    "library": GrammarKey("paths", "Paths of library files, below this folder or shipped."),
     "params": GrammarKey("params", "Constants, read as `$name`; `--set name=value` replaces a value."),
     "routes": GrammarKey("routes", "Bin, or list of permitted bins, for each class of objects."),
     "tree": GrammarKey("node", "Root node of the tree.", is_required=True),
@@ -83,9 +81,7 @@ SUBTREE_KEYS: GrammarKeys = {
 
 PARAM_KEYS: GrammarKeys = {
     "default": GrammarKey("value", "Default value; a param without a default must be set with `--set`."),
-    "type": GrammarKey(
-        "word", "text, integer, number, boolean or list; by default the type of the default value."
-    ),
+    "type": GrammarKey("word", "text, integer, number, boolean or list; by default the type of `default`."),
     "min": GrammarKey("number", "Minimum value."),
     "max": GrammarKey("number", "Maximum value."),
     "choices": GrammarKey("list", "Allowed values."),

@@ -41,16 +41,19 @@ class CellFile:
     """Content of a cell file and its bases.
 
     Attributes:
+        path: Path of the cell file.
         config: Validated content, or None if the file has errors.
         source: Text of the cell file.
-        root: YAML tree of the file merged with its bases, for positions of findings; None if YAML is invalid.
+        root: YAML tree of the file merged with its bases, for positions of findings; None if the YAML is
+            invalid, and for the cell of a recorded run.
         findings: Errors in the file and its bases.
     """
 
+    path: Path
     config: CellConfig | None
     source: Source
-    root: YamlNode | None
-    findings: tuple[Finding, ...]
+    root: YamlNode | None = None
+    findings: tuple[Finding, ...] = ()
 
     def make_error(self, path: KeyPath, code: str, message: str) -> Finding:
         """Return an error about the value at `path`."""
@@ -81,19 +84,19 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
     reader = _CellFileReader()
     root = reader.read_tree(path, source, ())
     if root is None:
-        return CellFile(None, source, None, tuple(reader.findings))
+        return CellFile(path, None, source, findings=tuple(reader.findings))
     root, override_findings = override_cell(root, overrides)
     config, validation_errors = validate(root, CellConfig)
     base_errors = _find_overridden_base(overrides)
     findings = (*reader.findings, *override_findings, *base_errors, *validation_errors)
-    file = CellFile(config, source, root, findings)
+    file = CellFile(path, config, source, root, findings)
     if config is None:
         return file
     overlap_errors = (file.make_error(keys, "layout", message) for keys, message in find_overlaps(config))
     resolved_config, outside_errors = _resolve_model_files(file, config, reader.folders)
     findings = (*findings, *_find_unknown_poses(file, config), *outside_errors, *overlap_errors)
     # After an error, the file has no `config`, so that no caller opens a model file outside the folder.
-    return CellFile(None if outside_errors else resolved_config, source, root, findings)
+    return replace(file, config=None if outside_errors else resolved_config, findings=findings)
 
 
 class _CellFileReader:

@@ -65,8 +65,7 @@ class MappingReader:
 
     def get_value_span(self, key: str) -> Span:
         """Return the position of the value of `key`, or of the owner if the key is missing."""
-        node = self.get(key)
-        return node.span if node else self.span
+        return (self.get(key) or self).span
 
     def require(self, key: str) -> YamlNode | None:
         """Return the value of `key`; if the key is missing, add an error and return None."""

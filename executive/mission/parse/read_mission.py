@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from executive.cell.config import CellConfig
 from executive.errors import InputError
 from executive.mission.findings import Finding, MissionError, sort_findings
 from executive.mission.model.mission import Mission, Subtree
@@ -29,7 +28,6 @@ class MissionFiles:
         mission: Content of the mission file and the subtrees of its libraries.
         libraries: Text of each library file by its path as written in the mission.
         cell: Content of the cell file, or None if the file cannot be read.
-        cell_path: Path of the cell file, or None if the file cannot be read.
         findings: Errors of the parsers.
     """
 
@@ -37,21 +35,7 @@ class MissionFiles:
     mission: Mission
     libraries: Mapping[str, str]
     cell: CellFile | None
-    cell_path: Path | None
     findings: tuple[Finding, ...]
-
-
-@dataclass(frozen=True)
-class RecordedCell:
-    """Cell of a recorded run, which replaces the cell file.
-
-    Attributes:
-        config: Content of the cell file in the recorded run, merged with its bases and overrides.
-        path: Path of the cell file in the recorded run.
-    """
-
-    config: CellConfig
-    path: Path
 
 
 def read_mission(
@@ -59,7 +43,7 @@ def read_mission(
     overrides: Mapping[str, str],
     skills: Skills,
     node_classes: ControlNodes,
-    recorded_cell: RecordedCell | None = None,
+    recorded_cell: CellFile | None = None,
 ) -> MissionFiles:
     """Return the content of a mission file, its libraries, and its cell file or the recorded cell.
 
@@ -77,20 +61,14 @@ def read_mission(
     texts = {file.name: _add_library(file, path.parent, parser, subtrees) for file in mission.libraries}
     libraries = {name: text for name, text in texts.items() if text is not None}
     mission = replace(mission, subtrees=subtrees, is_complete=len(libraries) == len(texts))
-    cell_path: Path | None = None
-    cell: CellFile | None = None
-    if recorded_cell is not None:
-        cell_path = recorded_cell.path
-        cell = CellFile(recorded_cell.config, Source(str(cell_path), ""), None, ())
-    elif mission.cell.name:
+    cell = recorded_cell
+    if cell is None and mission.cell.name:
         try:
-            cell_path = find_file_below(path.parent, mission.cell.name)
-            cell = read_cell(cell_path, overrides)
+            cell = read_cell(find_file_below(path.parent, mission.cell.name), overrides)
             findings += cell.findings
         except InputError as error:
-            cell_path = None
             parser.add_error(mission.cell.span, "no-cell", str(error))
-    return MissionFiles(source, mission, libraries, cell, cell_path, tuple(findings))
+    return MissionFiles(source, mission, libraries, cell, tuple(findings))
 
 
 def _add_library(

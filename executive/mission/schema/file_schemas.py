@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import GrammarKeys
 from executive.mission.parse.control import find_inner_keys, find_shorthand_key, has_optional_body
 from executive.mission.parse.mapping_reader import NAME_PATTERN
+from executive.mission.parse.node_parser import Skills
 from executive.mission.parse.params import PARAM_TYPES
 from executive.mission.schema.types import (
     DIALECT,
@@ -20,12 +20,9 @@ from executive.mission.schema.types import (
     make_name_schemas,
     make_settings_schema,
 )
-from executive.skill import Skill
 from executive.tree.keys import Key, KeyKind
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import ControlNodes
-
-Skills: TypeAlias = Mapping[str, type[Skill]]
 
 _NAME = NAME_PATTERN.pattern
 """Regular expression of a name, for use in longer expressions."""

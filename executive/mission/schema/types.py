@@ -45,9 +45,8 @@ class Draft07(GenerateJsonSchema):
         del section_schema["title"]
         return section_schema
 
-    def field_title_should_be_set(self, schema: object) -> bool:
+    def field_title_should_be_set(self, _schema: object) -> bool:
         """Return False, because no field has a title."""
-        del schema
         return False
 
 

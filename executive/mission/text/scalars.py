@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 
-# Spellings of each kind of value in the core schema.
-_NULL_WORDS = frozenset({"", "~", "null", "Null", "NULL"})
-_TRUE_WORDS = frozenset({"true", "True", "TRUE"})
-_FALSE_WORDS = frozenset({"false", "False", "FALSE"})
+# Spellings of the values in the core schema.
+_VALUE_BY_WORD: Mapping[str, bool | float | None] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), math.nan),
+}
 _INTEGER = re.compile(r"[-+]?[0-9]+")
 _PREFIXED_INTEGER = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _INFINITE = re.compile(r"[-+]?\.(inf|Inf|INF)")
-_NAN_WORDS = frozenset({".nan", ".NaN", ".NAN"})
 _MAX_NUMBER_LENGTH = 300
 """Maximum number of characters of a number; a longer scalar is a string."""
 
@@ -22,12 +25,8 @@ ScalarValue = None | bool | int | float | str
 
 def convert_scalar(text: str) -> ScalarValue:
     """Return the value of a plain scalar: None, a boolean, a number, or the text itself."""
-    if text in _NULL_WORDS:
-        return None
-    if text in _TRUE_WORDS:
-        return True
-    if text in _FALSE_WORDS:
-        return False
+    if text in _VALUE_BY_WORD:
+        return _VALUE_BY_WORD[text]
     if text[0] not in "+-.0123456789" or len(text) > _MAX_NUMBER_LENGTH:
         return text
     if _INTEGER.fullmatch(text):
@@ -36,9 +35,7 @@ def convert_scalar(text: str) -> ScalarValue:
         return _convert_large_integer(int(text, base=0))
     if _FLOAT.fullmatch(text):
         return float(text)
-    if _INFINITE.fullmatch(text):
-        return float(text.replace(".", ""))
-    return float("nan") if text in _NAN_WORDS else text
+    return float(text.replace(".", "")) if _INFINITE.fullmatch(text) else text
 
 
 def _convert_large_integer(number: int) -> int | float:

@@ -236,8 +236,7 @@ class _Composer:
         start, end = event.start_mark, event.end_mark
         assert start is not None and end is not None, "PyYAML locates every event"
         if not length:
-            is_single_line = start.line == end.line
-            length = max(1, end.column - start.column) if is_single_line else _LINE_LENGTH
+            length = max(1, end.column - start.column) if start.line == end.line else _LINE_LENGTH
         return Span(self.source, start.line + 1, start.column + 1, length)
 
     def _make_fatal_error(self, span: Span, code: str, message: str) -> _IncompleteTree:
