@@ -17,11 +17,11 @@ from executive.cells.sim.spawn import find_max_object_count
 from executive.errors import InputError, explain_os_errors
 from executive.mission.findings import suggest_choice
 from executive.perception.detectors.detector_registry import find_detector_errors
-from executive.perception.envelope.fingerprint import compute_fingerprint
 from executive.perception.envelope.measurement import (
     MEASUREMENT_SUFFIX,
     ErrorCounts,
     Measurement,
+    compute_fingerprint,
     format_measurements,
     read_measurements,
 )

@@ -143,10 +143,10 @@ def describe_size_contradiction(
     if not _is_completely_visible(detection, frame, area):
         return ""
     left, top, right, bottom = detection.box
-    sides = _project_cylinder(position, frame, object_class)
+    cylinder_length = _compute_cylinder_length(position, frame, object_class)
     scale = float(frame.matrix[0, 0]) / frame.compute_depth(position)
     min_length = math.sqrt(2) * object_class.radius * scale * (1 - SIZE_TOLERANCE) - SIZE_TOLERANCE_PX
-    max_length = max(sides) * (1 + SIZE_TOLERANCE) + SIZE_TOLERANCE_PX
+    max_length = cylinder_length * (1 + SIZE_TOLERANCE) + SIZE_TOLERANCE_PX
     length = max(right - left, bottom - top)
     if min_length <= length <= max_length:
         return ""
@@ -163,11 +163,10 @@ def _is_completely_visible(detection: Detection, frame: Frame, area: Box) -> boo
     return border_distance >= MIN_BORDER_DISTANCE and frame.compute_visible_fraction(detection.box) >= 1.0
 
 
-def _project_cylinder(position: Array, frame: Frame, object_class: ObjectClass) -> tuple[float, float]:
-    """Return width and height [pixel] of the image of the cylinder that encloses an object."""
+def _compute_cylinder_length(position: Array, frame: Frame, object_class: ObjectClass) -> float:
+    """Return the longer side [pixel] of the image of the cylinder that encloses an object."""
     angles = np.linspace(0, 2 * math.pi, 16, endpoint=False)
     x, y = object_class.radius * np.cos(angles), object_class.radius * np.sin(angles)
     half = object_class.height / 2
     circles = [np.stack((x, y, np.full(16, z)), axis=1) for z in (-half, half)]
-    width, height = np.ptp(project(frame.matrix, frame.X_WC, position + np.concatenate(circles)), axis=0)
-    return float(width), float(height)
+    return float(np.ptp(project(frame.matrix, frame.X_WC, position + np.concatenate(circles)), axis=0).max())

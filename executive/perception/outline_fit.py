@@ -124,25 +124,18 @@ class OutlineFitter:
 
     def search(self) -> Iterator[PoseFit]:
         """Yield fits that start at the poses of the search grid with the strongest edges at the outlines."""
-        small_image = cv2.resize(
-            self._image, None, fx=1 / IMAGE_REDUCTION, fy=1 / IMAGE_REDUCTION, interpolation=cv2.INTER_AREA
-        )
+        scale = 1 / IMAGE_REDUCTION
+        small_image = cv2.resize(self._image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
         small_image = cv2.GaussianBlur(small_image, (0, 0), SMOOTHING_STD).astype(np.float32)
-        gradients = np.stack(
-            [cv2.Sobel(small_image, cv2.CV_32F, 1, 0), cv2.Sobel(small_image, cv2.CV_32F, 0, 1)], axis=-1
-        )
+        derivatives = [cv2.Sobel(small_image, cv2.CV_32F, *orders) for orders in ((1, 0), (0, 1))]
+        gradients = np.stack(derivatives, axis=-1)
         matrix, X_CW = self._frame.matrix, self._frame.X_WC.inverse()
         last_pixel = np.array(small_image.shape[1::-1]) - 1
-        if (
-            not _is_sufficient(self._find_visible_samples(np.zeros(6)))
-            or np.abs(gradients).max() < MIN_CONTRAST
-        ):
+        samples = self._find_visible_samples(np.zeros(6))
+        if not _is_sufficient(samples) or np.abs(gradients).max() < MIN_CONTRAST:
             return
-        points, next_points, _ = _sample_outlines(self._bins, self._frame.X_WC, matrix)
-        points, next_points = (
-            X_CW.apply(points[::SAMPLE_REDUCTION]),
-            X_CW.apply(next_points[::SAMPLE_REDUCTION]),
-        )
+        *world_points, _ = _sample_outlines(self._bins, self._frame.X_WC, matrix)
+        points, next_points = (X_CW.apply(values[::SAMPLE_REDUCTION]) for values in world_points)
         scored_offsets: list[tuple[float, Array]] = []
         for roll, axial_shift in itertools.product(ROLLS_DEG, AXIAL_SHIFTS):
             shift = np.array([0.0, 0.0, axial_shift * points[:, 2].mean()])
@@ -160,8 +153,7 @@ class OutlineFitter:
             best = int(scores.argmax())
             scored_offsets.append((float(scores[best]), np.concatenate([rotation_vectors[best], shift])))
         for _, offset in sorted(scored_offsets, key=lambda pair: -pair[0])[:MAX_REFINED_POSES]:
-            fit = self.refine(offset, SEARCH_EDGE_DISTANCES)
-            if fit is not None:
+            if fit := self.refine(offset, SEARCH_EDGE_DISTANCES):
                 yield fit
 
     def _find_visible_samples(self, offset: Array) -> EdgeSamples:
@@ -216,12 +208,8 @@ def _sample_outlines(bins: Sequence[Bin], X_WC: Pose, matrix: Array) -> tuple[Ar
             continue
         pixels = _project(corners_C, matrix)
         silhouette = cv2.convexHull(pixels.astype(np.float32), returnPoints=False)[:, 0].tolist()
-        polygons: tuple[list[int], ...] = (silhouette, [0, 1, 2, 3])
-        edges = {
-            frozenset(edge)
-            for polygon in polygons
-            for edge in zip(polygon, [*polygon[1:], polygon[0]], strict=True)
-        }
+        closed_polygons: tuple[list[int], ...] = ([*silhouette, silhouette[0]], [0, 1, 2, 3, 0])
+        edges = {frozenset(edge) for polygon in closed_polygons for edge in itertools.pairwise(polygon)}
         for start, end in sorted(sorted(edge) for edge in edges):
             count = int(np.linalg.norm(pixels[end] - pixels[start]) / SAMPLE_SPACING)
             fractions = ((np.arange(count) + 0.5) / max(count, 1))[:, None]

@@ -113,23 +113,16 @@ def encode_answer(answer: Answer) -> dict[str, Any]:
 
 def decode_answer(value: Any) -> Answer:
     """Return the answer that `encode_answer` encoded."""
-    confident, doubtful, unknown = (
-        tuple(map(decode_detection, value[key])) for key in ("confident", "doubtful", "unknown")
-    )
+    keys = ("confident", "doubtful", "unknown")
+    confident, doubtful, unknown = (tuple(map(decode_detection, value[key])) for key in keys)
     return Answer(value["detector"], confident, ErrorRates(*value["reliability"]), doubtful, unknown)
 
 
 def encode_observations(observations: Sequence[Observation]) -> list[Any]:
     """Return the attributes of each observation as a list."""
+    attributes = (vars(observation).values() for observation in observations)
     return [
-        [
-            encode_detection(each.detection),
-            each.position.tolist(),
-            each.std,
-            each.is_confident,
-            each.contradiction,
-        ]
-        for each in observations
+        [encode_detection(detection), position.tolist(), *rest] for detection, position, *rest in attributes
     ]
 
 

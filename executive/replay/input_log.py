@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from executive.events import (
-    Event,
     InputRead,
     MotionPlanned,
     RunEnded,
@@ -160,21 +159,9 @@ class InputLog:
         """Return True if the recorded run ended before its tree was ticked in control step `tick`."""
         return tick > self.last_tick if self.halt is None else self.halt == (tick, False)
 
-    def is_halted_after(self, tick: int) -> bool:
-        """Return True if the recorded run was halted after its tree was ticked in control step `tick`."""
-        return self.halt == (tick, True)
-
     def select_before(self, tick: int) -> InputLog:
         """Return the log of the events before control step `tick`, including the start of the run."""
         return InputLog.from_events(_select_before(self.events, tick))
-
-    def count_events(self, kind: type[Event]) -> int:
-        """Return the number of events of a kind."""
-        return sum(isinstance(timed.event, kind) for timed in self.events)
-
-    def count_readings(self, name: str) -> int:
-        """Return the number of recorded values of the input `name`."""
-        return len(self.inputs.get(name, ()))
 
 
 def _select_before(events: Iterable[TimedEvent], tick: int) -> list[TimedEvent]:

@@ -1,23 +1,26 @@
-"""Cell with a recorder of its inputs, and the name and codec of each input."""
+"""Recorder of the inputs of a run (values that the run reads from its cell), and a cell with a recorder."""
 
 from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from pydantic import JsonValue
 
 from executive.cell.clock import StepClock
 from executive.cell.protocols import Cell
 from executive.cell.proxy import Access, intercept
-from executive.events import Emit, ToolCommanded
+from executive.errors import Stopped
+from executive.events import Emit, InputRead, ToolCommanded
 from executive.replay import codecs
 from executive.replay.codecs import Codec
-from executive.replay.input_recorder import InputRecorder
+
+Value = TypeVar("Value")
 
 
 class InputFormat(NamedTuple):
@@ -94,6 +97,47 @@ def check_input(name: str, value: JsonValue) -> None:
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, zlib.error) as error:
         problem = f"{type(error).__name__}: {error}"
         raise ValueError(f'"value" does not have the format of the input "{name}" ({problem})') from error
+
+
+class InputRecorder:
+    """Emits an event for each changed value of an input; used only in the thread of the tick loop.
+
+    Args:
+        emit: Function that emits an event.
+    """
+
+    def __init__(self, emit: Emit) -> None:
+        self._emit = emit
+        self._read_counts: Counter[str] = Counter()
+        self._last_values: dict[str, object] = {}
+
+    def begin_step(self) -> None:
+        """Begin a control step: set the number of reads of each input to 0."""
+        self._read_counts.clear()
+
+    def read(self, name: str, query: Callable[[], Value], codec: Codec = codecs.IDENTITY) -> Value:
+        """Read an input from the cell, record its value if the value has changed, and return the value.
+
+        Args:
+            name: Name of the input.
+            query: Function that reads the value from the cell.
+            codec: Codec of the value.
+
+        Raises:
+            Exception: The cell raised an exception; the exception is recorded and raised again.
+        """
+        self._read_counts[name] += 1
+        read_count = self._read_counts[name]
+        try:
+            value = query()
+        except (Exception, Stopped) as error:
+            self._emit(InputRead(name, read_count, str(error), type(error).__name__))
+            raise
+        encoded = codec.encode(value)
+        if name not in self._last_values or encoded != self._last_values[name]:
+            self._last_values[name] = encoded
+            self._emit(InputRead(name, read_count, encoded))
+        return value
 
 
 def make_recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:

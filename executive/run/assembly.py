@@ -69,7 +69,7 @@ def assemble(
     Raises:
         InputError: The kind of the cell is not installed, or a request names no class of the mission.
     """
-    builder = _RunBuilder(loaded, skills, options, observers)
+    builder = _RunBuilder(loaded, skills, options, RunContext(observers))
     workcell = builder.build_workcell()
     builder.context.connect(workcell, LookaheadPlanner(workcell.cell))
     start = RunStarted(
@@ -113,10 +113,10 @@ def assemble_resumed(
     Raises:
         InputError: The kind of the cell is not installed, or its world cannot be reconstructed.
     """
-    builder = _RunBuilder(loaded, skills, options)
-    frame_count, pose_count = map(log.count_readings, ("camera.frame", "camera.next_pose"))
-    resume_point = ResumePoint(world_log, frame_count, pose_count)
-    workcell = builder.build_workcell(resume_point, log.count_events(RequestGiven))
+    builder = _RunBuilder(loaded, skills, options, RunContext())
+    frame_count, pose_count = (len(log.inputs.get(name, ())) for name in ("camera.frame", "camera.next_pose"))
+    request_count = sum(isinstance(timed.event, RequestGiven) for timed in log.events)
+    workcell = builder.build_workcell(ResumePoint(world_log, frame_count, pose_count), request_count)
     interruption = log.find_interruption(workcell.steps, workcell.last_command, is_complete=is_complete)
     return builder.build_resumed_run(workcell, log, None if has_ended else interruption)
 
@@ -130,28 +130,25 @@ def assemble_replay(
 ) -> ResumedRun:
     """Return a run that replays a recorded run without hardware or simulation."""
     options = RunOptions(seed, requests=(), kind=CellWithoutHardware)
-    builder = _RunBuilder(loaded, skills, options, observers)
+    builder = _RunBuilder(loaded, skills, options, RunContext(observers))
     return builder.build_resumed_run(builder.build_workcell(), log)
 
 
+@dataclass(frozen=True, eq=False)
 class _RunBuilder:
-    """Builder of the work cell, the tree and the run of a mission; the arguments are those of `assemble`.
+    """Builder of the work cell, the tree and the run of a mission.
 
     Attributes:
+        loaded, skills, options: Arguments of `assemble`.
         context: Cell and events of the run; its method `connect` must be called before `build_tree`.
         control: Control with which other threads stop, pause and step the run.
     """
 
-    def __init__(
-        self,
-        loaded: LoadedMission,
-        skills: Mapping[str, type[Skill]],
-        options: RunOptions,
-        observers: Sequence[Observer] = (),
-    ) -> None:
-        self._loaded, self._skills, self._options = loaded, skills, options
-        self.context = RunContext(observers)
-        self.control = RunControl()
+    loaded: LoadedMission
+    skills: Mapping[str, type[Skill]]
+    options: RunOptions
+    context: RunContext
+    control: RunControl = field(default_factory=RunControl)
 
     def build_workcell(self, resume_point: ResumePoint | None = None, request_count: int = 0) -> Workcell:
         """Return the work cell of the run.
@@ -160,24 +157,21 @@ class _RunBuilder:
             resume_point: State of the cell at the interruption of the run; None for a new run.
             request_count: Number of requests that the operator had given before the interruption.
         """
-        loaded, options, emit = self._loaded, self._options, self.context.emit
+        loaded, options, emit = self.loaded, self.options, self.context.emit
         operator: Operator
         if options.requests is None:
             operator = TerminalOperator(emit, self.control, has_keyboard=options.has_keyboard)
         else:
             operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, request_count)
-        cell_options = CellOptions(
-            operator, loaded.cell_path.parent, options.gui, resume=resume_point, scene=options.scene
-        )
-        make_cell = options.kind or load_cell_kind(loaded.cell_config.kind)
-        return make_cell(
-            loaded.cell_config, seed=options.seed, routes=loaded.routes, emit=emit, options=cell_options
-        )
+        config, base = loaded.cell_config, loaded.cell_path.parent
+        cell_options = CellOptions(operator, base, options.gui, resume=resume_point, scene=options.scene)
+        make_cell = options.kind or load_cell_kind(config.kind)
+        return make_cell(config, seed=options.seed, routes=loaded.routes, emit=emit, options=cell_options)
 
     def build_tree(self) -> TreeNode:
         """Return the behaviour tree of the mission for the cell of `context`."""
         cell, emit = self.context.cell, self.context.emit
-        return build_tree(self._loaded, self._skills, cell, Blackboard(), emit, self._options.substitutes)
+        return build_tree(self.loaded, self.skills, cell, Blackboard(), emit, self.options.substitutes)
 
     def build_resumed_run(
         self, workcell: Workcell, log: InputLog, interruption: Interruption | None = None
@@ -186,6 +180,6 @@ class _RunBuilder:
         replayed_cell = ReplayedCell(workcell, log, interruption)
         self.context.connect(replayed_cell)
         return ResumedRun(
-            self.context, replayed_cell, self.build_tree(), self.control, self._loaded.mission.name,
-            is_realtime=self._options.is_realtime,
+            self.context, replayed_cell, self.build_tree(), self.control, self.loaded.mission.name,
+            is_realtime=self.options.is_realtime,
         )  # fmt: skip

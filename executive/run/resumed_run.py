@@ -103,7 +103,7 @@ class ResumedRun(Run):
             # A halted skill must not open the tool, because the journal may lack the last motions of the arm.
             with replayed_cell.suppress_commands(), contextlib.suppress(Fault):
                 restart_skills(self.root)
-        context.brake_arm()
+        brake_arm(context.cell, context.advance)
         if interruption.restarts_tree:
             replayed_cell.accounts.reopen()
         if self._is_scene_known:

@@ -13,7 +13,7 @@ from executive.cell.workcell import Workcell
 from executive.errors import ExecutiveError, Fault, Stopped
 from executive.events import FaultRaised, Observer, RunEnded, RunHalted, RunStarted
 from executive.run.outcome import HALTED, LoopEnd, catch_problems, check_items, finalize_items, to_loop_end
-from executive.run.run_context import RunContext
+from executive.run.run_context import RunContext, brake_arm
 from executive.run.run_control import RunControl
 from executive.run.signals import halt_on_signals
 from executive.tree.halting import halt
@@ -100,11 +100,14 @@ class Run:
         self.workcell.close()
 
     def _execute_tree(self) -> RunEnded:
-        """Tick the tree until it ends, brake the arm, finalize the items, and return the end of the run."""
+        """Tick the tree until it ends, brake the arm, finalize the items, and return the end of the run.
+
+        If the tree succeeds, the final states of the items determine the status of the run.
+        """
         context = self._context
         with halt_on_signals(self.control):
             loop_end = self._tick_until_end()
-            problems = halt(self.root) + catch_problems(context.brake_arm)
+            problems = halt(self.root) + catch_problems(lambda: brake_arm(context.cell, context.advance))
         if loop_end.traceback:
             # The arm brakes before this event is emitted, because a full disk must not prevent the braking.
             problems += catch_problems(lambda: context.emit(FaultRaised(loop_end.traceback)))
@@ -116,7 +119,10 @@ class Run:
             loop_end = replace(loop_end, message="; ".join([loop_end.message, *problems]))
         elif problems:
             loop_end = LoopEnd("FAULT", "fault", "; ".join(problems))
-        return self._make_run_ended(loop_end)
+        elif has_succeeded:
+            loop_end = check_items(self.workcell.accounts)
+        cause = (loop_end.status, loop_end.reason, loop_end.message, loop_end.node)
+        return RunEnded(*cause, self._is_table_empty, self._held_item, self.tick, round(self.now, 6))
 
     def _tick_until_end(self) -> LoopEnd:
         """Tick the tree once in every control step until it ends, or until the run is stopped."""
@@ -162,10 +168,3 @@ class Run:
         """Store whether the ledger contains neither an object to sort nor an undeclared label."""
         ledger = self._context.cell.ledger
         self._is_table_empty = ledger.is_table_empty() and not ledger.unknown_labels
-
-    def _make_run_ended(self, loop_end: LoopEnd) -> RunEnded:
-        """Return the last event of the run; if the tree succeeded, the items determine the status."""
-        if loop_end.status == "SUCCESS":
-            loop_end = check_items(self.workcell.accounts)
-        cause = (loop_end.status, loop_end.reason, loop_end.message, loop_end.node)
-        return RunEnded(*cause, self._is_table_empty, self._held_item, self.tick, round(self.now, 6))

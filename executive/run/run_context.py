@@ -9,8 +9,7 @@ from executive.cell.protocols import Cell
 from executive.cell.workcell import Workcell
 from executive.errors import Fault
 from executive.events import Event, Observer, TimedEvent
-from executive.replay.input_recorder import InputRecorder
-from executive.replay.recorded_cell import make_recorded_cell
+from executive.replay.recorded_cell import InputRecorder, make_recorded_cell
 from executive.run.lookahead_planner import LookaheadPlanner
 
 MAX_BRAKING_TIME = 2.0
@@ -84,14 +83,6 @@ class RunContext:
         """Let the planner plan the probable next motion."""
         if self.planner is not None:
             self.planner.plan_next_motion()
-
-    def brake_arm(self) -> None:
-        """Brake the arm until it is at rest.
-
-        Raises:
-            Fault: The arm is not at rest, or a command to brake failed.
-        """
-        brake_arm(self.cell, self.advance)
 
 
 def brake_arm(cell: Cell, advance: Callable[[], None]) -> None:

@@ -14,10 +14,13 @@ class RunControl:
     """Commands to a run from any thread or signal handler; a command takes effect between two ticks.
 
     During a pause, the clock of the run and a simulated world stand still.
+
+    Attributes:
+        is_stopped: True after the first call of `stop`.
     """
 
     def __init__(self) -> None:
-        self._is_stopped = False
+        self.is_stopped = False
         self._is_paused = False
         self._remaining_ticks = 0
         """Number of ticks that `step` requested and that have not begun."""
@@ -26,18 +29,13 @@ class RunControl:
         self._callbacks: list[Callable[[], None]] = []
 
     @property
-    def is_stopped(self) -> bool:
-        """True after the first call of `stop`."""
-        return self._is_stopped
-
-    @property
     def is_paused(self) -> bool:
         """True if the run is paused or will pause after the ticks of `step`; False after `stop`."""
-        return self._is_paused and not self._is_stopped
+        return self._is_paused and not self.is_stopped
 
     def stop(self) -> None:
         """Stop the run: the run halts its tree and brakes its arm."""
-        self._is_stopped = True
+        self.is_stopped = True
         self._wake_up.set()
 
     def pause(self) -> None:
@@ -75,7 +73,7 @@ class RunControl:
         """Call the callbacks, and wait until the next tick may begin or the run is stopped."""
         for callback in self._callbacks:
             callback()
-        while self._is_paused and not self._is_stopped:
+        while self.is_paused:
             if self._remaining_ticks > 0:
                 self._remaining_ticks -= 1
                 return

@@ -18,10 +18,8 @@ DISTRIBUTION = "executive"
 def list_versions() -> Mapping[str, str]:
     """Return the versions by name, without packages that are not installed."""
     versions = {"python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
-    for name in (DISTRIBUTION, *list_requirements()):
-        if version := find_version(name):
-            versions[name] = version
-    return MappingProxyType(versions)
+    versions |= {name: find_version(name) for name in (DISTRIBUTION, *list_requirements())}
+    return MappingProxyType({name: version for name, version in versions.items() if version})
 
 
 def list_requirements(extra: str = "") -> tuple[str, ...]:

@@ -7,8 +7,13 @@ from executive.cell.protocols import Cell
 from executive.cell.proxy import IS_METHOD
 from executive.cells.fake.cell import FakeCell
 from executive.events import Emit, Event, ToolCommanded, discard_event
-from executive.replay.input_recorder import InputRecorder
-from executive.replay.recorded_cell import COMMANDS, INPUT_FORMATS, RECORDED_ROLES, make_recorded_cell
+from executive.replay.recorded_cell import (
+    COMMANDS,
+    INPUT_FORMATS,
+    RECORDED_ROLES,
+    InputRecorder,
+    make_recorded_cell,
+)
 
 
 def recorded(fake: FakeCell, emit: Emit = discard_event) -> Cell:

@@ -1,23 +1,30 @@
-"""Stored measurements of detectors: the files `CELL.measured.json`."""
+"""Stored measurements of detectors (files `CELL.measured.json`), and fingerprints of detectors."""
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, ValidationError
 
-from executive.cell.config import Section
+from executive.cell.config import CameraConfig, CellConfig, DetectorConfig, Section
 from executive.cell.error_rates import ErrorRates
 from executive.errors import InputError
+from executive.perception.camera_model import compute_calibration
+from executive.perception.detectors.detector_registry import find_detector_kinds
 from executive.perception.envelope.frame_statistics import FrameRange
 
 MEASUREMENT_SUFFIX = ".measured.json"
 """Suffix of a measurement file, after the name of the cell."""
 MAX_FILE_SIZE = 1_000_000
 """Maximum size of a measurement file [byte]."""
+
+
+Fingerprint = Mapping[str, str]
+"""Declared properties of detector and cell that affect the error rates: text by name of the property."""
 
 
 class StoredErrorRates(Section):
@@ -100,3 +107,50 @@ def format_measurements(measurements: Iterable[Measurement], new: Measurement) -
     ordered = sorted((*others, new), key=lambda measurement: measurement.detector)
     content = MeasurementFile(measurements=tuple(ordered)).model_dump(mode="json")
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+
+
+def compute_fingerprint(config: CellConfig, detector: str, base: Path) -> Fingerprint:
+    """Return the fingerprint of a detector in its cell.
+
+    The fingerprint contains weights and settings of the detector, the localization method, the classes and
+    their sizes, and pose, intrinsics, image size, `table_view` and depth settings of the camera. It does not
+    contain bins, the number of objects, light and colours. Paths in the cell file are relative to `base`.
+    """
+    section = config.detectors[detector]
+    options = {key: value for key, value in section.options.items() if key != "threads"}
+    return {
+        "detector": f"{section.kind} {json.dumps(options, sort_keys=True)}",
+        "weights": _digest_weights(section, base),
+        "threshold": f"{section.threshold:g}",
+        "localization": config.localization,
+        **{
+            f"class {label}": f"{kind.height * 1000:.1f} mm high, radius {kind.radius * 1000:.1f} mm"
+            for label, kind in config.objects.items()
+        },
+        **_describe_camera(next(iter(config.cameras.values())), config),
+    }
+
+
+def list_changed_properties(measured: Fingerprint, current: Fingerprint) -> str:
+    """Return the names of the properties that differ between two fingerprints; "" if none."""
+    names = dict.fromkeys([*measured, *current])
+    return ", ".join(name for name in names if measured.get(name) != current.get(name))
+
+
+def _digest_weights(section: DetectorConfig, base: Path) -> str:
+    """Return a digest of the model file of a detector; "" for a detector without a model file."""
+    find_weights = getattr(find_detector_kinds()[section.kind].load(), "weights", None)
+    path = find_weights(section, base) if find_weights else None
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path and path.is_file() else ""
+
+
+def _describe_camera(camera: CameraConfig, config: CellConfig) -> dict[str, str]:
+    """Return the properties of a camera that affect error rates."""
+    matrix, X_MC = compute_calibration(camera)
+    poses = {name: config.arm.poses_deg[name] for name in camera.scan_poses if camera.mount == "wrist"}
+    return {
+        "camera pose": f"{camera.mount} {X_MC.to_rounded_list(4)} {json.dumps(poses)}",
+        "camera lens": f"{matrix.round(2).tolist()}",
+        "camera image": f"{camera.width} x {camera.height}, searched {list(camera.table_view)}",
+        "camera depth": "" if camera.depth is None else camera.depth.model_dump_json(),
+    }

@@ -13,9 +13,14 @@ from executive.cell.protocols import Clock
 from executive.errors import InputError
 from executive.perception.detectors.detector_registry import build_detectors, find_detector_kinds
 from executive.perception.detectors.requests import ChangedRequest, ClosableDetector
-from executive.perception.envelope.fingerprint import compute_fingerprint, list_changed_properties
 from executive.perception.envelope.frame_statistics import FrameRange, compute_frame_statistics
-from executive.perception.envelope.measurement import MEASUREMENT_SUFFIX, Measurement, read_measurements
+from executive.perception.envelope.measurement import (
+    MEASUREMENT_SUFFIX,
+    Measurement,
+    compute_fingerprint,
+    list_changed_properties,
+    read_measurements,
+)
 
 FAKE_KIND = "fake"
 """Kind of cell whose detectors are not measured, because they read the true positions of the objects."""

@@ -8,12 +8,13 @@ from plain_frames import frame_of
 from executive.cell.error_rates import ErrorRates, assume_rates
 from executive.mission.parse.cell_file import load_cell
 from executive.perception.detectors.requests import PendingSearch
-from executive.perception.envelope.fingerprint import compute_fingerprint, list_changed_properties
 from executive.perception.envelope.frame_statistics import FrameRange
 from executive.perception.envelope.measurement import (
     Measurement,
     StoredErrorRates,
+    compute_fingerprint,
     format_measurements,
+    list_changed_properties,
     read_measurements,
 )
 from executive.perception.envelope.rated_detectors import (

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from executive.errors import Fault, Unreachable
 from executive.events import Event, TimedEvent
 from executive.replay.input_log import InputLog
-from executive.replay.input_recorder import InputRecorder
-from executive.replay.input_replayer import InputNotRecorded, InputReplayer
+from executive.replay.recorded_cell import InputRecorder
+from executive.replay.replayed_cell import InputNotRecorded, InputReplayer
 
 
 class Recording:
