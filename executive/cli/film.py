@@ -12,10 +12,7 @@ from executive.cli.streams import keep_stdout_clean, print_json
 
 @click.command(name="film")
 @click.argument("run", metavar="RUN")
-@click.option(
-    "-o", "--output", type=FILE,
-    help="File to write, .mp4 or .gif; by default film.mp4 in the run directory.",
-)  # fmt: skip
+@click.option("-o", "--output", type=FILE, help="File (.mp4 or .gif) to write; by default film.mp4 in RUN.")
 @click.option("--gif", is_flag=True, help="Make an animated GIF, for example for a README.")
 @click.option(
     "--speed", type=click.FloatRange(0.1, 100),

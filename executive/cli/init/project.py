@@ -51,15 +51,13 @@ def write_project(folder: Path, package: str) -> list[str]:
 
 def _require_empty(folder: Path) -> None:
     """Raise an InputError if `folder` is a file or contains files."""
+    advice = "name a folder that is empty or does not exist"
     if folder.is_file():
-        raise InputError(f'"{folder}" is a file; name a folder that is empty or does not exist')
+        raise InputError(f'"{folder}" is a file; {advice}')
     entries = sorted(os.listdir(folder)) if folder.exists() else []
     if entries:
-        raise InputError(
-            f'the folder "{folder}" is not empty: it contains {entries[0]}'
-            f"{f' and {len(entries) - 1} more' if entries[1:] else ''}; "
-            "name a folder that is empty or does not exist"
-        )
+        more_text = f" and {len(entries) - 1} more" if entries[1:] else ""
+        raise InputError(f'the folder "{folder}" is not empty: it contains {entries[0]}{more_text}; {advice}')
 
 
 def _map_path(file: Path, package: str) -> str:

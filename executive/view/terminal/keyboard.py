@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import termios
@@ -12,7 +13,7 @@ from executive.run.run_control import RunControl
 
 POLL_PERIOD = 0.1
 """Maximum time until the reading thread notices that it must end [s]."""
-PAUSE_KEYS, STEP_KEY = ("p", " "), "s"
+PAUSE_KEYS, STEP_KEY = (b"p", b" "), b"s"
 """Keys that pause or continue a run, and key that runs one control step."""
 HELP = "p pause, s step, Ctrl-C stop"
 """Text about the keys while the run is not paused."""
@@ -50,17 +51,15 @@ class KeyReader:
 
     def _read_keys(self) -> None:
         """Handle keys until the thread must stop or the terminal is closed."""
-        while not self._must_stop.is_set():
-            if select.select([self._descriptor], [], [], POLL_PERIOD)[0]:
-                try:
-                    key = os.read(self._descriptor, 1).decode("ascii", "ignore")
-                except OSError:
-                    return
-                if not key:
-                    return
-                self._handle_key(key)
+        with contextlib.suppress(OSError):
+            while not self._must_stop.is_set():
+                if select.select([self._descriptor], [], [], POLL_PERIOD)[0]:
+                    key = os.read(self._descriptor, 1)
+                    if not key:
+                        return
+                    self._handle_key(key)
 
-    def _handle_key(self, key: str) -> None:
+    def _handle_key(self, key: bytes) -> None:
         if key == STEP_KEY:
             self.control.step()
         elif key in PAUSE_KEYS and self.control.is_paused:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 from executive.events import ItemChanged
@@ -40,7 +40,7 @@ def describe_end(status: str, reason: str, node: str, message: str) -> str:
 
 
 def format_summary(
-    result: Result, items: Iterable[ItemChanged], repeat_command: str, report_file: str = ""
+    result: Result, items: Collection[ItemChanged], repeat_command: str, report_file: str = ""
 ) -> str:
     """Return a text with the end of a run, the times, and the items by bin or by state.
 
@@ -72,21 +72,18 @@ def describe_place_on_table(item: ItemChanged) -> str:
     return "x {:.2f} m, y {:.2f} m".format(*item.position) if is_on_table else ""
 
 
-def group_items_by_outcome(items: Iterable[ItemChanged]) -> dict[str, list[str]]:
+def group_items_by_outcome(items: Collection[ItemChanged]) -> dict[str, list[str]]:
     """Return names of placed items by bin, and descriptions of the other items by state.
 
     Phantoms, which are detections without an object, are only counted.
     """
     outcomes: dict[str, list[str]] = defaultdict(list)
-    phantom_count = 0
     for item in items:
-        if item.state == "phantom":
-            phantom_count += 1
-        elif item.state == "placed":
+        if item.state == "placed":
             outcomes[item.bin].append(item.item)
-        else:
+        elif item.state != "phantom":
             details = ": ".join(filter(None, (describe_place_on_table(item), item.reason)))
             outcomes[item.state].append(f"{item.item} ({details})" if details else item.item)
-    if phantom_count:
+    if phantom_count := sum(item.state == "phantom" for item in items):
         outcomes["phantom"].append(f"{phantom_count} detected by mistake")
     return dict(outcomes)

@@ -54,7 +54,7 @@ def keyboard() -> Iterator[Keyboard]:
 
 
 def test_a_key_pauses_the_run_and_lets_it_go_on_and_others_mean_nothing(keyboard: Keyboard) -> None:
-    keyboard.press("xq\n\tp", True)
+    keyboard.press("xqé\n\tp", True)
     keyboard.press(" ", False)
     keyboard.press("p", True)
 
