@@ -53,15 +53,15 @@ def draw_frame(
         state: State of the run at the time of the frame.
         subtitle: Second line of the header: seed, cell and speed.
         duration: Duration of the run on the robot's clock [s].
-        has_caption: True to write the current action or failure over the image of the cell.
+        has_caption: True to write the current action or incident over the image of the cell.
     """
     frame = Image.new("RGB", (WIDTH, HEIGHT), BACKGROUND)
     frame.paste(Image.fromarray(picture), (0, 0))
     _draw_camera_image(frame, state.picture_file)
-    if has_caption and (state.failure_text or state.action_text):
-        text, max_lines = (state.failure_text, 2) if state.failure_text else (state.action_text, 1)
+    if has_caption and (state.incident_text or state.action_text):
+        text, max_lines = (state.incident_text, 2) if state.incident_text else (state.action_text, 1)
         lines = style.wrap_text(text, _CAPTION_FONT_SIZE, MAX_CAPTION_WIDTH, max_lines)
-        _draw_caption(frame, lines, FAILURE if state.failure_text else RUNNING)
+        _draw_caption(frame, lines, FAILURE if state.incident_text else RUNNING)
     _draw_header(frame, source.start.mission, subtitle, state.time, duration)
     top = HEIGHT - _PANEL_BOTTOM_MARGIN - panel.compute_items_height(source.item_count)
     ImageDraw.Draw(frame).line((PANEL_LEFT, top - 10, PANEL_RIGHT, top - 10), LINE, 1)

@@ -12,8 +12,8 @@ from executive.record.timeline.activation import Activation, get_skill_name
 from executive.record.timeline.timeline import Timeline
 from executive.view.tree.tree_text import find_skill_names
 
-FAILURE_DISPLAY_TIME = 1.6
-"""Time on the clock of the run for which a film shows a failure [s]."""
+INCIDENT_DISPLAY_TIME = 1.6
+"""Time on the clock of the run for which a film shows a failure, halt or resumption [s]."""
 
 
 class FilmRunState:
@@ -39,7 +39,7 @@ class FilmRunState:
         self._later_events = deque(events)
         self._later_image_files = deque(sorted(image_files))
         self._skill_names_by_path = find_skill_names(nodes)
-        self._incident_text, self._incident_time = "", 0.0
+        self._last_incident, self._last_incident_time = "", 0.0
 
     @property
     def active_paths(self) -> frozenset[str]:
@@ -52,9 +52,9 @@ class FilmRunState:
         return frozenset(path for path, activation in activations if _get_end_key(activation) == end)
 
     @property
-    def failure_text(self) -> str:
-        """Text about a failure, halt or resumption within the last `FAILURE_DISPLAY_TIME`; else ""."""
-        return self._incident_text if self.time < self._incident_time + FAILURE_DISPLAY_TIME else ""
+    def incident_text(self) -> str:
+        """Text about a failure, halt or resumption within the last `INCIDENT_DISPLAY_TIME`; else ""."""
+        return self._last_incident if self.time < self._last_incident_time + INCIDENT_DISPLAY_TIME else ""
 
     @property
     def action_text(self) -> str:
@@ -67,7 +67,7 @@ class FilmRunState:
                 target = timeline.selections.get(activation.item)
                 is_held = item is not None and item.last_change.state == "held"
                 bin_text = f"to {target.bin}" if target is not None and is_held else ""
-                return " ".join(part for part in (name, activation.item, bin_text) if part)
+                return " ".join(filter(None, (name, activation.item, bin_text)))
         return ""
 
     def advance_to(self, step: int, time: float) -> None:
@@ -77,7 +77,7 @@ class FilmRunState:
             timed_event = self._later_events.popleft()
             self.timeline(timed_event)
             if text := _describe_incident(timed_event):
-                self._incident_text, self._incident_time = text, timed_event.clock
+                self._last_incident, self._last_incident_time = text, timed_event.clock
         while self._later_image_files and int(self._later_image_files[0].stem.partition("_")[0]) <= step:
             self.picture_file = self._later_image_files.popleft()
 

@@ -9,7 +9,7 @@ from events import at, item_changed
 from small_tree import NODES, ended, started
 
 from executive.events import Event, FaultRaised, RunHalted, RunResumed, TargetSelected
-from executive.view.film.run_state import FAILURE_DISPLAY_TIME, FilmRunState
+from executive.view.film.run_state import INCIDENT_DISPLAY_TIME, FilmRunState
 
 EVENTS = [
     started(0, "tree"),
@@ -68,12 +68,12 @@ def test_a_round_is_over_where_its_root_begins_again_or_succeeds(events, opened,
 
 def test_a_failure_with_an_item_is_shown_for_some_time(state: FilmRunState) -> None:
     state.advance_to(240, 1.0)
-    assert state.failure_text == "Grasp.missed: no seal"
+    assert state.incident_text == "Grasp.missed: no seal"
     state.advance_to(300, 1.25)
     assert state.picture_file == Path("frames/000250_cube-1_missed.jpg")
-    assert state.failure_text
-    state.advance_to(700, 1.0 + FAILURE_DISPLAY_TIME + 0.01)
-    assert state.failure_text == ""
+    assert state.incident_text
+    state.advance_to(700, 1.0 + INCIDENT_DISPLAY_TIME + 0.01)
+    assert state.incident_text == ""
 
 
 def test_of_a_tree_that_ended_what_ended_last_stays_open(state: FilmRunState) -> None:
@@ -85,7 +85,7 @@ def test_of_a_tree_that_ended_what_ended_last_stays_open(state: FilmRunState) ->
     assert statuses(state)["tree"] == "FAILURE"
     assert state.timeline.find_current_activation("tree/Transit").reason_or_item == "blocked"
     # It was about no item: the tree says it, and nothing else has to.
-    assert state.failure_text == ""
+    assert state.incident_text == ""
 
 
 @pytest.mark.parametrize(
@@ -95,4 +95,4 @@ def test_of_a_tree_that_ended_what_ended_last_stays_open(state: FilmRunState) ->
 def test_events_of_the_whole_run_are_shown(event: Event, sentence: str) -> None:
     state = FilmRunState([at(1, event, 0.0)], NODES, [])
     state.advance_to(1, 0.0)
-    assert state.failure_text == sentence
+    assert state.incident_text == sentence
