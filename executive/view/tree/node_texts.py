@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from executive.mission.outline import OutlineNode
 from executive.tree.node import ControlNode
 from executive.view.text import wrap_and_truncate
-from executive.view.tree.tree_text import describe_reads, describe_reasons, describe_writes
+from executive.view.tree.tree_text import describe_connections, describe_reasons
 
 MAX_LINE_LENGTH = 28
 """Maximum length of a line of text in the box of a node [characters]."""
@@ -47,8 +47,7 @@ def _make_tooltip(node: OutlineNode) -> str:
         node.doc,
         node.when,
         node.detail,
-        describe_reads(node),
-        describe_writes(node),
+        *describe_connections(node),
         describe_reasons(node),
         f"subtree {node.subtree}" if node.subtrees else "",
         node.path,

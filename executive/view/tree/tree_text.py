@@ -35,14 +35,10 @@ def draw_text(nodes: Sequence[OutlineNode], *, shows_ports: bool = False, shows_
     return "\n".join(lines)
 
 
-def describe_reads(node: OutlineNode) -> str:
-    """Return a text with the variables that a skill reads; `?` marks optional variables; "" for none."""
-    return _describe_connections("reads", node.reads, "<-")
-
-
-def describe_writes(node: OutlineNode) -> str:
-    """Return a text with the variables that a skill writes; "" for none."""
-    return _describe_connections("writes", node.writes, "->")
+def describe_connections(node: OutlineNode) -> list[str]:
+    """Return the texts about the variables that a skill reads and that it writes, without empty texts."""
+    texts = _format_variables("reads", node.reads, "<-"), _format_variables("writes", node.writes, "->")
+    return list(filter(None, texts))
 
 
 def describe_reasons(node: OutlineNode) -> str:
@@ -122,14 +118,14 @@ def _list_details(node: OutlineNode, shows_ports: bool, shows_reasons: bool) -> 
     """Yield the texts below the line of a node."""
     if shows_reasons and node.when:
         yield node.when
-    if shows_ports and (node.reads or node.writes):
-        yield "; ".join(filter(None, (describe_reads(node), describe_writes(node))))
+    if shows_ports and (texts := describe_connections(node)):
+        yield "; ".join(texts)
     if shows_reasons and node.reasons:
         yield describe_reasons(node)
 
 
-def _describe_connections(verb: str, connections: Sequence[Connection], arrow: str) -> str:
-    """Return a text with the variables of connections, and the ports whose name differs from the variable."""
+def _format_variables(verb: str, connections: Sequence[Connection], arrow: str) -> str:
+    """Return a text with the variables (`?` for optional), and the ports whose name differs; "" for none."""
     texts = []
     for connection in connections:
         variable = f"${connection.variable}" + ("" if connection.required else "?")
