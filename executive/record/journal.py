@@ -43,10 +43,8 @@ class Journal:
             try:
                 _lock(fd, path)
                 if not resume and os.fstat(fd).st_size:
-                    raise InputError(
-                        f'"{path}" is the journal of another run; a new run needs its own directory: name '
-                        "another folder with --runs DIR"
-                    )
+                    advice = "a new run needs its own directory: name another folder with --runs DIR"
+                    raise InputError(f'"{path}" is the journal of another run; {advice}')
                 self._file_size = _repair_end(fd) if resume else 0
             except BaseException:
                 os.close(fd)
@@ -76,10 +74,9 @@ class Journal:
             with contextlib.suppress(OSError):
                 if os.fstat(self._fd).st_size > self._file_size:
                     os.ftruncate(self._fd, self._file_size)
-            raise RecordLost(
-                f'the journal "{self._path}" cannot be written: {describe_os_error(error)}; '
-                "the run stops, because nobody could explain a run without a journal"
-            ) from error
+            problem = f'the journal "{self._path}" cannot be written: {describe_os_error(error)}'
+            consequence = "the run stops, because nobody could explain a run without a journal"
+            raise RecordLost(f"{problem}; {consequence}") from error
 
     def close(self) -> None:
         """Sync the file to the disk and close the file; further calls have no effect.
@@ -193,10 +190,9 @@ def _lock(fd: int, path: Path) -> None:
     except BlockingIOError as error:
         pid = _find_lock_holder(fd)
         writer, command = (f"process {pid}", f'"kill {pid}"') if pid else ("another process", "Ctrl-C")
-        raise InputError(
-            f'the run directory "{path.parent}" is in use: {writer} writes its journal, and two runs cannot '
-            f"share it; wait until that run has ended, or stop it with {command}"
-        ) from error
+        problem = f'the run directory "{path.parent}" is in use: {writer} writes its journal'
+        advice = f"wait until that run has ended, or stop it with {command}"
+        raise InputError(f"{problem}, and two runs cannot share it; {advice}") from error
 
 
 def _find_lock_holder(fd: int) -> int | None:

@@ -100,10 +100,9 @@ def _check_end(directory: RunDirectory, events: Sequence[TimedEvent]) -> bool:
     if end is None:
         return False
     if end.status == "INCOMPLETE" and end.held_item:
-        raise InputError(
-            f'the run in "{directory.path}" ended with {end.held_item} in the tool and cannot be '
-            "resumed; take it out of the tool and run the mission again"
-        )
+        problem = f"ended with {end.held_item} in the tool and cannot be resumed"
+        advice = "take it out of the tool and run the mission again"
+        raise InputError(f'the run in "{directory.path}" {problem}; {advice}')
     if end.status in FINAL_STATUSES and read_result(directory, events) is not None:
         raise InputError(f'the run in "{directory.path}" ended as {end.status}; there is nothing to resume')
     return end.status in FINAL_STATUSES
@@ -115,8 +114,6 @@ def _describe_missing_commands(replayed_cell: ReplayedCell) -> str:
     if interruption is None or interruption.last_action != UNKNOWN_ACTION:
         return ""
     count = interruption.resume_tick - interruption.complete_step_count
-    duration = count * replayed_cell.log.control_period
-    return (
-        f"the journal ends {count} control steps ({duration:.2f} s) before the "
-        "log of the world and may lack commands to the tool; the scene is observed before the run continues"
-    )
+    steps = f"{count} control steps ({count * replayed_cell.log.control_period:.2f} s)"
+    problem = f"the journal ends {steps} before the log of the world and may lack commands to the tool"
+    return f"{problem}; the scene is observed before the run continues"

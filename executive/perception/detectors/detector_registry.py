@@ -103,7 +103,5 @@ def find_detectable_labels(
 
 
 def _describe_missing_kind(name: str, kind: str, kinds: Mapping[str, PluginEntry]) -> str:
-    return (
-        f'detector "{name}" is of kind "{kind}", which is not installed; '
-        f"installed: {', '.join(sorted(kinds)) or 'none'}"
-    )
+    installed_kinds = ", ".join(sorted(kinds)) or "none"
+    return f'detector "{name}" is of kind "{kind}", which is not installed; installed: {installed_kinds}'

@@ -99,10 +99,9 @@ class OnnxModel:
         if not isinstance(size, int):
             raise InputError(f"{path} has an input of variable size; export it with a fixed size")
         if class_count != len(self.labels):
-            raise InputError(
-                f"{path} has {class_count} classes, but there are {len(self.labels)} labels: "
-                f"{', '.join(self.labels)}; give one label per class, in the order of the model"
-            )
+            labels = f"{len(self.labels)} labels: {', '.join(self.labels)}"
+            advice = "give one label per class, in the order of the model"
+            raise InputError(f"{path} has {class_count} classes, but there are {labels}; {advice}")
         return size
 
 
@@ -118,9 +117,8 @@ def read_labels(path: Path) -> tuple[str, ...]:
         InputError: The file does not exist, is not a text file, or is empty.
     """
     if not path.is_file():
-        raise InputError(
-            f"there is no label file {path}; it needs one class name per line, in the order of the model"
-        )
+        advice = "it needs one class name per line, in the order of the model"
+        raise InputError(f"there is no label file {path}; {advice}")
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:

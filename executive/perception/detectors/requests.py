@@ -129,10 +129,8 @@ class PendingSearch:
             Unavailable: The detector gave no usable answer.
         """
         if not self.ready:
-            raise RuntimeError(
-                f"the answer is due at {self.due_time:.3f} s, and the time is {self.clock.now:.3f} s; "
-                "wait until `ready` is true"
-            )
+            problem = f"the answer is due at {self.due_time:.3f} s, and the time is {self.clock.now:.3f} s"
+            raise RuntimeError(f"{problem}; wait until `ready` is true")
         return Answer(self.detector, tuple(self.future.result()), self.error_rates)
 
 

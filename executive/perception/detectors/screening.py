@@ -44,16 +44,12 @@ def screen_answer(answer: Answer, frame: Frame, view: str, labels: Collection[st
         Unavailable: A box, a confidence or a label is invalid.
     """
     if len(answer.confident) > MAX_BOXES:
-        raise Crowded(
-            f"detector {answer.detector} found {len(answer.confident)} boxes in the view {view}, which "
-            f"cannot all be objects; at most {MAX_BOXES} are allowed: raise `floor` of the detector in "
-            "the cell file, or use another detector"
-        )
+        problem = f"found {len(answer.confident)} boxes in the view {view}, which cannot all be objects"
+        advice = "raise `floor` of the detector in the cell file, or use another detector"
+        raise Crowded(f"detector {answer.detector} {problem}; at most {MAX_BOXES} are allowed: {advice}")
     if invalid := next(filterfalse(_is_valid, answer.confident), None):
-        raise Unavailable(
-            f"detector {answer.detector} returned an invalid box: {invalid.label[:MAX_LABEL_LENGTH]!r} "
-            f"{invalid.confidence:g} at {invalid.box}"
-        )
+        box = f"{invalid.label[:MAX_LABEL_LENGTH]!r} {invalid.confidence:g} at {invalid.box}"
+        raise Unavailable(f"detector {answer.detector} returned an invalid box: {box}")
     threshold = answer.error_rates.threshold
     confident: list[Detection] = []
     doubtful: list[Detection] = []

@@ -39,10 +39,8 @@ def try_write_report(run: str) -> tuple[str, str]:
     except ExecutiveError as error:
         return "", f"no report was written: {error}"
     except Exception as error:
-        return "", (
-            f"no report was written: {type(error).__name__}: {error}; "
-            f"`executive --debug report {run}` shows the traceback"
-        )
+        advice = f"`executive --debug report {run}` shows the traceback"
+        return "", f"no report was written: {type(error).__name__}: {error}; {advice}"
 
 
 def write_report(path: Path) -> Path:

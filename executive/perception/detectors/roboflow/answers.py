@@ -62,11 +62,10 @@ def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
         validated = _Answer.model_validate(answer)
     except ValidationError as error:
         raise ValueError(_describe_first_error(error)) from None
-    if validated.image is not None and (validated.image.width, validated.image.height) != size:
-        raise ValueError(
-            f"it belongs to an image of {validated.image.width:g} x {validated.image.height:g} pixels, "
-            f"and {size[0]} x {size[1]} were sent"
-        )
+    image, sent_size = validated.image, f"{size[0]} x {size[1]}"
+    if image is not None and (image.width, image.height) != size:
+        image_size = f"{image.width:g} x {image.height:g} pixels"
+        raise ValueError(f"it belongs to an image of {image_size}, and {sent_size} were sent")
     return list(_convert_predictions(validated.predictions, size))
 
 
@@ -103,10 +102,9 @@ def _convert_predictions(predictions: list[_Prediction], size: tuple[int, int]) 
             or max(right / width, bottom / height) > 1 + MAX_OVERHANG
             or not (0 <= prediction.x <= width and 0 <= prediction.y <= height)
         ):
-            raise ValueError(
-                f"predictions[{index}] is a box from ({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f}) "
-                f"in an image of {width} x {height} pixels"
-            )
+            corners = f"({left:.0f}, {top:.0f}) to ({right:.0f}, {bottom:.0f})"
+            image = f"an image of {width} x {height} pixels"
+            raise ValueError(f"predictions[{index}] is a box from {corners} in {image}")
         box = max(left, 0.0), max(top, 0.0), min(right, float(width)), min(bottom, float(height))
         yield Detection(prediction.label, prediction.confidence, box)
 

@@ -86,9 +86,8 @@ class InferenceProcess:
             raise Unavailable(f"its helper process was not ready within {STARTUP_TIMEOUT:.0f} s") from None
         if "setup_error" in message:
             self._discard_process()
-            raise Unavailable(
-                f"inference-sdk cannot be used: {message['setup_error']}; `executive doctor` checks packages"
-            )
+            problem = f"inference-sdk cannot be used: {message['setup_error']}"
+            raise Unavailable(f"{problem}; `executive doctor` checks packages")
         self._is_ready = True
 
     def request(self, image: NDArray[np.uint8], deadline: float) -> Mapping[str, Any]:

@@ -77,10 +77,8 @@ class RoboflowOptions(DetectorOptions):
         errors = list(super().find_errors(config))
         for option, message in errors:
             if any(part in option.lower() for part in SECRET_WORDS):
-                message = (
-                    f'"{option}" does not belong in a cell file, because others can read the file; '
-                    f"delete the option and set the environment variable {KEY_VARIABLE}"
-                )
+                problem = f'"{option}" does not belong in a cell file, because others can read the file'
+                message = f"{problem}; delete the option and set the environment variable {KEY_VARIABLE}"
             yield option, message
         if errors:
             return
