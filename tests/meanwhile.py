@@ -29,7 +29,7 @@ def meanwhile(
         act: Changes the world; the arm is at rest before, and what was moved comes to rest after.
         kind: Makes the work cell, a fake or a simulated one.
     """
-    options = CellOptions(SilentOperator(), base=loaded.cell_path.parent, resume=ResumePoint(log))
+    options = CellOptions(SilentOperator(), cell_folder=loaded.cell_path.parent, resume=ResumePoint(log))
     cell = kind(loaded.cell_config, seed=seed, routes=loaded.routes, emit=discard_event, options=options)
     with closing(cell):
         world = open_world(cell)

@@ -105,14 +105,14 @@ class CellOptions:
 
     Attributes:
         operator: The person or script that requests classes of objects.
-        base: Folder to which paths in the cell file are relative.
+        cell_folder: Folder of the cell file, to which paths in the file are relative.
         gui: True to show the simulated world in a window.
         resume: State of the cell at the interruption of a resumed run; None for a new run.
         scene: Scene file with differences of the simulated world from the cell file; None: no differences.
     """
 
     operator: Operator
-    base: Path
+    cell_folder: Path
     gui: bool = False
     resume: ResumePoint | None = None
     scene: Path | None = None
@@ -130,13 +130,13 @@ class CellKind(Protocol):
     ) -> Workcell:
         """Return a cell for a cell file (`executive.cell.config.CellConfig`)."""
 
-    def check(self, config: Any, base: Path) -> Iterable[tuple[KeyPath, str]]:
+    def check(self, config: Any, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
         """Yield key and message of each error that the validation of the cell file does not find.
 
-        `base` is the folder to which paths in the file are relative.
+        `cell_folder` is the folder of the cell file, to which paths in the file are relative.
         """
 
-    def labels(self, config: Any, base: Path) -> Mapping[str, tuple[str, ...] | None]:
+    def labels(self, config: Any, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
         """Return the labels that each detector of a cell file can report, by name of the detector.
 
         The labels of a detector are None if they are unknown before its first answer. Errors in the file are

@@ -109,10 +109,9 @@ class BinContents:
 
 def find_probable_bin(record: ItemRecord) -> str | None:
     """Return the name of the bin that contains a dropped item with at least 95 % probability, or None."""
-    if record.state is not State.DROPPED:
-        return None
-    log_odds = record.bin_log_odds
-    return next((bin_name for bin_name in log_odds if log_odds[bin_name] >= LOG_ODDS_FELL_IN_BIN), None)
+    log_odds_by_bin = record.bin_log_odds.items()
+    probable_bins = (name for name, log_odds in log_odds_by_bin if log_odds >= LOG_ODDS_FELL_IN_BIN)
+    return next(probable_bins, None) if record.state is State.DROPPED else None
 
 
 def update_bin_log_odds(record: ItemRecord, bin_name: str, rates: ErrorRates, *, is_visible: bool) -> None:

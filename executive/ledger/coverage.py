@@ -80,8 +80,8 @@ class Coverage:
         # The views of one pose count as two viewpoints: of 31 objects that the detector of the cell fasteners
         # missed in the view `table`, the detector found 27 in the view `full`.
         viewpoint = f"{make_viewpoint_key(look)} {look.view}"
-        miss_rate, repeated = look.error_rates.miss_rate, look.error_rates.repeated
-        repeated_miss_rate = compute_repeat_probability(miss_rate, repeated)
+        miss_rate = look.error_rates.miss_rate
+        repeated_miss_rate = compute_repeat_probability(miss_rate, look.error_rates.repeated)
         earlier_searched_mask = self._searched_masks.setdefault(viewpoint, np.zeros(len(self._points), bool))
         miss_rates = np.where(earlier_searched_mask, repeated_miss_rate, miss_rate)
         self._miss_probabilities[searched_mask] *= miss_rates[searched_mask]

@@ -88,7 +88,7 @@ def test_all_findings_come_at_once_and_in_order(load: Load, small_cell: str) -> 
 def test_findings_of_the_robot_stand_in_the_cell_file(load: Load) -> None:
     class Short(FakeCell):
         @staticmethod
-        def check(config: CellConfig, base: Path) -> Iterable[tuple[tuple[str | int, ...], str]]:
+        def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[tuple[str | int, ...], str]]:
             yield ("bins", "blue_bin", "position"), "0.3 m out of reach"
 
     with pytest.raises(MissionError) as caught:

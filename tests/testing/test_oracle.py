@@ -19,7 +19,7 @@ def build(missions, request):
 
     def build(**oracle):
         path = missions / "cells" / "overhead.yaml"
-        options = CellOptions(SilentOperator(), base=path.parent)
+        options = CellOptions(SilentOperator(), cell_folder=path.parent)
         made = make_oracle_kind(**oracle)(
             load_cell(path), seed=3, routes=SHIPPED_ROUTES, emit=discard_event, options=options
         )

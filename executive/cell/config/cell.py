@@ -123,9 +123,7 @@ class CellConfig(Section):
         cls, detectors: dict[str, DetectorConfig], info: ValidationInfo
     ) -> dict[str, DetectorConfig]:
         """Put the default detector first, because skills use the first detector by default."""
-        default = info.data.get("detector", "")
-        if not default:
-            return detectors
+        default = info.data.get("detector") or next(iter(detectors))
         if default not in detectors:
             names = ", ".join(detectors)
             raise ValueError(f'must contain the default detector "{default}"; there are: {names}')

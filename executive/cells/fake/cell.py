@@ -82,7 +82,7 @@ class FakeCell(CellWithoutHardware):
         options: CellOptions | None = None,
     ) -> None:
         config = config or load_empty_cell()
-        options = options or CellOptions(SilentOperator(), base=Path())
+        options = options or CellOptions(SilentOperator(), cell_folder=Path())
         if options.gui:
             raise InputError(f'cell {config.cell} is of kind "fake" and has no window; run it without --gui')
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
@@ -122,9 +122,9 @@ class FakeCell(CellWithoutHardware):
         )
 
     @staticmethod
-    def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
+    def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
         """Return key and message for an unsupported arm, each place out of reach, and a lack of room."""
-        del base
+        del cell_folder
         if arm_errors := tuple(find_arm_errors(config)):
             return arm_errors
         room_error = _describe_lack_of_room(config, config.table.objects[1])
@@ -132,9 +132,9 @@ class FakeCell(CellWithoutHardware):
         return (*find_places_out_of_reach(config), *room_errors)
 
     @staticmethod
-    def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
+    def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
         """Return None for every detector: a fake detector knows all classes."""
-        del base
+        del cell_folder
         return dict.fromkeys(config.detectors)
 
     @staticmethod

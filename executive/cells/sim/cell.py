@@ -94,9 +94,9 @@ class SimCell(CellWithoutHardware):
         classes = {label: build_simulated_class(label, section) for label, section in config.objects.items()}
         localizer = build_localizer(config.localization, classes, bins, self._world.cast_ray)
         # Detectors are built last, because their processes would outlive an exception in a later statement.
-        folders = (options.base, get_shipped_folder() / "cells")
+        folders = (options.cell_folder, get_shipped_folder() / "cells")
         self._detectors = build_detectors(
-            config, clock=clock, base=options.base, seed=seeds.detectors, folders=folders
+            config, clock=clock, base=options.cell_folder, seed=seeds.detectors, folders=folders
         )
         self.cell = replace(
             self.cell,
@@ -109,7 +109,7 @@ class SimCell(CellWithoutHardware):
         )
 
     @staticmethod
-    def check(config: CellConfig, base: Path) -> Iterable[tuple[KeyPath, str]]:
+    def check(config: CellConfig, cell_folder: Path) -> Iterable[tuple[KeyPath, str]]:
         """Return key and message of each requirement of a cell file that the simulated cell cannot fulfil.
 
         The requirements concern the arm and its reach, the models, the detectors, the room for the objects,
@@ -121,7 +121,7 @@ class SimCell(CellWithoutHardware):
         return (
             *model_errors,
             *_find_missing_depth_sensors(config),
-            *find_detector_errors(config.detectors, base),
+            *find_detector_errors(config.detectors, cell_folder),
             *find_places_out_of_reach(config),
             *find_lack_of_room(config),
             # The check of the poses builds a world, which is impossible if a model is missing.
@@ -129,9 +129,9 @@ class SimCell(CellWithoutHardware):
         )
 
     @staticmethod
-    def labels(config: CellConfig, base: Path) -> Mapping[str, tuple[str, ...] | None]:
+    def labels(config: CellConfig, cell_folder: Path) -> Mapping[str, tuple[str, ...] | None]:
         """Return the classes that each detector knows, or None if unknown; no detector model is loaded."""
-        return find_detectable_labels(config.detectors, base)
+        return find_detectable_labels(config.detectors, cell_folder)
 
     @staticmethod
     def min_times(config: CellConfig) -> SimMinTimes:

@@ -184,7 +184,7 @@ def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
     If the skill has a target as input, and uses the tool without the arm, the suction cup touches the
     first target.
     """
-    fake = FakeCell(options=CellOptions(SilentOperator(list(SHIPPED_ROUTES)), base=Path()))
+    fake = FakeCell(options=CellOptions(SilentOperator(list(SHIPPED_ROUTES)), cell_folder=Path()))
     table, labels = load_empty_cell().table, list(fake.cell.classes)
     for label, y in zip(labels, np.linspace(*table.y, len(labels) + 2)[1:-1], strict=True):
         fake.world.put(label, sum(table.x) / 2, float(y))

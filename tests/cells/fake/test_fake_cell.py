@@ -69,7 +69,7 @@ def test_as_many_objects_as_the_file_says_lie_apart_on_its_table(load: Load) -> 
 
 
 def test_a_window_too_many_objects_and_unknown_ones_are_refused(load: Load, fake: FakeCell) -> None:
-    options = CellOptions(SilentOperator(), base=Path(), gui=True)
+    options = CellOptions(SilentOperator(), cell_folder=Path(), gui=True)
     with pytest.raises(InputError, match='overhead is of kind "fake" and has no window; run it without'):
         FakeCell(load(), options=options)
     with pytest.raises(InputError, match=r'"cub" can be put on the fake table\. Did you mean "cube"'):

@@ -35,7 +35,7 @@ def with_one(missions: Path, request: pytest.FixtureRequest) -> Callable[..., Si
         path = missions / "cells" / "fasteners.yaml"
         config = load_cell(path, {"cell.table.objects": "[1, 1]"})
         config = config.model_copy(update={"objects": {label: config.objects[label]}})
-        options = CellOptions(SilentOperator(), base=path.parent)
+        options = CellOptions(SilentOperator(), cell_folder=path.parent)
         made = make_oracle_kind()(
             config, seed=seed, routes={label: ROUTES[label]}, emit=discard_event, options=options
         )

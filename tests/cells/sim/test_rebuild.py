@@ -90,7 +90,7 @@ def left(mission, tmp_path_factory: pytest.TempPathFactory) -> list[Left]:
 
 
 def rebuilt(mission, log: Path) -> SimCell:
-    options = CellOptions(SilentOperator(), base=mission.cell_path.parent, resume=ResumePoint(log))
+    options = CellOptions(SilentOperator(), cell_folder=mission.cell_path.parent, resume=ResumePoint(log))
     return make_oracle_kind()(
         mission.cell_config, seed=SEED, routes=mission.routes, emit=discard_event, options=options
     )

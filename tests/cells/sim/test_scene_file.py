@@ -55,7 +55,7 @@ def cell(overhead: CellConfig, tmp_path: Path, request: pytest.FixtureRequest) -
         quiet = {"noise": {"gain": 0, "read": 0}}
         sections["camera"] = {**quiet, **sections.get("camera", {})}
         path.write_text(yaml.safe_dump({"scene": "changed", **sections}))
-        options = CellOptions(SilentOperator(), base=tmp_path, scene=path)
+        options = CellOptions(SilentOperator(), cell_folder=tmp_path, scene=path)
         make = make_oracle_kind(box_std=0.0, renders_images=True)
         made = make(config, seed=SEED, routes=SHIPPED_ROUTES, emit=discard_event, options=options)
         request.addfinalizer(made.close)

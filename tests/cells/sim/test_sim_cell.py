@@ -29,7 +29,7 @@ def build_cell(missions: Path, request: pytest.FixtureRequest) -> Build:
     def build_cell(name: str = "overhead", seed: int = 4, **changes: Any) -> SimCell:
         path = missions / "cells" / f"{name}.yaml"
         config = load_cell(path).model_copy(update=changes)
-        options = CellOptions(SilentOperator(), base=path.parent)
+        options = CellOptions(SilentOperator(), cell_folder=path.parent)
         made = make_oracle_kind(box_std=0.0)(
             config, seed=seed, routes=SHIPPED_ROUTES, emit=discard_event, options=options
         )

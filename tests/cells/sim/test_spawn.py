@@ -111,7 +111,7 @@ def test_a_load_travels_over_stacks_and_starts_from_their_tops(overhead: CellCon
 
 
 def test_the_first_world_is_the_one_that_a_cell_of_the_same_seed_begins_with(overhead: CellConfig) -> None:
-    options = CellOptions(SilentOperator(), base=Path("."))
+    options = CellOptions(SilentOperator(), cell_folder=Path("."))
     cell = make_oracle_kind()(overhead, seed=9, routes={}, emit=discard_event, options=options)
     world = build_initial_world(overhead, 9)
     assert (world.labels, world.rest_positions) == (cell._world.labels, {})

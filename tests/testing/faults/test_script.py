@@ -144,7 +144,7 @@ def test_everything_else_is_the_cell_that_it_wraps() -> None:
 
 def test_a_kind_of_cell_has_faults_in_one_run_after_the_other() -> None:
     kind = with_faults(FakeCell, [after(0.0, effects.table_bumped())])
-    options = CellOptions(SilentOperator(), base=Path())
+    options = CellOptions(SilentOperator(), cell_folder=Path())
     for _ in range(2):
         cell = kind(load_empty_cell(), seed=0, routes={}, emit=discard_event, options=options)
         cell.advance()
