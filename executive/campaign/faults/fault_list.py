@@ -163,7 +163,9 @@ class _FaultLister:
             yield _make_part_fault("object", "removed", occasion, after(start, removed))
             yield _make_part_fault("object", "bumped", occasion, after(start, bumped))
         for node in self.nodes:
-            if not _is_moving_to_target(self._skills[node.skill]) or not self._has_run(node):
+            skill = self._skills[node.skill]
+            has_target = any(port.type is Target for port in list_input_ports(skill))
+            if not (skill.moves and has_target and self._has_run(node)):
                 continue
             middle_activation = 1 + len(self._nominal_run.steps_by_path[node.path]) // 2
             for occasion, fraction in QUARTER_FRACTIONS:
@@ -222,8 +224,3 @@ def _make_part_fault(part: str, kind: str, occasion: Occasion, cell_fault: Sched
 
 def _describe_time(fraction: float) -> str:
     return f"after {fraction:.0%} of the motion"
-
-
-def _is_moving_to_target(skill: type[Skill]) -> bool:
-    """Return True if the skill moves the arm and has a target as an input."""
-    return skill.moves and any(port.type is Target for port in list_input_ports(skill))

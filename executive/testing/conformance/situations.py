@@ -111,18 +111,13 @@ def prepare_scene(
     except Exception as error:
         raise ArrangementFailed(f"the function `arrange` raised {type(error).__name__}: {error}") from error
     declarations: list[Param | Port] = [*skill.params.values(), *list_input_ports(skill)]
-    missing = []
-    for declared in declarations:
-        needs_value = declared.is_required or (situation.has_all_inputs and isinstance(declared, Port))
-        if declared.name in values or not needs_value:
-            continue
-        if (value := _generate_value(declared, scene)) is not None:
-            values[declared.name] = value
-        elif declared.is_required:
-            missing.append(declared)
-    if missing:
-        names = " and ".join(f'"{declared.name}" ({describe_type(declared.type)})' for declared in missing)
-        example = ", ".join(f'"{declared.name}": ...' for declared in missing)
+    for entry in declarations:
+        needs_value = entry.is_required or (situation.has_all_inputs and isinstance(entry, Port))
+        if needs_value and entry.name not in values and (value := _generate_value(entry, scene)) is not None:
+            values[entry.name] = value
+    if missing := [entry for entry in declarations if entry.is_required and entry.name not in values]:
+        names = " and ".join(f'"{entry.name}" ({describe_type(entry.type)})' for entry in missing)
+        example = ", ".join(f'"{entry.name}": ...' for entry in missing)
         raise ArrangementFailed(
             f"no value can be generated for {names}. Return it from a function in a test: "
             f"list_conformance_checks({skill.__name__}, lambda scene: {{{example}}}); "
@@ -168,14 +163,13 @@ def _find_name_in_scene(refers_to: str, scene: SkillScene) -> str | None:
     """Return a name of the kind `refers_to` from the scene, for instance of a bin; None: unknown kind."""
     fake = scene.cell
     label = fake.ledger.get_label(scene.item)
-    names = {
+    return {
         "item": scene.item,
         "class": label,
         "bin": fake.routes[label][0],
         "detector": next(iter(fake.detectors)),
         "pose": list(fake.arm.poses)[-1],
-    }
-    return names.get(refers_to)
+    }.get(refers_to)
 
 
 def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
@@ -190,7 +184,9 @@ def build_scene(skill: type[Skill], *, is_holding: bool) -> SkillScene:
         fake.world.put(label, sum(table.x) / 2, float(y))
     detections, targets = detect_targets(fake)
     item = targets[0].item
-    if is_holding or _starts_at_target(skill):
+    input_types = [port.type for port in list_input_ports(skill)]
+    starts_at_target = "tool" in skill.uses and "arm" not in skill.uses and Target in input_types
+    if is_holding or starts_at_target:
         object_class = fake.cell.classes[targets[0].label]
         top = targets[0].position + np.array([object_class.contact_radius, 0.0, object_class.height / 2])
         fake.arm.set_tool_pose(make_tool_down_pose(top, 0.0))
@@ -213,12 +209,6 @@ def detect_targets(fake: FakeCell) -> tuple[Detections, list[Target]]:
         fake.advance()
     detections = Detections(**vars(request.result()), frame=frame, view=view, area=camera.get_view_box(view))
     return detections, list(fake.ledger.observe(detections, fake.cell.localizer.localize(detections)))
-
-
-def _starts_at_target(skill: type[Skill]) -> bool:
-    """Return True if the skill has a target as input, and uses the tool without the arm."""
-    input_types = [port.type for port in list_input_ports(skill)]
-    return "tool" in skill.uses and "arm" not in skill.uses and Target in input_types
 
 
 def list_input_ports(skill: type[Skill]) -> list[Port]:

@@ -1,18 +1,25 @@
-"""Test runs of one skill, which its conformance checks share; a run is executed at its first use."""
+"""Test runs of one skill and their injected faults; all conformance checks of the skill share the runs."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
 
+from executive.cells.fake.arm import FakeMotion
 from executive.skill import Skill
+from executive.testing import faults
 from executive.testing.conformance.situations import Arrange, NotTestable, Situation, list_situations
-from executive.testing.conformance.skill_faults import NamedFault, list_skill_faults
-from executive.testing.conformance.skill_test_run import SkillTestRun
+from executive.testing.conformance.skill_test_run import NamedFault, SkillTestRun
+from executive.testing.faults.effect import Effect, Occurrence
 
 MAX_HALTS = 40
 """Maximum number of halts at evenly spaced ticks of a run, and maximum number of halts at calls."""
+RUN_INTERVALS = 20
+"""Number of equal intervals of a run; the seal breaks at each boundary, in a test run of its own."""
+PRECEDING_MOTION_STEPS = 24
+"""Duration of a motion that is still in progress when the skill starts [control steps]."""
 
 
 class TickNotReturned(NotTestable):
@@ -20,7 +27,7 @@ class TickNotReturned(NotTestable):
 
 
 class SkillRuns:
-    """The test runs of one skill.
+    """The test runs of one skill; a run is executed at its first use.
 
     Args:
         name: Name of the skill in messages.
@@ -97,3 +104,53 @@ def _choose_halt_ticks(test_run: SkillTestRun) -> list[int]:
     evenly_spaced = np.linspace(1, test_run.ticks, min(test_run.ticks, MAX_HALTS), dtype=int).tolist()
     call_ticks = sorted({call.tick + offset for call in test_run.calls for offset in (0, 1)})
     return sorted(tick for tick in {*evenly_spaced, *call_ticks[:MAX_HALTS]} if 1 <= tick <= test_run.ticks)
+
+
+def list_skill_faults(skill: type[Skill], ticks: int, *, is_holding: bool) -> Iterator[NamedFault]:
+    """Yield the faults for a skill whose run without a fault has `ticks` control steps.
+
+    Faults that need an object in the tool at the start are yielded only if `is_holding` is True.
+    """
+    for fault in _FAULTS:
+        can_occur = is_holding or not fault.requires_holding
+        if can_occur and (not fault.resource or fault.resource in skill.uses):
+            yield fault
+    if "tool" in skill.uses:
+        break_ticks = {round(ticks * index / RUN_INTERVALS) for index in range(RUN_INTERVALS + 1)}
+        for tick in sorted(break_ticks):
+            yield NamedFault(f"while the seal breaks at tick {tick}", faults.seal_breaks(None), tick=tick)
+
+
+def _move_arm(occurrence: Occurrence) -> bool:
+    """Start a motion of the arm, as a preceding skill could have done."""
+    arm = occurrence.context.cell.arm
+    arm.start(FakeMotion([arm.tool_pose] * PRECEDING_MOTION_STEPS))
+    return True
+
+
+def _empty_table(occurrence: Occurrence) -> bool:
+    """Remove all objects from the table; return False, so that also later objects are removed."""
+    context = occurrence.context
+    while (true_object := context.find_object("nearest", "")) is not None:
+        context.world.remove(true_object)
+    return False
+
+
+_FAULTS = (
+    NamedFault("while the suction cup cannot seal", faults.seal_fails(), "tool"),
+    NamedFault("while the tool sticks", faults.tool_sticks(), "tool", requires_holding=True),
+    NamedFault("while the table is empty", Effect("table_empty", _empty_table)),
+    NamedFault("while the table has changed since the last image", faults.table_bumped()),
+    NamedFault("while the arm collides", faults.arm_collides(), "arm"),
+    NamedFault("while the arm still moves at the start", Effect("arm_moves", _move_arm), "arm"),
+    NamedFault("while the goal is unreachable", faults.no_path(), "arm"),
+    NamedFault("while every path is blocked", faults.no_path(is_blocked=True), "arm"),
+    NamedFault("while the arm occludes the table", faults.workspace_occluded()),
+    NamedFault("while no depth is measured", faults.no_depth()),
+    NamedFault("while no detector answers", faults.detector_dead()),
+    NamedFault("while the detectors detect nothing", faults.detector_blind()),
+    NamedFault("while all confidences are low", faults.detector_unsure()),
+    NamedFault("while the operator quits", faults.operator_quits()),
+    NamedFault("while the operator requests a new scan", faults.operator_asks_rescan()),
+)
+"""Faults that begin at the start of a run."""

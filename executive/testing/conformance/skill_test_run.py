@@ -21,9 +21,9 @@ from executive.errors import Fault
 from executive.events import NodeStarted, TimedEvent
 from executive.skill import Skill, SkillFailed
 from executive.testing.conformance.situations import Arrange, Situation, prepare_scene
-from executive.testing.conformance.skill_faults import NamedFault
 from executive.testing.conformance.source_code import find_skill_line
 from executive.testing.faults import FaultyCell, during
+from executive.testing.faults.effect import Effect
 from executive.tree.skill_run import SkillRun
 
 MAX_RUN_TIME = 60.0
@@ -49,6 +49,25 @@ class Call:
     tick: int
     name: str
     arguments: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class NamedFault:
+    """A fault of the cell in a test run of a skill.
+
+    Attributes:
+        name: Description, as a part of a sentence: `while the table is empty`.
+        effect: Effect of the fault on the cell.
+        resource: Resource that affected skills use: `arm`, `tool` or `camera`; "" if all skills are affected.
+        requires_holding: True if the fault affects only runs with an object in the tool at the start.
+        tick: Control step before which the fault begins.
+    """
+
+    name: str
+    effect: Effect
+    resource: str = ""
+    requires_holding: bool = False
+    tick: int = 0
 
 
 class SkillTestRun:

@@ -20,12 +20,10 @@ from executive.testing.faults.world_access import WorldAccess, open_world
 
 _INTERCEPTED_ROLES = ("arm", "tool", "camera", "detector", "localizer", "operator")
 """Parts of the cell that effects can change or observe."""
-_INTERCEPTED_CALLS = frozenset(
-    {
-        "arm.plan", "tool.close", "tool.open", "camera.sees_table", "camera.capture", "detector.request",
-        "localizer.localize", "operator.ask",
-    }
-)  # fmt: skip
+_INTERCEPTED_CALLS = {
+    "arm.plan", "tool.close", "tool.open", "camera.sees_table", "camera.capture", "detector.request",
+    "localizer.localize", "operator.ask",
+}  # fmt: skip
 """Calls whose results effects can change."""
 
 
