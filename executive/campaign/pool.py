@@ -61,10 +61,9 @@ def run_jobs(
                     index = pending_indices[0]
                     try:
                         running_jobs[pool.submit(run_job, jobs[index])] = index
+                        pending_indices.popleft()
                     except BrokenExecutor:  # A worker died after its last result was read.
                         is_broken = True
-                    else:
-                        pending_indices.popleft()
                 ended_jobs, _ = wait(running_jobs, MAX_HALT_DELAY, FIRST_COMPLETED)
                 # Two signals within `MAX_HALT_DELAY` count as one signal: the command `timeout` sends two.
                 if signal_event.is_set():

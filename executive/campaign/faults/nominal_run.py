@@ -75,22 +75,20 @@ def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
     options = RunOptions(mission.seed, mission.requests, kind=mission.make_cell)
     run = assemble(mission.loaded, mission.skills, options, [activations])
     with closing(run):
-        run_end = run.execute()
-        if run_end.status == "HALTED":
+        end = run.execute()
+        if end.status == "HALTED":
             raise KeyboardInterrupt
         items, audit = run.count_items(), run.count_ground_truth()
     description = f"without a fault, {mission.name} with seed {mission.seed}"
-    if run_end.status != "SUCCESS":
+    if end.status != "SUCCESS":
         raise InputError(
-            f"{description} ends as {run_end.status} {run_end.reason}: {run_end.message}; "
+            f"{description} ends as {end.status} {end.reason}: {end.message}; "
             "a campaign needs a run that succeeds: choose another seed"
         )
-    if audit is not None and (
-        audit["unseen"] or not is_confirmed_by_audit(items, audit, run_end.is_table_empty)
-    ):
+    if audit is not None and (audit["unseen"] or not is_confirmed_by_audit(items, audit, end.is_table_empty)):
         raise InputError(
             f"{description} ends with a wrong ledger: the ledger says {format_counts(items)}; the audit "
             f"{format_counts(audit)}; choose another seed, or a mission that observes the whole table"
         )
     steps_by_path = {path: tuple(counts) for path, counts in activations.step_counts.items()}
-    return NominalRun(run_end.robot_time, items["placed"], steps_by_path)
+    return NominalRun(end.robot_time, items["placed"], steps_by_path)

@@ -55,7 +55,7 @@ class PlannedFault:
         cause: Cause of the fault, a few words.
         injected: Fault of the cell or of a skill that is injected.
         is_failure_reason: True if `kind` is a failure reason: the fault must let the node fail with it.
-        expected_reason: Reason with which skills should fail because of a fault of a part; "": no reason.
+        expected_reason: Failure reason that a fault of a part causes in skills; "" if no reason is expected.
         is_conditional: True if the node runs only after another fault.
         replaces_previous: True if the fault is tried only if the previous fault does not let the node fail.
     """

@@ -33,9 +33,9 @@ def can_succeed(runs: SkillRuns) -> Iterator[str]:
     except ArrangementFailed as error:
         yield f"{runs.name} cannot be tested: {error}"
         return
-    if not any(test_run.status == "SUCCESS" for test_run in runs.complete_runs):
+    if not any(test_run.status == "SUCCESS" for test_run in runs.unhalted_runs):
         yield (
-            f"{runs.name} never succeeded; {runs.complete_runs[0].ending}. "
+            f"{runs.name} never succeeded; {runs.unhalted_runs[0].ending}. "
             "Set up a scene in which it succeeds: "
             f"list_conformance_checks({runs.skill.__name__}, lambda scene: ...); "
             "skills/README.md has an example."
@@ -45,11 +45,11 @@ def can_succeed(runs: SkillRuns) -> Iterator[str]:
 def terminates(runs: SkillRuns) -> Iterator[str]:
     """Each tick returns, and the skill ends within 60 s on the run's clock."""
     try:
-        _ = runs.complete_runs, runs.halted_runs  # Executes all runs.
+        _ = runs.unhalted_runs, runs.halted_runs  # Executes all runs.
     except TickNotReturned as error:
         yield str(error)
         return
-    for test_run in runs.complete_runs:
+    for test_run in runs.unhalted_runs:
         if test_run.status == "RUNNING":
             yield (
                 f"{test_run.description} {runs.name} was still running after {MAX_RUN_TIME:g} s. "
@@ -59,7 +59,7 @@ def terminates(runs: SkillRuns) -> Iterator[str]:
 
 def ends_as_declared(runs: SkillRuns) -> Iterator[str]:
     """Under each fault the skill succeeds with all outputs, or fails with a declared reason and a message."""
-    for test_run in runs.complete_runs:
+    for test_run in runs.unhalted_runs:
         prefix = f"{test_run.description} at tick {test_run.ticks}"
         if test_run.status == "FAULT":
             yield (
@@ -75,7 +75,7 @@ def ends_as_declared(runs: SkillRuns) -> Iterator[str]:
 
 def has_outputs_of_declared_types(runs: SkillRuns) -> Iterator[str]:
     """Each output has its declared type."""
-    for test_run in runs.complete_runs:
+    for test_run in runs.unhalted_runs:
         for name, value in test_run.outputs.items():
             port_type = runs.skill.ports[name].type
             if not _is_of_type(value, port_type):
@@ -87,7 +87,7 @@ def has_outputs_of_declared_types(runs: SkillRuns) -> Iterator[str]:
 
 def leaves_inputs_unchanged(runs: SkillRuns) -> Iterator[str]:
     """The skill does not change its params and inputs."""
-    for test_run in runs.complete_runs:
+    for test_run in runs.unhalted_runs:
         for name in test_run.changed_names:
             yield (
                 f"{test_run.description} it changed the value of self.{name}. "
@@ -98,7 +98,7 @@ def leaves_inputs_unchanged(runs: SkillRuns) -> Iterator[str]:
 def uses_only_declared_parts(runs: SkillRuns) -> Iterator[str]:
     """The skill commands only parts in `uses`, moves only with `moves`, and senses only with `senses`."""
     skill = runs.skill
-    for name in dict.fromkeys(call.name for test_run in runs.complete_runs for call in test_run.calls):
+    for name in dict.fromkeys(call.name for test_run in runs.unhalted_runs for call in test_run.calls):
         part = name.partition(".")[0]
         if name in _ACTIONS and part not in skill.uses:
             yield f'{runs.name} calls cell.{name} and does not declare the {part}. Add "{part}" to uses.'

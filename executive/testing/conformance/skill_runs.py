@@ -50,7 +50,7 @@ class SkillRuns:
         return [(self._run(situation), self._run(situation)) for situation in self.situations]
 
     @cached_property
-    def complete_runs(self) -> list[SkillTestRun]:
+    def unhalted_runs(self) -> list[SkillTestRun]:
         """Runs without a halt: for each situation, one run without a fault and one run per fault."""
         runs_without_fault = [test_run for test_run, _ in self.repeated_runs]
         return runs_without_fault + [
@@ -58,7 +58,7 @@ class SkillRuns:
             for test_run in runs_without_fault
             # If the run without a fault does not end, a run with a fault would not end either.
             if test_run.status != "RUNNING"
-            for fault in list_skill_faults(self.skill, test_run.ticks, is_holding=test_run.holds_before)
+            for fault in _list_faults(self.skill, test_run)
         ]
 
     @cached_property
@@ -74,7 +74,7 @@ class SkillRuns:
     @property
     def ended_runs(self) -> list[SkillTestRun]:
         """All runs that ended with success, with a failure or with a halt."""
-        test_runs = [*self.complete_runs, *self.halted_runs]
+        test_runs = [*self.unhalted_runs, *self.halted_runs]
         return [test_run for test_run in test_runs if test_run.status in ("SUCCESS", "FAILURE", "HALTED")]
 
     def _run(
@@ -106,18 +106,14 @@ def _choose_halt_ticks(test_run: SkillTestRun) -> list[int]:
     return sorted(tick for tick in {*evenly_spaced, *call_ticks[:MAX_HALTS]} if 1 <= tick <= test_run.ticks)
 
 
-def list_skill_faults(skill: type[Skill], ticks: int, *, is_holding: bool) -> Iterator[NamedFault]:
-    """Yield the faults for a skill whose run without a fault has `ticks` control steps.
-
-    Faults that need an object in the tool at the start are yielded only if `is_holding` is True.
-    """
+def _list_faults(skill: type[Skill], run: SkillTestRun) -> Iterator[NamedFault]:
+    """Yield the faults that can affect a skill, given a run of the skill without a fault."""
     for fault in _FAULTS:
-        can_occur = is_holding or not fault.requires_holding
+        can_occur = run.holds_before or not fault.requires_holding
         if can_occur and (not fault.resource or fault.resource in skill.uses):
             yield fault
     if "tool" in skill.uses:
-        break_ticks = {round(ticks * index / RUN_INTERVALS) for index in range(RUN_INTERVALS + 1)}
-        for tick in sorted(break_ticks):
+        for tick in sorted({round(run.ticks * index / RUN_INTERVALS) for index in range(RUN_INTERVALS + 1)}):
             yield NamedFault(f"while the seal breaks at tick {tick}", faults.seal_breaks(None), tick=tick)
 
 

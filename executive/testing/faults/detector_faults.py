@@ -31,9 +31,7 @@ def _reduce_confidence(answer: Answer) -> Answer:
     """Return an answer whose confidences are below the threshold."""
     max_confidence = UNSURE_CONFIDENCE_FRACTION * answer.error_rates.threshold
     detections = sorted((*answer.confident, *answer.doubtful), key=lambda detection: -detection.confidence)
-    doubtful = tuple(
-        replace(detection, confidence=min(detection.confidence, max_confidence)) for detection in detections
-    )
+    doubtful = tuple(replace(found, confidence=min(found.confidence, max_confidence)) for found in detections)
     return replace(answer, confident=(), doubtful=doubtful, unknown=())
 
 
@@ -65,7 +63,7 @@ def detector_dead() -> Effect:
 def detector_hangs(hang_end: float = math.inf) -> Effect:
     """Return an effect: requests are answered when the fault ends, but not later than at `hang_end`.
 
-    `hang_end` [s] is on the run's clock. A fault that outlasts the waiting node prevents the answer.
+    `hang_end` is a time on the run's clock [s]. A node that ends before the fault gets no answer.
     """
     return make_detector_effect("detector_hangs", hang_end=hang_end)
 
