@@ -237,8 +237,6 @@ def store_evaluation(
     if evaluation.reliability is None:
         problem = f"detector {detector.name} gave no usable answer: {evaluation.why}"
         raise InputError(f"{problem}; nothing was measured")
-    confusion_matrix = evaluation.confusion
-    false_detections = confusion_matrix.get(NO_OBJECT, {})
     measurement = Measurement(
         detector=detector.name,
         fingerprint=dict(compute_fingerprint(detector.cell, detector.name, detector.base)),
@@ -251,9 +249,9 @@ def store_evaluation(
                 objects=sum(row.values()),
                 missed=row.get(NO_OBJECT, 0),
                 confused=sum(row.values()) - row.get(NO_OBJECT, 0) - row.get(label, 0),
-                false_detections=false_detections.get(label, 0),
+                false_detections=evaluation.confusion.get(NO_OBJECT, {}).get(label, 0),
             )
-            for label, row in confusion_matrix.items()
+            for label, row in evaluation.confusion.items()
             if label != NO_OBJECT
         },
         counts={

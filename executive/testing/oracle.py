@@ -79,8 +79,7 @@ class TruthCamera(SimCamera):
 
     def capture(self) -> TrueFrame:
         """Capture an image and return the frame with its true detections."""
-        frame = super().capture()
-        return TrueFrame(**vars(frame), true_detections=self._find_true_detections())
+        return TrueFrame(**vars(super().capture()), true_detections=self._find_true_detections())
 
     def _capture_images(self) -> tuple[Image, Array | None]:
         if self._renders_images or self.config.depth:
@@ -91,8 +90,7 @@ class TruthCamera(SimCamera):
         outlines = []
         camera_matrix, X_WC = self._get_true_view()
         for body, label in self._world.labels.items():
-            mesh = load_mesh(self._world.models[body])
-            vertices = self._world.get_object_pose(body).apply(mesh.vertices)
+            vertices = self._world.get_object_pose(body).apply(load_mesh(self._world.models[body]).vertices)
             distances = X_WC.inverse().apply(vertices)[:, 2]
             if np.all(distances > NEAR_PLANE):
                 pixels = project(camera_matrix, X_WC, vertices)
