@@ -153,9 +153,8 @@ def _describe_difference(run: SkillTestRun, rerun: SkillTestRun) -> str:
         if not has_equal_pickle(call.arguments, other.arguments):
             return f"it called {call.name} at tick {call.tick} with different arguments"
     if (run.ticks, run.status) != (rerun.ticks, rerun.status):
-        return (
-            f"it ended as {run.status} after {run.ticks} ticks and then as {rerun.status} after {rerun.ticks}"
-        )
+        end, other_end = f"{run.status} after {run.ticks}", f"{rerun.status} after {rerun.ticks}"
+        return f"it ended as {end} ticks and then as {other_end}"
     return "" if has_equal_pickle(run.outputs, rerun.outputs) else "it set its outputs to different values"
 
 
