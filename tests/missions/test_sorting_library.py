@@ -1,12 +1,14 @@
-"""The library of shipped subtrees outlasts the restart of a detection server."""
+"""The subtrees of the library outlast the restart of a detection server, and a collision in a look aside."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from executive.events import FaultInjected
-from executive.testing.faults import after, between, detector_dead
+from executive.testing.faults import after, arm_collides, between, detector_dead, during
 from executive.testing.run_mission import run_mission
 
 LONGEST_RESTART = 40.0
@@ -35,3 +37,18 @@ def test_a_sort_outlasts_the_restart_of_a_server(start: float, duration: float) 
     assert result.agrees
     assert result.items["placed"] == result.audit["right"] == result.items["seen"] >= 3
     assert result.robot_time > start + duration
+
+
+def test_after_a_collision_look_aside_looks_from_the_same_pose(tmp_path: Path) -> None:
+    mission = tmp_path / "look_twice.yaml"
+    mission.write_text(
+        "mission: look_twice\n"
+        "cell: cells/overhead.yaml\n"
+        "library: library/sorting.yaml\n"
+        "tree:\n"
+        "  - {use: look_aside, as: first, with: {pose: next}}\n"
+        "  - {use: look_aside, as: second, with: {pose: next}}\n"
+    )
+    collision = during("*second*/do/MoveToScan", arm_collides(), activations=1)
+    undisturbed, disturbed = run_mission(mission), run_mission(mission, faults=[collision])
+    assert disturbed.cell.cell.arm.q == pytest.approx(undisturbed.cell.cell.arm.q)
