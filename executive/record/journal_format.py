@@ -159,10 +159,9 @@ def _describe_old_format(line: bytes) -> str:
         return ""
     versions = entry.get("versions")
     version = versions.get("executive", "0.1") if isinstance(versions, dict) else "0.1"
-    return (
-        f"this journal has format {journal_format}, written by executive {version}; this version reads "
-        f"format {JOURNAL_FORMAT}; read the journal with executive {version}, or run the mission again"
-    )
+    problem = f"this journal has format {journal_format}, written by executive {version}"
+    advice = f"read the journal with executive {version}, or run the mission again"
+    return f"{problem}; this version reads format {JOURNAL_FORMAT}; {advice}"
 
 
 def _to_json_type(value: object) -> object:

@@ -23,7 +23,7 @@ MAX_PICTURES = 200
 """Maximum number of pictures of a run, so that a long run does not fill the disk."""
 
 StoredLook = tuple[Frame, FrameSearched]
-"""Frame without depth image, and the event with its detections."""
+"""Frame without its depth image, and the event with the detections in the frame."""
 
 _LISTED_STATES = ("held", "dropped", "rejected", "skipped", "lost")
 """States of items, except `placed`, that a picture lists."""

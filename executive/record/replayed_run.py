@@ -119,6 +119,7 @@ class _Comparison:
     def __init__(self, log: InputLog, edited: bool) -> None:
         self._log = log
         self._edited = edited
+        # The iterator yields the recorded decisions that have not been compared.
         self._recorded_decisions = filter(None, (_to_decision(timed, edited) for timed in log.events))
         # If the journal lacks the end of the run, its last control step may be incomplete and is ignored.
         self._has_recorded_end = any(isinstance(timed.event, RunEnded) for timed in log.events)

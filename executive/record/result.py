@@ -93,7 +93,7 @@ class Result:
         unknown_labels: Maximum number of boxes in one look for each label that is not in the cell file.
         assumption_reasons: Reasons for which error rates of detectors were assumed.
         audit: True places of the objects, compared with `items`; None in a cell without ground truth.
-        planning: Number of planned motions and waiting time for plans.
+        planning: Number of planned motions, and time for which skills waited for plans.
         requests: Requests of the operator, in order; a scripted operator repeats the run with them.
         robot_time_s, wall_time_s: Duration on the clock of the run and on a wall clock [s].
         trace: Hash of all decisions.

@@ -1,4 +1,4 @@
-"""Detection of objects in a thread, with answers that become available at reproducible times of the run."""
+"""Detectors that run in a thread, with answers that become available at reproducible times of the run."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class PendingSearch:
     """Running detection; implements `executive.cell.protocols.Request`.
 
     Attributes:
-        future: Detections, available when the thread has searched all regions.
+        future: Detections, which are available after the thread has searched all regions.
         due_time: Time from which the answer is available [s].
         clock: Clock of the run.
         detector: Name of the detector.

@@ -21,7 +21,7 @@ MAX_BOXES = 60
 """Maximum number of boxes in one answer, including doubtful boxes and unknown labels. Shipped cells have at
 most 20 objects, and the time for the assignment of boxes to items grows more than linearly."""
 MAX_COORDINATE = 1e5
-"""Maximum absolute coordinate of a box [pixel]; images are smaller; larger squared values could overflow."""
+"""Maximum absolute coordinate of a box [pixel]; all images are smaller, and squares of it do not overflow."""
 MAX_LABEL_LENGTH = 100
 """Maximum number of characters of a label, which appears in messages and on the terminal."""
 MAX_SECOND_CLASS_RATIO = 0.5

@@ -30,7 +30,7 @@ MIN_CONTAINED_FRACTION = 0.7
 
 @dataclass(frozen=True)
 class RegionDetection:
-    """A detection and the searched region of the image.
+    """A detection and the region of the image in which it was found.
 
     Attributes:
         detection: Detection with the box in pixels of the image.

@@ -15,7 +15,7 @@ from executive.record.timeline.timeline import Timeline
 LOOK = "look"
 """Activity: detection of the next item while the tool is empty."""
 RETRY = "retry"
-"""Activity: failed attempts to handle an item, and the looks before the next attempt."""
+"""Activity: failed attempts to pick or place an item, and the looks before the next attempt."""
 WAITING = "waiting"
 """Activity: no skill works on an item, moves the arm or senses the scene."""
 

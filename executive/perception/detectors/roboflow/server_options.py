@@ -92,9 +92,9 @@ class RoboflowOptions(DetectorOptions):
 def _check_model(options: RoboflowOptions) -> OptionErrors:
     """Yield the first invalid option for requests to a model, with a message."""
     api, model_id, parts = options.api, options.model_id, options.model_id.split("/")
-    if unused_options := ", ".join(name for name in WORKFLOW_OPTIONS if name in options.model_fields_set):
-        remedy = f"write api: workflow, or delete {unused_options}"
-        yield unused_options.partition(",")[0], f"api: {api} does not use {unused_options}; {remedy}"
+    if unused_options := [name for name in WORKFLOW_OPTIONS if name in options.model_fields_set]:
+        names = ", ".join(unused_options)
+        yield unused_options[0], f"api: {api} does not use {names}; write api: workflow, or delete {names}"
     elif not model_id:
         yield "model_id", f"api: {api} needs model_id: project/version, or a name such as rfdetr-nano"
     elif any(character in model_id for character in FORBIDDEN_CHARACTERS):
