@@ -54,11 +54,11 @@ def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> ExpandedMissi
     tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)
     unused_subtrees = []
     subtree_nodes = [node for subtree in mission.subtrees.values() for node in subtree.body.walk()]
-    names_in_subtrees = {node.name for node in subtree_nodes if isinstance(node, SubtreeNode)}
+    names_used_in_subtrees = {node.name for node in subtree_nodes if isinstance(node, SubtreeNode)}
     for subtree in mission.subtrees.values():
         if subtree.name in expander.used_names or subtree.library or isinstance(subtree.body, InvalidNode):
             continue
-        if subtree.name not in names_in_subtrees:
+        if subtree.name not in names_used_in_subtrees:
             message = f'the subtree "{subtree.name}" is never used'
             expander.findings.append(make_warning(subtree.span, "unused-tree", message))
         arguments = subtree.arguments.items()
@@ -87,7 +87,7 @@ class _Expander:
         self.findings: list[Finding] = []
         self.used_names: set[str] = set()
         # Referenced params and arguments, as (subtree, name); for a param, the subtree is "".
-        self._used_values: set[tuple[str, str]] = set()
+        self._referenced_names: set[tuple[str, str]] = set()
         self._node_count = 0
         # Span of the `use` in the mission file for the subtree that is being expanded.
         self._outermost_span: Span | None = None
@@ -103,13 +103,13 @@ class _Expander:
     def find_unused_names(self) -> Iterator[Finding]:
         """Yield a finding for every param without reference, and every unused argument of a used subtree."""
         for name, param in self.mission.params.items() if self.mission.tree else ():
-            if ("", name) not in self._used_values and f"${name}" not in param.span.source.text:
+            if ("", name) not in self._referenced_names and f"${name}" not in param.span.source.text:
                 yield make_warning(param.span, "unused-param", f'the param "{name}" is never used')
         for subtree in self.mission.subtrees.values():
             if isinstance(subtree.body, InvalidNode) or not self._use_counts[subtree.name]:
                 continue
             for name, argument in subtree.arguments.items():
-                if (subtree.name, name) not in self._used_values:
+                if (subtree.name, name) not in self._referenced_names:
                     message = f'the subtree "{subtree.name}" never uses its argument "{name}"'
                     yield make_error(argument.span, "unused-argument", message)
 
@@ -158,7 +158,7 @@ class _Expander:
         # A misspelt reference counts as a reference to the param or argument with the most similar name.
         name = reference.name if value is not None else find_similar_word(reference.name, values)
         is_argument = bool(callers) and name in self.mission.subtrees[callers[-1]].arguments
-        self._used_values.add((callers[-1] if is_argument else "", name or ""))
+        self._referenced_names.add((callers[-1] if is_argument else "", name or ""))
         if value is None or isinstance(value, Reference):
             return value or reference
         # A finding about the value is located at the value, so the message must contain the reference.
@@ -190,7 +190,7 @@ class _Expander:
         # A library must not depend on the params of a mission.
         params: ValuesByName = {} if subtree.library else self.params
         if subtree.returns is not None:
-            arguments = {name: _add_caller_prefix(value) for name, value in arguments.items()}
+            arguments = {name: _prefix_variable(value) for name, value in arguments.items()}
         body = self._expand_node(subtree.body, {**params, **arguments}, (*callers, use.name), depth + 1)
         if subtree.returns is None:
             return replace(use, body=body)
@@ -249,10 +249,9 @@ class _Expander:
                 self.findings.append(make_error(setting.name_span, "unknown-argument", message, hint))
         values: dict[str, Value] = {}
         for name, argument in subtree.arguments.items():
-            if name in use.arguments:
-                values[name] = use.arguments[name].value
-            elif argument.default is not None:
-                values[name] = argument.default
+            value = use.arguments[name].value if name in use.arguments else argument.default
+            if value is not None:
+                values[name] = value
             else:
                 message = f'the subtree "{subtree.name}" needs the argument "{name}"'
                 hint = f"Write with: {{{name}: ...}} at the level of use."
@@ -260,7 +259,7 @@ class _Expander:
         return values if len(values) == len(subtree.arguments) else None
 
 
-def _add_caller_prefix(value: Value) -> Value:
+def _prefix_variable(value: Value) -> Value:
     return replace(value, name=_CALLER_PREFIX + value.name) if isinstance(value, Reference) else value
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, InvalidNode, Node, SkillNode, SubtreeNode
-from executive.mission.parse.control import (
+from executive.mission.parse.control_nodes import (
     find_inner_keys,
     find_sibling_keys,
     has_optional_body,

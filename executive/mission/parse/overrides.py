@@ -23,14 +23,12 @@ def parse_override(key: str, value: str, is_text: bool = False) -> tuple[YamlNod
     """Return the YAML node of an override (None after an error) and findings; `is_text`: without parsing."""
     source = make_override_source(key, value)
     span = source.make_span(1, len(key) + 2, max(1, len(value)))
-    if is_text:
-        return YamlScalar(span, value, value), []
-    if not value.strip():
-        return YamlScalar(span, None, value), []
+    if is_text or not value.strip():
+        return YamlScalar(span, value if is_text else None, value), []
     # Blanks replace `key=`, so that the columns of findings are correct.
     root, yaml_findings = parse_yaml(Source("--set", " " * (len(key) + 1) + value))
     findings = [replace(finding, excerpt=source.text) for finding in yaml_findings]
-    return (_set_spans(root, span) if root else None), findings
+    return (_replace_spans(root, span) if root else None), findings
 
 
 def override_cell(root: YamlNode, overrides: Mapping[str, str]) -> tuple[YamlNode, list[Finding]]:
@@ -43,7 +41,7 @@ def override_cell(root: YamlNode, overrides: Mapping[str, str]) -> tuple[YamlNod
         findings += override_findings
         path = key.removeprefix(CELL_PREFIX).split(".")
         if node is not None and _has_section(root, path, node, findings):
-            root = _set_value(root, path, node, findings)
+            root = _replace_value(root, path, node, findings)
     return root, findings
 
 
@@ -57,7 +55,7 @@ def _has_section(root: YamlNode, path: list[str], value: YamlNode, findings: lis
     return False
 
 
-def _set_value(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> YamlNode:
+def _replace_value(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> YamlNode:
     """Return the tree with `value` at `path`; add an error if `path` leads below a scalar or a list."""
     key, *inner_path = path
     if not isinstance(root, YamlMapping):
@@ -70,19 +68,19 @@ def _set_value(root: YamlNode, path: list[str], value: YamlNode, findings: list[
         entry = YamlEntry(YamlScalar(value.span, key, key), YamlMapping(value.span, ()))
         root = replace(root, entries=(*root.entries, entry))
     if inner_path:
-        new_entry = YamlEntry(entry.key, _set_value(entry.value, inner_path, value, findings))
+        new_entry = YamlEntry(entry.key, _replace_value(entry.value, inner_path, value, findings))
     else:
         new_entry = YamlEntry(replace(entry.key, span=value.span), value)
     entries = [new_entry if candidate is entry else candidate for candidate in root.entries]
     return replace(root, entries=tuple(entries))
 
 
-def _set_spans(node: YamlNode, span: Span) -> YamlNode:
+def _replace_spans(node: YamlNode, span: Span) -> YamlNode:
     """Return the node with `span` as the position of the node and of all nodes below."""
     if isinstance(node, YamlScalar):
         return replace(node, span=span)
     if isinstance(node, YamlMapping):
         keys = [replace(entry.key, span=span) for entry in node.entries]
-        values = [_set_spans(entry.value, span) for entry in node.entries]
+        values = [_replace_spans(entry.value, span) for entry in node.entries]
         return replace(node, span=span, entries=tuple(map(YamlEntry, keys, values)))
-    return replace(node, span=span, items=tuple(_set_spans(item, span) for item in node.items))
+    return replace(node, span=span, items=tuple(_replace_spans(item, span) for item in node.items))

@@ -84,7 +84,8 @@ def _make_finding(root: YamlNode, model: type[BaseModel], error: ErrorDetails) -
     parent, key = path[:-1], path[-1] if path else ""
     owner = join_keys(parent) or "the file"
     if error_type == "extra_forbidden":
-        hint = suggest_choice(str(key), _list_keys(model, parent), f"Keys of {owner}")
+        allowed_keys = getattr(_find_type(model, parent), "model_fields", ())
+        hint = suggest_choice(str(key), allowed_keys, f"Keys of {owner}")
         span = find_span(root, path, at_key=True)
         return make_error(span, "unknown-key", f'{owner} has no key "{key}"', hint)
     if error_type == "missing" and isinstance(key, int):
@@ -123,14 +124,6 @@ def _remove_none(annotation: object) -> object:
     """Return `T` for the type `T | None`, and any other type unchanged."""
     members = [member for member in get_args(annotation) if member is not NoneType]
     return members[0] if NoneType in get_args(annotation) and len(members) == 1 else annotation
-
-
-def _list_keys(model: type[BaseModel], path: KeyPath) -> list[str]:
-    """Return the keys of the section at `path`; none if the value at `path` is no section."""
-    declared_type = _find_type(model, path)
-    if isinstance(declared_type, type) and issubclass(declared_type, BaseModel):
-        return list(declared_type.model_fields)
-    return []
 
 
 def _find_infinite_numbers(node: YamlNode) -> Iterator[Finding]:

@@ -6,8 +6,8 @@ import inspect
 from collections.abc import Mapping, Sequence
 
 from executive.mission.model import grammar
-from executive.mission.model.grammar import GrammarKeys
-from executive.mission.parse.control import find_inner_keys, find_shorthand_key, has_optional_body
+from executive.mission.model.grammar import GrammarKey, GrammarKeys
+from executive.mission.parse.control_nodes import find_inner_keys, find_shorthand_key, has_optional_body
 from executive.mission.parse.mapping_reader import NAME_PATTERN
 from executive.mission.parse.node_parser import Skills
 from executive.mission.parse.params import PARAM_TYPES
@@ -78,7 +78,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     requirements: dict[str, Schema] = {}
     for word, node_class in node_classes.items():
         keys = {name: key for name, key in node_class.keys.items() if key.is_sibling}
-        siblings[word] = {name: _make_key_schema(key) for name, key in keys.items()}
+        siblings[word] = _make_properties(keys)
         requirements[word] = _require_any_of(node_class.any_of) if set(node_class.any_of) & set(keys) else {}
     return {
         "title": "A node",
@@ -114,7 +114,7 @@ def _make_control_node_schema(node_class: type[ControlNode]) -> Schema:
     if inner_keys:
         any_of = node_class.any_of
         requirement = _require_any_of(any_of) if set(any_of) <= set(inner_keys) else {}
-        alternatives.append({**_make_section_schema(inner_keys), **requirement})
+        alternatives.append({**_make_mapping_schema(inner_keys), **requirement})
     value = alternatives[0] if len(alternatives) == 1 else {"anyOf": alternatives}
     return {"title": node_class.keyword, "description": _get_first_line(node_class), **value}
 
@@ -123,21 +123,10 @@ def _get_first_line(node_class: type[ControlNode]) -> str:
     return (inspect.getdoc(node_class) or "").partition("\n")[0]
 
 
-def _make_section_schema(keys: Mapping[str, Key]) -> Schema:
-    return {
-        "type": "object",
-        "properties": {name: _make_key_schema(key) for name, key in keys.items()},
-        "required": [name for name, key in keys.items() if key.is_required],
-        "additionalProperties": False,
-    }
-
-
-def _make_key_schema(key: Key) -> Schema:
-    return {"description": key.doc, **_make_value_schema(key)}
-
-
-def _make_value_schema(key: Key) -> Schema:
-    """Return the schema of the value of a key of a control node."""
+def _make_value_schema(key: Key | GrammarKey) -> Schema:
+    """Return the schema of the value of a key."""
+    if isinstance(key, GrammarKey):
+        return _SCHEMAS_BY_KIND[key.kind]
     match key.kind:
         case KeyKind.NODE:
             node = _make_reference("node")
@@ -152,10 +141,10 @@ def _make_value_schema(key: Key) -> Schema:
         case KeyKind.ELEMENTS:
             return _SCHEMAS_BY_KIND["list"]
         case KeyKind.SECTIONS:
-            section = _make_section_schema(key.section.keys)
+            section = _make_mapping_schema(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}
         case KeyKind.SECTION:
-            section, shorthand = _make_section_schema(key.section.keys), find_shorthand_key(key.section)
+            section, shorthand = _make_mapping_schema(key.section.keys), find_shorthand_key(key.section)
             if shorthand is None:
                 return section
             value = shorthand.make_validator().json_schema()
@@ -186,7 +175,7 @@ def _make_param_schema() -> Schema:
     return {**declaration, "type": ["object", "array", "string", "number", "boolean", "null"]}
 
 
-def _make_mapping_schema(keys: GrammarKeys) -> Schema:
+def _make_mapping_schema(keys: Mapping[str, Key | GrammarKey]) -> Schema:
     return {
         "type": "object",
         "properties": _make_properties(keys),
@@ -195,8 +184,8 @@ def _make_mapping_schema(keys: GrammarKeys) -> Schema:
     }
 
 
-def _make_properties(keys: GrammarKeys) -> Schema:
-    return {name: {"description": key.doc, **_SCHEMAS_BY_KIND[key.kind]} for name, key in keys.items()}
+def _make_properties(keys: Mapping[str, Key | GrammarKey]) -> Schema:
+    return {name: {"description": key.doc, **_make_value_schema(key)} for name, key in keys.items()}
 
 
 def _make_reference(name: str) -> Schema:

@@ -153,13 +153,13 @@ class _Composer:
         """Return the root node of the only document."""
         next(self._events)  # StreamStartEvent
         if isinstance(next(self._events), yaml.StreamEndEvent):
-            raise self._make_fatal_error(self.source.make_span(), "empty", "the file is empty")
+            raise self._add_fatal_error(self.source.make_span(), "empty", "the file is empty")
         root = self._read_node(next(self._events), 0)
         next(self._events)  # DocumentEndEvent
         event = next(self._events)
         if not isinstance(event, yaml.StreamEndEvent):
             message = 'a second document starts here, after "---"'
-            raise self._make_fatal_error(self._make_span(event, len("---")), "two-documents", message)
+            raise self._add_fatal_error(self._make_span(event, len("---")), "two-documents", message)
         return root
 
     def _read_node(self, event: yaml.Event, depth: int) -> YamlNode:
@@ -180,10 +180,10 @@ class _Composer:
     def _resolve_alias(self, event: yaml.AliasEvent, depth: int) -> YamlNode:
         if event.anchor not in self._anchors:
             message = f'there is no anchor "&{event.anchor}" above'
-            raise self._make_fatal_error(self._make_span(event), "alias", message)
+            raise self._add_fatal_error(self._make_span(event), "alias", message)
         node, node_count = self._anchors[event.anchor]
         if depth + _compute_height(node) > _MAX_DEPTH:
-            raise self._make_fatal_error(self._make_span(event), "too-deep", _DEPTH_MESSAGE)
+            raise self._add_fatal_error(self._make_span(event), "too-deep", _DEPTH_MESSAGE)
         self._count_nodes(node_count, event)
         return node
 
@@ -192,13 +192,13 @@ class _Composer:
         self._node_count += count
         if self._node_count > _MAX_NODE_COUNT:
             message = f"the file has more than {_MAX_NODE_COUNT} keys and values, including those of aliases"
-            raise self._make_fatal_error(self._make_span(event), "too-large", message)
+            raise self._add_fatal_error(self._make_span(event), "too-large", message)
 
     def _read_value(self, event: yaml.Event, depth: int) -> YamlNode:
         if isinstance(event, yaml.ScalarEvent):
             return self._read_scalar(event)
         if depth >= _MAX_DEPTH:
-            raise self._make_fatal_error(self._make_span(event, 1), "too-deep", _DEPTH_MESSAGE)
+            raise self._add_fatal_error(self._make_span(event, 1), "too-deep", _DEPTH_MESSAGE)
         if isinstance(event, yaml.SequenceStartEvent):
             items = []
             while not isinstance(item_event := next(self._events), yaml.SequenceEndEvent):
@@ -239,7 +239,7 @@ class _Composer:
             length = max(1, end.column - start.column) if start.line == end.line else _LINE_LENGTH
         return Span(self.source, start.line + 1, start.column + 1, length)
 
-    def _make_fatal_error(self, span: Span, code: str, message: str) -> _IncompleteTree:
+    def _add_fatal_error(self, span: Span, code: str, message: str) -> _IncompleteTree:
         """Add an error that prevents a complete tree, and return the exception to raise."""
         self._add_error(span, code, message)
         return _IncompleteTree()
