@@ -18,7 +18,7 @@ from executive.cli.main import main as command_line
 from executive.cli.skills import Declaration, collect_declarations
 from executive.mission.findings import MEANING_BY_CODE
 from executive.mission.model import grammar
-from executive.mission.parse.control_nodes import find_inner_keys
+from executive.mission.parse.control_node_parser import find_inner_keys
 from executive.mission.schema.types import Schema, make_type_schema
 from executive.mission.text.file_search import list_shipped_missions
 from executive.perception.detectors.detector_registry import find_detector_kinds

@@ -89,7 +89,7 @@ class _Expander:
         # Referenced params and arguments, as (subtree, name); for a param, the subtree is "".
         self._referenced_names: set[tuple[str, str]] = set()
         self._node_count = 0
-        # Span of the `use` in the mission file for the subtree that is being expanded.
+        # Span of the `use` in the mission file that contains the current node.
         self._outermost_span: Span | None = None
         self._use_counts: Counter[str] = Counter()
 
@@ -120,7 +120,7 @@ class _Expander:
             depth_problem = f"is more than {_MAX_DEPTH} levels deep"
             problem = depth_problem if depth > _MAX_DEPTH else f"has more than {_MAX_NODE_COUNT} nodes"
             message = f"after the expansion of subtrees, the tree {problem}"
-            self.findings.append(make_error(self._outermost_span or node.span, "too-large", message))
+            self._add_error(self._outermost_span or node.span, "too-large", message)
             raise _TooLargeError
 
         def expand_part(part: object) -> object:
@@ -166,20 +166,18 @@ class _Expander:
         return replace(value, origin=origin, reference_span=reference.span)
 
     def _expand_use(self, use: SubtreeNode, callers: tuple[str, ...], depth: int) -> Node:
-        """Return the use with its expanded body; without body if the use has errors."""
+        """Return `use` with the expanded body of the subtree; after an error, return `use` unchanged."""
         self.used_names.add(use.name)
         subtree = self.mission.subtrees.get(use.name)
         if subtree is None:
             if self.mission.is_complete:
                 self.used_names.add(find_similar_word(use.name, self.mission.subtrees) or "")
-                message = f'there is no subtree "{use.name}"'
                 hint = suggest_choice(use.name, self.mission.subtrees, "Subtrees of the mission")
-                self.findings.append(make_error(use.span, "unknown-tree", message, hint))
+                self._add_error(use.span, "unknown-tree", f'there is no subtree "{use.name}"', hint)
             return use
         if use.name in callers:
             cycle = " -> ".join((*callers[callers.index(use.name) :], use.name))
-            message = f"a subtree cannot use itself: {cycle}"
-            self.findings.append(make_error(use.span, "recursive-use", message))
+            self._add_error(use.span, "recursive-use", f"a subtree cannot use itself: {cycle}")
             return use
         arguments = self._collect_arguments(use, subtree)
         returns = self._map_returned_variables(use, subtree)
@@ -198,7 +196,7 @@ class _Expander:
         return replace(use, body=body, returned_variables=tuple(returns.values()))
 
     def _rename_variables(self, use: SubtreeNode, body: Node, returns: Mapping[str, str]) -> Node:
-        """Return the body with unique names of local variables; returned variables get the caller's names."""
+        """Return the body; local variables get unique names, returned variables get the caller's names."""
         use_number = self._use_counts[use.name]
         prefix = f"{use.name}." if use_number == 1 else f"{use.name}-{use_number}."
         written_variables = find_written_variables(body, self.skills)
@@ -232,12 +230,12 @@ class _Expander:
             if name not in returned_names:
                 hint = suggest_choice(name, returned_names, "Returned variables")
                 message = f'the subtree "{subtree.name}" does not return "{name}"'
-                self.findings.append(make_error(setting.name_span, "unknown-return", message, hint))
+                self._add_error(setting.name_span, "unknown-return", message, hint)
             elif isinstance(setting.value, Reference):
                 variables[name] = setting.value.name
             else:
                 message = f"returns.{name} must be a variable, for example $mine"
-                self.findings.append(make_error(setting.value.span, "wrong-type", message))
+                self._add_error(setting.value.span, "wrong-type", message)
         return variables
 
     def _collect_arguments(self, use: SubtreeNode, subtree: Subtree) -> dict[str, Value] | None:
@@ -246,7 +244,7 @@ class _Expander:
             if name not in subtree.arguments:
                 hint = suggest_choice(name, subtree.arguments, "Arguments of the subtree")
                 message = f'the subtree "{subtree.name}" has no argument "{name}"'
-                self.findings.append(make_error(setting.name_span, "unknown-argument", message, hint))
+                self._add_error(setting.name_span, "unknown-argument", message, hint)
         values: dict[str, Value] = {}
         for name, argument in subtree.arguments.items():
             value = use.arguments[name].value if name in use.arguments else argument.default
@@ -255,8 +253,11 @@ class _Expander:
             else:
                 message = f'the subtree "{subtree.name}" needs the argument "{name}"'
                 hint = f"Write with: {{{name}: ...}} at the level of use."
-                self.findings.append(make_error(use.span, "missing-argument", message, hint))
+                self._add_error(use.span, "missing-argument", message, hint)
         return values if len(values) == len(subtree.arguments) else None
+
+    def _add_error(self, span: Span, code: str, message: str, hint: str = "") -> None:
+        self.findings.append(make_error(span, code, message, hint))
 
 
 def _prefix_variable(value: Value) -> Value:

@@ -45,15 +45,13 @@ def get_type_name(node: Node) -> str:
     return "unknown"
 
 
-def _assign_path(node: Node, parent_path: str, key_path: str, name: str | None = None) -> Node:
+def _assign_path(node: Node, parent_path: str, key_path: str, name: str = "") -> Node:
     """Return the node with its path and the paths of its descendants.
 
     `key_path` is the part of the path for the key of the parent that contains the node, or "". `name` is the
     last part of the path; the default is `get_path_name(node)`, and for a list no name.
     """
-    path = _join(parent_path, key_path)
-    if name is not None or not _is_list(node):
-        path = _join(path, name or get_path_name(node))
+    path = _join(parent_path, key_path, name or ("" if _is_list(node) else get_path_name(node)))
     match node:
         case InnerNode():
             return replace(node, path=path, values=_assign_value_paths(node, path))

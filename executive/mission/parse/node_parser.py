@@ -9,7 +9,7 @@ from dataclasses import replace
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, InvalidNode, Node, SkillNode, SubtreeNode
-from executive.mission.parse.control_nodes import (
+from executive.mission.parse.control_node_parser import (
     find_inner_keys,
     find_sibling_keys,
     has_optional_body,
@@ -47,10 +47,9 @@ class NodeParser:
 
     def read_node(self, node: YamlNode | None, span: Span) -> Node:
         """Return the mission node for a YAML node; for a missing or empty node, an invalid node at `span`."""
-        if node is None:
-            return InvalidNode(span, "")
-        if is_empty(node):
-            self.add_error(span, "missing-node", "a node is missing here")
+        if node is None or is_empty(node):
+            if node is not None:
+                self.add_error(span, "missing-node", "a node is missing here")
             return InvalidNode(span, "")
         if isinstance(node, YamlSequence):
             return self._read_list(node)

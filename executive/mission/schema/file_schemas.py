@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from executive.mission.model import grammar
 from executive.mission.model.grammar import GrammarKey, GrammarKeys
-from executive.mission.parse.control_nodes import find_inner_keys, find_shorthand_key, has_optional_body
+from executive.mission.parse.control_node_parser import find_inner_keys, find_shorthand_key, has_optional_body
 from executive.mission.parse.mapping_reader import NAME_PATTERN
 from executive.mission.parse.node_parser import Skills
 from executive.mission.parse.params import PARAM_TYPES
