@@ -44,8 +44,7 @@ def command(
     redundancy_message = f"{''.join(formats)} always contains ports and reasons; omit {' and '.join(details)}"
     check_usage((len(formats) > 1, conflict_message), (formats and details, redundancy_message))
     with keep_stdout_clean():
-        from pydantic_core import to_json
-
+        from executive.record.recorded_mission import format_tree
         from executive.view.tree.dot import format_dot
         from executive.view.tree.svg import draw_svg
         from executive.view.tree.tree_text import draw_text, fold_subtrees
@@ -57,7 +56,7 @@ def command(
         elif as_dot:
             output = format_dot(nodes, name)
         elif as_json:
-            output = json.loads(to_json(nodes, inf_nan_mode="strings", fallback=str))
+            output = json.loads(format_tree(nodes))
         else:
             output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
     print_json(output) if as_json else click.echo(output)

@@ -1,4 +1,4 @@
-"""Outline of a built behaviour tree as plain data, for drawings, run records and web pages."""
+"""Outline of a behaviour tree: its nodes as plain data, for drawings, run records and web pages."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import inspect
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 from py_trees.behaviour import Behaviour
+from pydantic import Field
 
 from executive.tree.node import ControlNode
 from executive.tree.skill_leaf import SkillLeaf
@@ -34,7 +36,7 @@ class Connection:
 
 @dataclass(frozen=True)
 class OutlineNode:
-    """One node of an outline.
+    """One node of an outline; an alias is the key of an attribute in JSON files.
 
     Attributes:
         path: Unique path from the root.
@@ -44,16 +46,16 @@ class OutlineNode:
         kind: `skill`, or the keyword of a control node.
         symbol, shape: Symbol and Graphviz shape of a control node in drawings; "" for a skill.
         title: Label of the node; for a node without label, name of the skill or keyword.
-        slot: Key of the parent under which the node is written: `do`, `recover`, `catch 1`; "" in a list.
-        when: Failures that activate a catch: `on Grasp.missed`; "" for other nodes.
+        parent_key: Key of the parent that contains the node: `do`, `recover`, `catch 1`; "" in a list.
+        trigger: Failures after which the handler of a catch runs: `on Grasp.missed`; "" for other nodes.
         subtrees: Names of the subtrees with this node as root, the outermost first.
-        skill: Name of the skill; "" for a control node, whose attributes from `doc` to `uses` are empty, too.
+        skill: Name of the skill. In a control node, all attributes from `skill` to `uses` are empty.
         doc: Description of the skill, one sentence.
         params: Values of the skill's params.
         reads, writes: Connections of the skill's inputs and outputs.
         reasons: Reasons for which the skill may fail.
         senses: True if the skill gets new information, such as an image.
-        uses: Devices of which the skill has exclusive use.
+        uses: Devices that no concurrent branch may use at the same time.
     """
 
     path: str
@@ -62,8 +64,8 @@ class OutlineNode:
     detail: str
     kind: str
     title: str
-    slot: str = ""
-    when: str = ""
+    parent_key: Annotated[str, Field(alias="slot")] = ""
+    trigger: Annotated[str, Field(alias="when")] = ""
     subtrees: tuple[str, ...] = ()
     skill: str = ""
     doc: str = ""
@@ -77,7 +79,7 @@ class OutlineNode:
     shape: str = ""
 
     @property
-    def subtree(self) -> str:
+    def joined_subtrees(self) -> str:
         """Names of the subtrees with this node as root, separated by " / "."""
         return " / ".join(self.subtrees)
 
@@ -105,13 +107,13 @@ def _iterate_outline(node: Behaviour, parent: Behaviour | None, depth: int = 0) 
     label, detail = getattr(node, "label", ""), getattr(node, "detail", "")
     kind = _get_kind(node)
     if label and kind != SKILL_KIND:
-        detail = ", ".join(part for part in (kind, detail) if part)
+        detail = ", ".join(filter(None, (kind, detail)))
     title = label or (node.skill_name if isinstance(node, SkillLeaf) else kind)
     subtrees = tuple(getattr(node, "subtree_names", ()))
-    slot = _find_slot(relative_path, parent, node, title, subtrees) if parent else ""
-    when = parent.describe_trigger(node) if isinstance(parent, ControlNode) else ""
+    parent_key = _find_parent_key(node, parent, relative_path, (title, *reversed(subtrees)))
+    trigger = parent.describe_trigger(node) if isinstance(parent, ControlNode) else ""
     name = _format_name(relative_path)
-    outline_node = OutlineNode(path, name, depth, detail, kind, title, slot, when, subtrees)
+    outline_node = OutlineNode(path, name, depth, detail, kind, title, parent_key, trigger, subtrees)
     if isinstance(node, SkillLeaf):
         yield _describe_skill(outline_node, node)
     else:
@@ -136,31 +138,27 @@ def _get_kind(node: Behaviour) -> str:
 
 def _format_name(relative_path: str) -> str:
     """Return the name of a node below its parent, from its path relative to the parent."""
-    slot, _, name = relative_path.rpartition("/")
-    name = _INDEX_PATTERN.sub("", name)
-    slot = slot.replace("/", " ")
-    # A list without label has no name: its path in the second catch ends with the index, "catch/2".
-    return f"{slot} {name}" if name.isdigit() else f"{slot}: {name}" if slot else name
+    keys, _, name = relative_path.rpartition("/")
+    keys, name = keys.replace("/", " "), _INDEX_PATTERN.sub("", name)
+    # The path of a list without a label ends with a key and an index, such as "catch/2".
+    return f"{keys} {name}" if name.isdigit() else f"{keys}: {name}" if keys else name
 
 
-def _find_slot(
-    relative_path: str, parent: Behaviour, node: Behaviour, title: str, subtrees: tuple[str, ...]
+def _find_parent_key(
+    node: Behaviour, parent: Behaviour | None, relative_path: str, names: Sequence[str]
 ) -> str:
-    """Return the key of the parent under which a node is written, or "".
+    """Return the key of the parent that contains a node, or "".
 
-    The key is the relative path without the names of the node and of its subtrees. If the path omits the key,
-    the key is found by comparing the node with the children of the parent.
+    The path of the node relative to its parent consists of the key and some of the `names`, from the last
+    to the first. If the path has no key, the function compares the node with the children of the parent.
     """
-    parts = [_INDEX_PATTERN.sub("", part) for part in relative_path.split("/")]
-    if parts[-1] == title:
-        del parts[-1]
-    for subtree in reversed(subtrees):
-        if parts and parts[-1] == subtree:
+    parts = [_INDEX_PATTERN.sub("", part) for part in relative_path.split("/")] if parent else []
+    for name in names:
+        if parts and parts[-1] == name:
             del parts[-1]
     if not parts and isinstance(parent, ControlNode):
-        for key in parent.keys.values():
-            if not key.is_in_path and node in parent.list_children(key.name):
-                return key.name
+        omitted_keys = [name for name, key in parent.keys.items() if not key.is_in_path]
+        parts = [name for name in omitted_keys if node in parent.list_children(name)]
     return " ".join(parts)
 
 

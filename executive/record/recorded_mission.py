@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import yaml
-from pydantic import TypeAdapter, ValidationError
-from pydantic_core import to_json
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from executive.cell.config import CellConfig
 from executive.errors import InputError, explain_os_errors
@@ -21,8 +20,8 @@ from executive.skill import Skill
 if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
 
-_NODES_ADAPTER = TypeAdapter(list[OutlineNode])
-"""Decoder of `tree.json`."""
+_NODES_ADAPTER = TypeAdapter(list[OutlineNode], config=ConfigDict(ser_json_inf_nan="strings"))
+"""Encoder and decoder of `tree.json`."""
 
 
 def read_mission_of_run(
@@ -63,7 +62,7 @@ def read_cell(path: Path) -> CellConfig:
 
 def format_tree(nodes: Sequence[OutlineNode]) -> str:
     """Return an outline as the text of `tree.json`; values that JSON cannot represent become strings."""
-    return to_json(list(nodes), inf_nan_mode="strings", fallback=str, indent=1).decode() + "\n"
+    return _NODES_ADAPTER.dump_json(list(nodes), by_alias=True, fallback=str, indent=1).decode() + "\n"
 
 
 def read_tree(path: Path) -> list[OutlineNode]:

@@ -27,12 +27,13 @@ def _format_branch(index: int, nodes: Sequence[OutlineNode], children: Sequence[
     node = nodes[index]
     statements = [_format_node(node)]
     for child in children[index]:
-        label = f" [label={_quote(nodes[child].slot)}]" if nodes[child].slot else ""
+        label = f" [label={_quote(nodes[child].parent_key)}]" if nodes[child].parent_key else ""
         edge = f"{_quote(node.path)} -> {_quote(nodes[child].path)}{label};"
         statements += [*_format_branch(child, nodes, children), edge]
     if node.subtrees:
         header = f"subgraph {_quote(f'cluster {node.path}')} {{"
-        statements = [header, f"label={_quote(node.subtree)}; style=dashed; color=gray;", *statements, "}"]
+        label = f"label={_quote(node.joined_subtrees)}; style=dashed; color=gray;"
+        statements = [header, label, *statements, "}"]
     return statements
 
 

@@ -34,7 +34,7 @@ def make_node_texts(node: OutlineNode) -> NodeTexts:
     """Return the texts about a node in a picture."""
     symbol = "" if node.kind == "skill" else node.symbol or ControlNode.symbol
     title = "".join(wrap_and_truncate(node.title, MAX_LINE_LENGTH))
-    trigger_lines = wrap_and_truncate(node.when, MAX_LINE_LENGTH, 2)
+    trigger_lines = wrap_and_truncate(node.trigger, MAX_LINE_LENGTH, 2)
     detail_lines = wrap_and_truncate(node.detail, MAX_LINE_LENGTH, 3 if symbol else 2)
     return NodeTexts(symbol, title, trigger_lines + detail_lines, _make_tooltip(node))
 
@@ -45,11 +45,11 @@ def _make_tooltip(node: OutlineNode) -> str:
     lines = (
         node.title if node.title == type_name else f"{node.title}: {type_name}",
         node.doc,
-        node.when,
+        node.trigger,
         node.detail,
         *describe_connections(node),
         describe_reasons(node),
-        f"subtree {node.subtree}" if node.subtrees else "",
+        f"subtree {node.joined_subtrees}" if node.subtrees else "",
         node.path,
     )
     return "\n".join(filter(None, lines))

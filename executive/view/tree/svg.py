@@ -82,9 +82,10 @@ def _compute_size(node: OutlineNode, texts: NodeTexts, lines: Sequence[tuple[str
     text_width = max([estimate_text_width(texts.title, TITLE_SIZE, bold=True), *widths])
     width = _compute_text_indent(texts) + text_width + _BOX_PADDING
     height = _TITLE_HEIGHT + _LINE_HEIGHT * len(lines)
-    label_width = estimate_text_width(node.slot, EDGE_LABEL_SIZE) + _EDGE_LABEL_GAP if node.slot else 0.0
-    subtree_name_width = estimate_text_width(node.subtree, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING
-    return NodeSize(width, height, label_width, subtree_name_width if node.subtrees else 0.0)
+    label, name = node.parent_key, node.joined_subtrees
+    label_width = estimate_text_width(label, EDGE_LABEL_SIZE) + _EDGE_LABEL_GAP if label else 0.0
+    name_width = estimate_text_width(name, SUBTREE_NAME_SIZE, bold=True) + FRAME_PADDING if name else 0.0
+    return NodeSize(width, height, label_width, name_width)
 
 
 def _compute_text_indent(texts: NodeTexts) -> float:

@@ -116,8 +116,8 @@ def _wrap_line(text: str, first_indent: str, indent: str) -> list[str]:
 
 def _list_details(node: OutlineNode, shows_ports: bool, shows_reasons: bool) -> Iterator[str]:
     """Yield the texts below the line of a node."""
-    if shows_reasons and node.when:
-        yield node.when
+    if shows_reasons and node.trigger:
+        yield node.trigger
     if shows_ports and (texts := describe_connections(node)):
         yield "; ".join(texts)
     if shows_reasons and node.reasons:
@@ -138,6 +138,6 @@ def _make_use_node(node: OutlineNode, subtree: str, detail: str) -> OutlineNode:
     """Return a node that stands for a whole subtree; it replaces `node`, the first node of the subtree."""
     outer_subtrees = node.subtrees[: node.subtrees.index(subtree)]
     return OutlineNode(
-        node.path, node.name, node.depth, detail, USE_KEYWORD, subtree, node.slot, node.when, outer_subtrees,
-        symbol="…", shape="ellipse",
+        node.path, node.name, node.depth, detail, USE_KEYWORD, subtree, node.parent_key, node.trigger,
+        outer_subtrees, symbol="…", shape="ellipse",
     )  # fmt: skip

@@ -76,7 +76,7 @@ def test_a_skill_tells_what_the_mission_connects_and_what_it_declares():
 def test_every_node_knows_its_children_what_it_is_to_its_parent_and_which_subtree_begins_with_it():
     nodes = make_outline(tree())
     look, taken = ("sequence", ("look",)), ("", "Pick", ())
-    assert [(node.slot, node.title, node.subtrees) for node in nodes] == [
+    assert [(node.parent_key, node.title, node.subtrees) for node in nodes] == [
         ("", "try", ()), ("do", "retry", ()), ("recover", *look), taken, ("do", "Pick", ()),
         ("catch 1", *look), taken, ("finally", *look), taken,
     ]  # fmt: skip
@@ -86,7 +86,7 @@ def test_every_node_knows_its_children_what_it_is_to_its_parent_and_which_subtre
 def test_a_node_knows_after_which_failures_it_runs():
     catch = [Catch(on=MISSED, do=look("tree/try/catch/1/look"))]
     root = TryCatch(make_site("tree/try"), do=pick("tree/try/Pick"), catch=catch)
-    assert [node.when for node in make_outline(root)] == ["", "", "on Pick.missed", ""]
+    assert [node.trigger for node in make_outline(root)] == ["", "", "on Pick.missed", ""]
 
 
 def test_ports_and_reasons_stand_below_the_skill():
@@ -105,7 +105,7 @@ def test_ports_and_reasons_stand_below_the_skill():
 def test_a_catch_tells_what_it_is_for_with_the_reasons():
     nodes = [
         OutlineNode("tree/try", "try", 0, "", "try", "try"),
-        OutlineNode("tree/try/catch/1", "catch 1", 1, "", "sequence", "sequence", when="on Pick.missed"),
+        OutlineNode("tree/try/catch/1", "catch 1", 1, "", "sequence", "sequence", trigger="on Pick.missed"),
         OutlineNode("tree/try/catch/1/Wait", "Wait", 2, "", "skill", "Wait"),
     ]
     assert draw_text(nodes, shows_reasons=True).splitlines() == [
@@ -136,7 +136,7 @@ def test_a_folded_tree_shows_every_subtree_once():
         "├─ catch 1: look  (as above, other params)",
         "└─ finally: look  (as above)",
     ]
-    assert [(node.kind, node.title, node.slot) for node in shown if node.kind == "use"] == [
+    assert [(node.kind, node.title, node.parent_key) for node in shown if node.kind == "use"] == [
         ("use", "look", "catch 1"), ("use", "look", "finally"),
     ]  # fmt: skip
     assert [node for node in shown if node.kind != "use"] == nodes[:5]

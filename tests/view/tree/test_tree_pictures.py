@@ -33,14 +33,15 @@ def skill(path: str, depth: int, name: str, **more) -> OutlineNode:
 
 NODES = [
     control("tree/try", 0, "try"),
-    control("tree/try/retry", 1, "retry", slot="do", detail=RETRY),
+    control("tree/try/retry", 1, "retry", parent_key="do", detail=RETRY),
     skill(
-        "tree/try/retry/do/Grasp", 2, "Grasp", slot="do", doc="Close the tool.", detail="settle: 0.2",
+        "tree/try/retry/do/Grasp", 2, "Grasp", parent_key="do", doc="Close the tool.", detail="settle: 0.2",
         reads=(Connection("target", "target", True), Connection("only", "item", False)),
         writes=(Connection("held", "thing", True),), reasons=("missed", "blocked"),
     ),
     control(
-        "tree/try/catch/1/look", 1, "sequence", slot="catch 1", when="on Grasp.missed", subtrees=("look",)
+        "tree/try/catch/1/look", 1, "sequence", parent_key="catch 1", trigger="on Grasp.missed",
+        subtrees=("look",),
     ),
     skill("tree/try/catch/1/look/2:Detect", 2, "Detect", title="again", detail="Detect, view: full"),
 ]  # fmt: skip
@@ -74,7 +75,7 @@ def test_every_node_is_a_group_with_its_symbol_title_and_short_lines_and_a_subtr
     found = groups(picture)
     assert [group.attrib["data-kind"] for group in found.values()] == [node.kind for node in NODES]
     shown = {
-        path: [texts(group, kind) for kind in ("slot", "symbol", "title", "line")]
+        path: [texts(group, kind) for kind in ("edge-label", "symbol", "title", "line")]
         for path, group in found.items()
     }
     assert shown == {
@@ -129,11 +130,11 @@ def test_the_picture_needs_nothing_else_and_its_colours_come_from_the_style_shee
 
 
 def test_text_from_a_mission_cannot_leave_its_place_in_the_svg():
-    node = skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, slot=NASTY, subtrees=(NASTY,))
+    node = skill(f"tree/{NASTY}", 0, "Grasp", title=NASTY, detail=NASTY, parent_key=NASTY, subtrees=(NASTY,))
     picture = parsed([control("tree", 0, "sequence"), replace(node, depth=1)], NASTY)
     group = groups(picture)[f"tree/{replace_invalid_xml_characters(NASTY)}"]
     assert picture.findtext(f"{SVG}title") == replace_invalid_xml_characters(NASTY)
-    assert texts(group, "slot") == [replace_invalid_xml_characters(NASTY)]
+    assert texts(group, "edge-label") == [replace_invalid_xml_characters(NASTY)]
     assert NASTY[:24] in tooltip(group)
     draw_svg([node], NASTY).encode()
 
@@ -189,7 +190,7 @@ def test_a_note_stands_below_what_the_mission_says_in_a_box_with_room_for_it():
     )
     grasp = "tree/try/retry/do/Grasp"
     texts = sorted(noted[grasp].iter(f"{SVG}text"), key=lambda text: float(text.attrib["y"]))
-    assert [(text.attrib["class"], text.text) for text in texts if text.attrib["class"] != "slot"] == [
+    assert [(text.attrib["class"], text.text) for text in texts if text.attrib["class"] != "edge-label"] == [
         ("title", "Grasp"), ("line", "settle: 0.2"), ("note", "1 done, 2 failed"),
         ("note", "missed: no seal on …"),
     ]  # fmt: skip
