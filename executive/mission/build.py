@@ -32,18 +32,18 @@ def build_tree(
 ) -> TreeNode:
     """Return the root of a new behaviour tree; every node of the tree has a unique, readable `path`.
 
-    `substitutes` maps patterns of node paths to skills that run in place of the mission's skills; `*` in a
-    pattern matches any characters, including `/`. The first matching pattern applies.
+    `substitutes` contains skills that run in place of the mission's skills, by pattern of node paths. In a
+    pattern, `*` matches any characters, including `/`. The first matching pattern applies.
 
     Raises:
         InputError: A pattern matches no skill node.
     """
     builder = TreeBuilder(skills, cell, blackboard, emit, substitutes or {})
     root = builder.build_node(loaded.tree)
+    paths = [node.path for node in root.iterate() if isinstance(node, SkillLeaf)]
     for pattern in builder.substitutes:
-        if pattern not in builder.matched_patterns:
-            paths = ", ".join(node.path for node in root.iterate() if isinstance(node, SkillLeaf))
-            raise InputError(f'no skill node matches "{pattern}"; the skill nodes are: {paths}')
+        if not any(fnmatchcase(path, pattern) for path in paths):
+            raise InputError(f'no skill node matches "{pattern}"; the skill nodes are: {", ".join(paths)}')
     return root
 
 
@@ -53,15 +53,13 @@ class TreeBuilder:
 
     Attributes:
         substitutes: Skills that run in place of the mission's skills, by pattern of node paths.
-        matched_patterns: Patterns that have matched a skill node so far.
     """
 
     skills: Mapping[str, type[Skill]]
     cell: Cell
     blackboard: Blackboard
     emit: Emit
-    substitutes: Mapping[str, type[Skill]] = field(default_factory=dict)
-    matched_patterns: list[str] = field(default_factory=list)
+    substitutes: Mapping[str, type[Skill]]
     node_classes: ControlNodes = field(default_factory=load_control_nodes)
 
     def build_node(self, node: Node) -> TreeNode:
@@ -82,16 +80,13 @@ class TreeBuilder:
 
     def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
         skill = self.skills[node.skill]
-        declarations: dict[str, Param | Port] = {**skill.params, **skill.ports}
+        declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
         types = {name: declaration.type for name, declaration in declarations.items()}
         wiring = Wiring(
             constants={name: convert_value(value.value, types[name]) for name, value in find_literals(node)},
             inputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.IN)},
             outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},
         )
-        return SkillLeaf(context, node.skill, self._find_substitute(node.path) or skill, wiring, self.cell)
-
-    def _find_substitute(self, path: str) -> type[Skill] | None:
-        patterns = [pattern for pattern in self.substitutes if fnmatchcase(path, pattern)]
-        self.matched_patterns.extend(patterns)
-        return self.substitutes[patterns[0]] if patterns else None
+        patterns = (pattern for pattern in self.substitutes if fnmatchcase(node.path, pattern))
+        executed_skill = next((self.substitutes[pattern] for pattern in patterns), skill)
+        return SkillLeaf(context, node.skill, executed_skill, wiring, self.cell)

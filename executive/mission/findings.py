@@ -111,22 +111,18 @@ def describe_findings(findings: Sequence[Finding]) -> list[str]:
     return texts
 
 
-def make_error(span: Span, code: str, message: str, hint: str = "") -> Finding:
-    """Return an error at `span`."""
-    return _make_finding("error", span, code, message, hint)
-
-
-def make_warning(span: Span, code: str, message: str, hint: str = "") -> Finding:
-    """Return a warning at `span`; a mission with warnings can run."""
-    return _make_finding("warning", span, code, message, hint)
-
-
-def _make_finding(severity: str, span: Span, code: str, message: str, hint: str) -> Finding:
+def make_error(span: Span, code: str, message: str, hint: str = "", severity: str = "error") -> Finding:
+    """Return an error at `span`, or a finding of another severity."""
     assert code in MEANING_BY_CODE, code
     source = span.source
     excerpt = _mask_secrets(source.get_line(span.line))
     message, hint = shorten_quotations(message), shorten_quotations(hint)
     return Finding(source.path, span.line, span.col, severity, code, message, span.length, hint, excerpt)
+
+
+def make_warning(span: Span, code: str, message: str, hint: str = "") -> Finding:
+    """Return a warning at `span`; a mission with warnings can run."""
+    return make_error(span, code, message, hint, "warning")
 
 
 @lru_cache(maxsize=64)

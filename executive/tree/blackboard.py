@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import UserDict
-from collections.abc import Mapping
 
 
 class Blackboard(UserDict[str, object]):
@@ -12,11 +11,3 @@ class Blackboard(UserDict[str, object]):
     Every run has its own blackboard, so that one process can execute several missions. All subtrees share
     the blackboard. Arguments of subtrees are no variables: values replace them before the tree is built.
     """
-
-    def write(self, values: Mapping[str, object]) -> None:
-        """Set variables; `values` maps their names to their new values."""
-        self.data.update(values)
-
-    def remove(self, name: str) -> None:
-        """Remove a variable, if it exists."""
-        self.data.pop(name, None)

@@ -130,18 +130,14 @@ UNKNOWN_STATE = FlowState(None, None)
 
 
 @dataclass(frozen=True)
-class PossibleFailure:
-    """A failure that a node may pass on.
+class PossibleFailure(Reason):
+    """A failure that a node may pass on; `source` is the failing skill or the keyword of a control node.
 
     Attributes:
-        source: Name of the skill, or the keyword of the control node, that fails.
-        reason: Declared cause of the failure.
         origin: Path of the node that fails.
         labels: Labels of the failing node and of the ancestors that passed the failure on.
     """
 
-    source: str
-    reason: str
     origin: str
     labels: frozenset[str] = frozenset()
 
@@ -157,9 +153,6 @@ class PossibleFailure:
         """Return True if one of `reasons` certainly denotes the failure."""
         sources = {self.source, *self.labels}
         return any(reason.reason == self.reason and reason.source in sources for reason in reasons)
-
-    def __str__(self) -> str:
-        return f"{self.source}.{self.reason}"
 
 
 @dataclass(frozen=True)

@@ -65,11 +65,11 @@ class ForEach(Loop):
 
     def clean_up(self) -> None:
         """Remove the variable that holds the current element."""
-        self.blackboard.remove(self.each)
+        self.blackboard.pop(self.each, None)
 
     def _write_element(self) -> None:
         element = self._elements[self._element_index]
-        self.blackboard.write({self.each: element})
+        self.blackboard[self.each] = element
         position = f"element {self._element_index + 1} of {len(self._elements)}"
         self.report_choice(f"{position}: {_describe_element(element)}")
 

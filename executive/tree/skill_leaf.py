@@ -132,7 +132,7 @@ class SkillLeaf(TreeNode):
 
     def _succeed(self, port_values: Mapping[str, object]) -> None:
         outputs = {port: port_values[port] for port in self.wiring.outputs}
-        self.blackboard.write({self.wiring.outputs[port]: value for port, value in outputs.items()})
+        self.blackboard.update({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._find_item(outputs) or self._item
         json_outputs = {port: to_json_or_type_name(value) for port, value in outputs.items()}
         self._end(Status.SUCCESS, outputs=json_outputs)

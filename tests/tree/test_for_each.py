@@ -55,17 +55,17 @@ def list_choices(events: Any) -> list[str]:
 def test_a_text_names_the_variable_that_holds_the_list(
     make: Any, scope: Blackboard, ticks: Any, used: Any
 ) -> None:
-    scope.write({"todo": ("a", 2)})
+    scope.update({"todo": ("a", 2)})
     assert (ticks(make("todo")), used) == ("RRS", ["a", 2])
 
 
 def test_the_list_is_the_one_of_the_start(make: Any, scope: Blackboard, ticks: Any, used: Any) -> None:
     todo = ["a", "b"]
-    scope.write({"todo": todo})
+    scope.update({"todo": todo})
     node = make("todo")
     node.tick_once()
     todo.append("late")
-    scope.write({"todo": ["other"]})
+    scope.update({"todo": ["other"]})
     assert (ticks(node), used) == ("RS", ["a", "b"])
     assert (ticks(node), used) == ("RS", ["a", "b", "other"])
 
@@ -81,7 +81,7 @@ def test_the_current_element_is_reported(make: Any, ticks: Any, events: Any) -> 
 
 @pytest.mark.parametrize("end", ["success", "halt", "fault"])
 def test_the_variable_is_gone_however_it_ends(end: str, make: Any, scope: Blackboard, ticks: Any) -> None:
-    scope.write({"other": 1})
+    scope.update({"other": 1})
     node = make(["a", "break" if end == "fault" else "b"])
     node.tick_once()
     assert scope["it"] == "a"
@@ -109,13 +109,13 @@ def test_a_loop_that_ended_does_not_touch_the_variable_again(
 ) -> None:
     node = make(["a"])
     ticks(node)
-    scope.write({"it": "somebody else's"})
+    scope.update({"it": "somebody else's"})
     node.stop()
     assert scope["it"] == "somebody else's"
 
 
 def test_a_list_that_nothing_wrote_is_a_fault(make: Any, scope: Blackboard) -> None:
-    scope.write({"targets": []})
+    scope.update({"targets": []})
     with pytest.raises(Fault) as caught:
         make("todo").tick_once()
     assert (str(caught.value), caught.value.node) == (
@@ -125,7 +125,7 @@ def test_a_list_that_nothing_wrote_is_a_fault(make: Any, scope: Blackboard) -> N
 
 @pytest.mark.parametrize(("value", "kind"), [("abc", "str"), ({"a": 1}, "dict"), (None, "NoneType")])
 def test_what_is_no_list_is_a_fault(make: Any, scope: Blackboard, value: Any, kind: str) -> None:
-    scope.write({"todo": value})
+    scope.update({"todo": value})
     node = make("todo")
     with pytest.raises(Fault) as caught:
         node.tick_once()

@@ -59,7 +59,7 @@ class Worker(Skill):
 @pytest.fixture
 def scope() -> Blackboard:
     scope = Blackboard()
-    scope.write({"input": "stone"})
+    scope.update({"input": "stone"})
     return scope
 
 
@@ -81,7 +81,7 @@ def test_inputs_are_those_of_the_start_and_outputs_are_committed_on_success_only
     node = make()
     node.tick_once()
     assert node.status is Status.RUNNING and "result" not in scope
-    scope.write({"input": "brick"})
+    scope.update({"input": "brick"})
     node.tick_once()
     assert node.status is Status.SUCCESS
     assert dict(scope) == {"input": "brick", "result": "stone None"}
@@ -98,7 +98,7 @@ def test_a_failure_writes_nothing_and_says_why(make: Any, scope: Blackboard, tic
 def test_every_start_gets_a_fresh_instance_and_fresh_inputs(make: Any, scope: Blackboard, ticks: Any) -> None:
     node = make()
     ticks(node)
-    scope.write({"input": "brick", "extra": "new"})
+    scope.update({"input": "brick", "extra": "new"})
     assert (ticks(node), scope["result"]) == ("RS", "brick new")
 
 
@@ -125,7 +125,7 @@ def test_a_bug_in_a_skill_is_a_fault(make: Any, way: str, sentence: str, events:
 
 
 def test_a_missing_input_is_a_fault_that_names_it(make: Any, scope: Blackboard) -> None:
-    scope.remove("input")
+    del scope["input"]
     with pytest.raises(Fault) as caught:
         make().tick_once()
     assert str(caught.value) == (
@@ -181,7 +181,7 @@ def test_events_say_what_happened_to_which_item(site: Any, events: Any) -> None:
             self.held = self.target.item
 
     scope = site().blackboard
-    scope.write({"target": Target("cube-2", "cube", np.zeros(3), 0.9, 1, 0, 0.0)})
+    scope.update({"target": Target("cube-2", "cube", np.zeros(3), 0.9, 1, 0, 0.0)})
     wiring = Wiring({}, {"target": "target"}, {"held": "held"})
     node = SkillLeaf(site("tree/Take"), "Take", Take, wiring, None)  # type: ignore[arg-type]
     node.tick_once()
@@ -210,7 +210,7 @@ def test_the_item_is_what_a_port_names_that_the_skill_always_has(
     colour: str, items: list[str], site: Any, ticks: Any, events: Any
 ) -> None:
     scope = site().blackboard
-    scope.write({"box": "box-1", "unlike": "cube-2", "colour": colour})
+    scope.update({"box": "box-1", "unlike": "cube-2", "colour": colour})
     inputs = {name: name for name in ("unlike", "colour", "box")}
     wiring = Wiring({}, inputs, {"found": "found"})
     assert ticks(SkillLeaf(site(), "Sort", Sort, wiring, None)) == "RS"  # type: ignore[arg-type]
@@ -219,7 +219,7 @@ def test_the_item_is_what_a_port_names_that_the_skill_always_has(
 
 def test_a_forgotten_variable_is_gone_and_need_not_have_been_there() -> None:
     scope, other = Blackboard(), Blackboard()
-    scope.write({"a": 1, "b": 2})
+    scope.update({"a": 1, "b": 2})
     for _ in range(2):
-        scope.remove("a")
+        scope.pop("a", None)
     assert (dict(scope), dict(other)) == ({"b": 2}, {})
