@@ -14,7 +14,7 @@ from executive.exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from executive.mission.findings import Finding
-    from executive.mission.flow.unhandled_failures import UnhandledFailure
+    from executive.mission.flow_analysis import UnhandledFailure
 
 
 @click.command(name="check")

@@ -15,7 +15,7 @@ from executive.mission.check.checks import run_checks
 from executive.mission.check.context import CheckContext
 from executive.mission.expand import expand
 from executive.mission.findings import Finding, MissionError, make_warning, sort_findings
-from executive.mission.flow.unhandled_failures import UnhandledFailure, find_unhandled_failures
+from executive.mission.flow_analysis import UnhandledFailure, find_unhandled_failures
 from executive.mission.model.mission import Mission
 from executive.mission.model.node_paths import assign_paths
 from executive.mission.model.nodes import InvalidNode, Node

@@ -19,7 +19,7 @@ from executive.cell.json_values import to_json
 from executive.cli.main import COMMANDS, main
 from executive.errors import Fault, InputError
 from executive.mission.findings import Finding, MissionError
-from executive.mission.flow.unhandled_failures import UnhandledFailure
+from executive.mission.flow_analysis import UnhandledFailure
 from executive.record.result import Audit, ItemCounts, Result
 from executive.record.timeline.timeline import PlanningTotals
 from executive.run.assembly import RunOptions

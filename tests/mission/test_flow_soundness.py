@@ -17,7 +17,7 @@ from executive.mission.build import TreeBuilder
 from executive.mission.check.checks import run_checks
 from executive.mission.check.context import CheckContext
 from executive.mission.expand import expand
-from executive.mission.flow.unhandled_failures import find_unhandled_failures
+from executive.mission.flow_analysis import find_unhandled_failures
 from executive.mission.model.node_paths import assign_paths
 from executive.mission.parse.mission_file import parse_mission
 from executive.mission.parse.node_parser import NodeParser

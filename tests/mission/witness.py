@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from py_trees.common import Status
 
 from executive.events import NodeStarted, RunEnded, TimedEvent
-from executive.mission.flow.analysis import FlowAnalysis
+from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.load import LoadedMission
 from executive.mission.model.nodes import SkillNode
 from executive.run.run import Run

@@ -16,7 +16,7 @@ from executive.events import FaultInjected, FrameSearched, ItemChanged, RunEnded
 from executive.geometry import Array
 from executive.ledger.item import State
 from executive.ledger.outcomes import is_balanced
-from executive.mission.flow.unhandled_failures import UnhandledFailure
+from executive.mission.flow_analysis import UnhandledFailure
 from executive.testing.faults.world_access import TrueObject
 
 DISPLACING_EFFECTS = frozenset({"object_removed", "object_moved", "seal_breaks"})

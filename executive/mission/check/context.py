@@ -10,7 +10,7 @@ from typing import NamedTuple
 from executive.cell.config import CellConfig
 from executive.cell.protocols import MinTimes
 from executive.mission.findings import suggest_choice
-from executive.mission.flow.analysis import FlowAnalysis
+from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.mission import Mission
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.values import Reference

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error, make_warning
-from executive.mission.flow.analysis import FlowAnalysis
+from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_path_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
 from executive.mission.findings import Finding, make_error, suggest_choice
-from executive.mission.flow.analysis import FlowAnalysis
+from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model import grammar
 from executive.mission.model.nodes import InnerNode, Node, NodeSection, SkillNode, iterate_keys, list_nodes
 from executive.mission.model.values import FailureName

@@ -21,7 +21,7 @@ from executive.campaign.faults.trial_checks import (
 from executive.cell.frame import FrameCaptured
 from executive.cells.fake.cell import FakeCell
 from executive.events import FaultInjected, RunEnded
-from executive.mission.flow.unhandled_failures import UnhandledFailure
+from executive.mission.flow_analysis import UnhandledFailure
 from executive.testing.faults import during, seal_fails
 from executive.testing.faults.world_access import TrueObject
 

@@ -1,9 +1,9 @@
-"""Data-flow analysis of the tree over all possible execution paths (abstract interpretation)."""
+"""Data-flow analysis of the tree over all execution paths, and the failures that no node handles."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from executive.mission.findings import find_similar_word
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
@@ -37,7 +37,7 @@ class FlowAnalysis:
     Attributes:
         nodes: Every node by its path.
         entry_states: Join of the states in which a node may start, by path; without unreachable nodes.
-        flows: Possible ends of a node, with their states, for the last analysed entry state, by path.
+        flows: Possible ends of a node with the states after them, for the last analysed entry state, by path.
         body_end_states: Join of the states after success of the body of a `use`, by path of the `use`.
         root_flow: Possible ends of the whole tree.
     """
@@ -92,21 +92,46 @@ class FlowAnalysis:
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
         final_state = state.with_arm_moved() if skill.moves else state
         success = final_state.with_variables(outputs).apply_success(postcondition, node.path)
-
-        def compute_end_state(reason: str) -> FlowState:
-            return final_state.apply_failure(skill.tool_state_after_failure.get(reason), node.path)
-
-        failures = {
-            PossibleFailure(node.skill, reason, node.path): compute_end_state(reason)
-            for reason in skill.reasons
+        end_states = {
+            key: final_state.apply_failure(skill.tool_state_after_failure.get(key), node.path)
+            for key in (*skill.reasons, HALT_KEY)
         }
-        return Flow(success, failures, compute_end_state(HALT_KEY))
+        failures = {PossibleFailure(node.skill, key, node.path): end_states[key] for key in skill.reasons}
+        return Flow(success, failures, end_states[HALT_KEY])
 
     def _compute_use_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:
         flow = self._analyse(body, state)
-        # One use may be entered in several states, for example in a loop.
-        end_states = (self.body_end_states.get(node.path), flow.success)
-        self.body_end_states[node.path] = join_states(end_states)
+        # In a loop, one use may start in several states.
+        self.body_end_states[node.path] = join_states((self.body_end_states.get(node.path), flow.success))
         # `find_unwritten_returns` reports unwritten returned variables, so they count as written here.
-        success = flow.success and flow.success.with_variables(node.returned_variables)
-        return replace(flow, success=success)
+        return replace(flow, success=flow.success and flow.success.with_variables(node.returned_variables))
+
+
+@dataclass(frozen=True)
+class UnhandledFailure:
+    """A failure that can end the mission, because no node handles it.
+
+    Attributes:
+        source: Name of the skill, or keyword of the control node, that fails.
+        reason: Reason of the failure.
+        node: Path of the node that fails, in the tree.
+        path: Path of the file that contains the node.
+        line: Line of the node in the file.
+    """
+
+    source: str
+    reason: str
+    node: str
+    path: str
+    line: int
+
+
+def find_unhandled_failures(analysis: FlowAnalysis) -> tuple[UnhandledFailure, ...]:
+    """Return the failures that can end the mission, in the order of the tree."""
+    order = {path: index for index, path in enumerate(analysis.nodes)}
+    failures = sorted(analysis.root_flow.failures, key=lambda end: (order[end.origin], end.reason))
+    spans = [analysis.nodes[failure.origin].span for failure in failures]
+    return tuple(
+        UnhandledFailure(failure.source, failure.reason, failure.origin, span.source.path, span.line)
+        for failure, span in zip(failures, spans, strict=True)
+    )

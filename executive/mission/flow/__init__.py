@@ -1,1 +1,0 @@
-"""Abstract execution of the tree, and the failures that no node handles."""
