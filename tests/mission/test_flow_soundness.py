@@ -211,7 +211,7 @@ def sound(tree: Tree) -> CheckContext | None:
 def run(case: CheckContext, seed: int) -> tuple[World, Any]:
     """Run a mission until it ends or for long enough; return its world and its root."""
     world = World(seed)
-    root = TreeBuilder(SKILLS, cast("Cell", world), Blackboard(), discard_event).build_node(case.tree)
+    root = TreeBuilder(SKILLS, cast("Cell", world), Blackboard(), discard_event, {}).build_node(case.tree)
     while world.ticks < MOST_TICKS:
         root.tick_once()
         if root.status is not Status.RUNNING:
