@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from executive.cell.bins import Bin
 from executive.cell.protocols import Routes
 from executive.cell.workcell import AUDIT_KEYS
 from executive.geometry import Array
@@ -38,7 +39,11 @@ class FinalObject:
 
 
 def audit_objects(
-    objects: Iterable[FinalObject], records: Sequence[ItemRecord], routes: Routes, max_distance: float
+    objects: Iterable[FinalObject],
+    records: Sequence[ItemRecord],
+    bins: Mapping[str, Bin],
+    routes: Routes,
+    max_distance: float,
 ) -> dict[str, int]:
     """Return the number of objects by outcome.
 
@@ -51,16 +56,19 @@ def audit_objects(
     Args:
         objects: The objects of the world, including removed objects.
         records: The items of the ledger.
+        bins: The bins of the cell.
         routes: Names of the permitted bins of each class.
         max_distance: Maximum horizontal distance between the first position of an item and its object [m].
     """
     counts = dict.fromkeys(AUDIT_KEYS, 0)
     first_positions = [record.first_position for record in records if record.state is not State.PHANTOM]
     for final_object in objects:
+        # For an item in a bin, a resumed run records the centre of the bin as first position.
+        bin_centre = [bins[final_object.bin].position] if final_object.bin else []
         is_seen = any(
-            float(np.linalg.norm((first_position - position)[:2])) <= max_distance
+            np.linalg.norm((first_position - position)[:2]) <= max_distance
             for first_position in first_positions
-            for position in final_object.rest_positions
+            for position in (*final_object.rest_positions, *bin_centre)
         )
         outcome = _find_outcome(final_object, routes)
         if final_object.is_removed:

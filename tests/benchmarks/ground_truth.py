@@ -13,8 +13,8 @@ from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
-from executive.cells.audit import UNKNOWN_LABEL
-from executive.cells.sim.audit import audit_bodies
+from executive.cells.audit import UNKNOWN_LABEL, audit_objects
+from executive.cells.sim.audit import list_final_objects
 from executive.cells.sim.cell import SimCell
 from executive.events import Emit, ItemChanged
 from executive.ledger.item import State
@@ -198,10 +198,9 @@ class AuditedCell(SimCell):
         """Return the true end of a body."""
         places = [self._initial_positions[body], *self._world.rest_positions.get(body, ())]
         gate = self.config.ledger.gate
-        counts = audit_bodies(
-            self._world, {body: places}, self.accounts.records, self.cell.bins, self.routes, gate,
-            held_body=self._tool.held_body, dropped_bodies=self._tool.dropped_bodies,
-        )  # fmt: skip
+        bins, tool = self.cell.bins, self._tool
+        objects = list_final_objects(self._world, {body: places}, bins, tool.held_body, tool.dropped_bodies)
+        counts = audit_objects(objects, self.accounts.records, bins, self.routes, gate)
         seen_there = tuple(
             record.item
             for record in self.accounts.records
@@ -211,8 +210,7 @@ class AuditedCell(SimCell):
         inside = ""
         if body in self._world.labels:
             position = self._world.get_object_pose(body).position
-            bins = self.cell.bins.items()
-            inside = next((name for name, bin in bins if bin.contains(position, BIN_THICKNESS)), "")
+            inside = next((name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS)), "")
         return FoundObject(
             label=self._labels[body],
             place=next((place for place in END_PLACES if counts[place]), ""),

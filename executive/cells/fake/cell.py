@@ -11,15 +11,22 @@ import numpy as np
 
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
+from executive.cell.layout import build_bin, compute_travel_height
 from executive.cell.protocols import MinTimes, Routes
 from executive.cell.workcell import CellOptions, KeyPath
 from executive.cells.audit import FinalObject, audit_objects
-from executive.cells.fake.arm import FakeArm, FakeTool, find_places_out_of_reach
+from executive.cells.fake.arm import MAX_TOOL_SPEED, FakeArm, FakeTool, find_places_out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
-from executive.cells.fake.min_times import FakeMinTimes
 from executive.cells.fake.state_log import FakeStateLog, restore_world
 from executive.cells.fake.visuals import FakeVisuals
-from executive.cells.fake.world import FakeObject, FakeWorld
+from executive.cells.fake.world import (
+    TOUCH_DISTANCE,
+    FakeObject,
+    FakeWorld,
+    describe_lack_of_room,
+    put_random_objects,
+)
+from executive.cells.min_times import CellMinTimes
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import Fault, InputError
 from executive.events import Emit, discard_event
@@ -127,7 +134,7 @@ class FakeCell(CellWithoutHardware):
         del cell_folder
         if arm_errors := tuple(find_arm_errors(config)):
             return arm_errors
-        room_error = _describe_lack_of_room(config, config.table.objects[1])
+        room_error = describe_lack_of_room(config, config.table.objects[1])
         room_errors = [(("table", "objects"), room_error)] if room_error else []
         return (*find_places_out_of_reach(config), *room_errors)
 
@@ -169,17 +176,13 @@ class FakeCell(CellWithoutHardware):
 
     def audit(self) -> dict[str, int]:
         """Return the number of objects by outcome, such as `right`, `wrong_bin`, `left` and `elsewhere`."""
-        world, final_objects = self.world, []
-        for fake_object in (*world.objects, *world.removed_objects):
-            bin = self._find_bin(fake_object)
-            # For an item in a bin, a resumed run records the centre of the bin as first position.
-            positions = fake_object.rest_positions + ([self.cell.bins[bin].position] if bin else [])
-            is_held, is_removed = fake_object is world.held_object, fake_object in world.removed_objects
-            state = FinalObject(
-                fake_object.label, bin, positions, fake_object.is_dropped, is_held, is_removed
-            )
-            final_objects.append(state)
-        return audit_objects(final_objects, self.ledger.records, self.routes, self.config.ledger.gate)
+        held, removed = self.world.held_object, self.world.removed_objects
+        final_objects = [
+            FinalObject(o.label, self._find_bin(o), o.rest_positions, o.is_dropped, o is held, o in removed)
+            for o in (*self.world.objects, *removed)
+        ]
+        max_distance = self.config.ledger.gate
+        return audit_objects(final_objects, self.ledger.records, self.cell.bins, self.routes, max_distance)
 
     def _find_bin(self, fake_object: FakeObject) -> str:
         """Return the name of the bin that contains an object, or ""."""
@@ -197,42 +200,23 @@ class FakeCell(CellWithoutHardware):
             self._log.close()
 
 
+class FakeMinTimes(CellMinTimes):
+    """Durations of straight paths at the maximum speed of the fake arm; implements `MinTimes`."""
+
+    def __init__(self, config: CellConfig) -> None:
+        super().__init__(config, TOUCH_DISTANCE)
+
+    def _compute_min_transport_time(self, bin: str) -> float:
+        """Return the time [s] to lift the tallest object to travel height and to move to the nearest slot."""
+        max_height = max(object_class.height for object_class in self._config.objects.values())
+        slots = build_bin(bin, self._config.bins[bin]).slots
+        low, high = np.array([self._config.table.x, self._config.table.y]).T
+        distance = float(np.linalg.norm(slots - np.clip(slots, low, high), axis=1).min())
+        return (compute_travel_height(self._config) - max_height + distance) / MAX_TOOL_SPEED
+
+
 @functools.cache
 def load_empty_cell() -> CellConfig:
     """Return the shipped cell `overhead` as a fake cell without objects, for tests of single skills."""
     path = get_shipped_folder() / "cells" / "overhead.yaml"
     return load_cell(path, {"cell.kind": "fake", "cell.table.objects": "[0, 0]"})
-
-
-def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
-    """Put objects of random classes on random grid points; the cell file limits the number of objects.
-
-    Raises:
-        InputError: The workspace has no room for the objects.
-    """
-    rng = np.random.default_rng(seed)
-    count = int(rng.integers(*config.table.objects, endpoint=True))
-    if room_error := _describe_lack_of_room(config, count):
-        raise InputError(room_error)
-    points, _ = _compute_grid_points(config)
-    for index in rng.permutation(len(points))[:count]:
-        world.put(str(rng.choice(list(config.objects))), *points[index])
-
-
-def _compute_grid_points(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
-    """Return the grid points for objects on the table, and the minimum distance between two points [m]."""
-    distance = 2 * max(object_class.radius for object_class in config.objects.values()) + config.table.gap
-    ranges = config.table.x, config.table.y
-    xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in ranges)
-    return [(float(x), float(y)) for x in xs for y in ys], distance
-
-
-def _describe_lack_of_room(config: CellConfig, count: int) -> str:
-    """Return a message if the workspace lacks room for `count` objects, else ""."""
-    points, distance = _compute_grid_points(config)
-    if count <= len(points):
-        return ""
-    return (
-        f"{count} objects find no room on the workspace of cell {config.cell}, which has {len(points)} "
-        f"places {distance:.3f} m apart; ask for fewer or widen table.x and table.y"
-    )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from executive.cell.bins import BIN_THICKNESS, Bin
+from executive.cell.config import CellConfig
 from executive.cell.objects import ObjectClass
 from executive.errors import InputError
 from executive.geometry import Array
@@ -127,3 +128,37 @@ class FakeWorld:
             if is_touched and fake_object is not self.held_object:
                 return fake_object
         return None
+
+
+def put_random_objects(world: FakeWorld, config: CellConfig, seed: int) -> None:
+    """Put objects of random classes on random grid points; the cell file limits the number of objects.
+
+    Raises:
+        InputError: The workspace has no room for the objects.
+    """
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(*config.table.objects, endpoint=True))
+    if room_error := describe_lack_of_room(config, count):
+        raise InputError(room_error)
+    points, _ = _compute_grid_points(config)
+    for index in rng.permutation(len(points))[:count]:
+        world.put(str(rng.choice(list(config.objects))), *points[index])
+
+
+def _compute_grid_points(config: CellConfig) -> tuple[list[tuple[float, float]], float]:
+    """Return the grid points for objects on the table, and the minimum distance between two points [m]."""
+    distance = 2 * max(object_class.radius for object_class in config.objects.values()) + config.table.gap
+    ranges = config.table.x, config.table.y
+    xs, ys = (np.linspace(low, high, 1 + int((high - low) / distance)) for low, high in ranges)
+    return [(float(x), float(y)) for x in xs for y in ys], distance
+
+
+def describe_lack_of_room(config: CellConfig, count: int) -> str:
+    """Return a message if the workspace lacks room for `count` objects, else ""."""
+    points, distance = _compute_grid_points(config)
+    if count <= len(points):
+        return ""
+    return (
+        f"{count} objects find no room on the workspace of cell {config.cell}, which has {len(points)} "
+        f"places {distance:.3f} m apart; ask for fewer or widen table.x and table.y"
+    )

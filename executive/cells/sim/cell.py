@@ -9,9 +9,10 @@ from pathlib import Path
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath
+from executive.cells.audit import audit_objects
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.arm_occlusion import ArmOcclusion
-from executive.cells.sim.audit import audit_bodies
+from executive.cells.sim.audit import list_final_objects
 from executive.cells.sim.camera import SimCamera
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.command_log import CommandLog, read_commands
@@ -156,17 +157,10 @@ class SimCell(CellWithoutHardware):
 
     def audit(self) -> dict[str, int]:
         """Return the number of objects by outcome, such as `right`, `wrong_bin`, `left` and `elsewhere`."""
-        moves = self._world.rest_positions
-        return audit_bodies(
-            self._world,
-            {body: [start, *moves.get(body, ())] for body, start in self._initial_positions.items()},
-            self.accounts.records,
-            self.cell.bins,
-            self.routes,
-            self.config.ledger.gate,
-            held_body=self._tool.held_body,
-            dropped_bodies=self._tool.dropped_bodies,
-        )
+        world, tool, bins, moves = self._world, self._tool, self.cell.bins, self._world.rest_positions
+        rest_positions = {body: [p, *moves.get(body, ())] for body, p in self._initial_positions.items()}
+        objects = list_final_objects(world, rest_positions, bins, tool.held_body, tool.dropped_bodies)
+        return audit_objects(objects, self.accounts.records, bins, self.routes, self.config.ledger.gate)
 
     def close(self) -> None:
         """Close the detectors and the physics servers."""
@@ -185,9 +179,7 @@ class SimCell(CellWithoutHardware):
 
 def _find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each camera without a depth sensor if the cell localizes by depth."""
-    if config.localization != "depth":
-        return
     for name, camera in config.cameras.items():
-        if camera.depth is None:
+        if config.localization == "depth" and camera.depth is None:
             message = f'localization "depth" needs a camera with depth, and {name} has none; give it a '
             yield ("localization",), message + 'section "depth: {}", or use "plane"'

@@ -11,8 +11,8 @@ import pytest
 
 from executive.cell.bins import Bin
 from executive.cell.workcell import AUDIT_KEYS
-from executive.cells.audit import UNKNOWN_LABEL
-from executive.cells.sim.audit import audit_bodies
+from executive.cells.audit import UNKNOWN_LABEL, audit_objects
+from executive.cells.sim.audit import list_final_objects
 from executive.geometry import Pose
 
 IN_BIN, ON_TABLE, ON_FLOOR = (0.2, -0.44, 0.12), (0.5, 0.0, 0.025), (1.4, 0.0, -0.6)
@@ -33,10 +33,9 @@ class OneBody:
 def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more: Any) -> dict[str, int]:
     bins = {"red_bin": Bin("red_bin", np.array([0.2, -0.44, 0]), np.array([0.2, 0.2, 0.1]), np.zeros((1, 2)))}
     stood = {7: [np.array([0.5, 0.0, 0.025])]}
-    options = {"records": [], **more}
-    return audit_bodies(
-        world or OneBody(), stood, bins=bins, routes={"cube": bins_of_cube}, max_distance=0.025, **options
-    )  # type: ignore[arg-type]
+    records = more.pop("records", [])
+    objects = list_final_objects(world or OneBody(), stood, bins, **more)  # type: ignore[arg-type]
+    return audit_objects(objects, records, bins, {"cube": bins_of_cube}, max_distance=0.025)
 
 
 @pytest.mark.parametrize(
