@@ -15,7 +15,7 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height, find_unreachable_places
 from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
-from executive.cells.fake.fake_obstacles import Collision, FakeObstacles
+from executive.cells.fake.obstacles import Collision, FakeObstacles
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, discard_event
@@ -59,6 +59,8 @@ class FakeArm:
 
     Attributes:
         poses: Tool pose of each named pose; a run begins at `home`.
+        tool_pose: Pose of the tool centre point; changed by `set_tool_pose`.
+        collision: Description of the obstacle that stopped the last motion, or None.
         next_obstacle: Name of an obstacle in the middle of the next motion, or None; set by tests.
         commands: Names of the executed commands, `start` or `stop`, in order, for tests.
     """
@@ -66,7 +68,10 @@ class FakeArm:
     def __init__(
         self, world: FakeWorld, config: CellConfig, clock: Clock, emit: Emit = discard_event
     ) -> None:
-        self.poses = compute_named_poses(config)
+        compute_tool_pose = build_kinematics(config).compute_tool_pose
+        self.poses = {name: compute_tool_pose(np.radians(q)) for name, q in config.arm.poses_deg.items()}
+        self.tool_pose = self.poses["home"]
+        self.collision: str | None = None
         self.next_obstacle: str | None = None
         self.commands: list[str] = []
         self._world = world
@@ -74,20 +79,13 @@ class FakeArm:
         self._joint_count = config.arm.joint_count
         self._obstacles = FakeObstacles(config)
         self._plans = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
-        self._tool_pose = self.poses["home"]
         self._path: list[Pose] = []
         self._half_pose_count = 0
-        self._collision_message: str | None = None
 
     @property
     def q(self) -> Array:
         """Tool position [m], padded with zeros to the number of joints `(n,)`."""
-        return np.concatenate([self._tool_pose.position, np.zeros(self._joint_count - 3)])
-
-    @property
-    def tool_pose(self) -> Pose:
-        """Pose of the tool centre point."""
-        return self._tool_pose
+        return np.concatenate([self.tool_pose.position, np.zeros(self._joint_count - 3)])
 
     @property
     def tool_velocity(self) -> Array:
@@ -97,17 +95,12 @@ class FakeArm:
     @property
     def destination(self) -> Array:
         """Position of the tool `(3,)` [m] at the end of the running motion, or now if the arm is at rest."""
-        return (self._path[-1] if self._path else self._tool_pose).position
+        return (self._path[-1] if self._path else self.tool_pose).position
 
     @property
     def at_rest(self) -> bool:
         """True while no motion runs."""
         return not self._path
-
-    @property
-    def collision(self) -> str | None:
-        """Description of the obstacle that stopped the last motion, or None."""
-        return self._collision_message
 
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
         """Begin to plan a motion to a goal or a named pose; a plan from `plan_ahead` is complete at once.
@@ -136,11 +129,11 @@ class FakeArm:
         self._world.is_commanded = True
         self._path = list(motion.path)
         self._half_pose_count = len(self._path) // 2
-        self._collision_message = None
+        self.collision = None
 
     def set_tool_pose(self, pose: Pose) -> None:
         """Move the tool to a pose at once; the arm is then at rest."""
-        self._tool_pose, self._path = pose, []
+        self.tool_pose, self._path = pose, []
 
     def stop(self) -> None:
         """End the running motion without braking."""
@@ -151,7 +144,7 @@ class FakeArm:
     def run_into(self, obstacle: str) -> None:
         """Stop the running motion and set `collision` to an obstacle; do nothing if the arm is at rest."""
         if self._path:
-            self._collision_message = obstacle
+            self.collision = obstacle
             self.stop()
 
     def advance(self) -> None:
@@ -159,13 +152,13 @@ class FakeArm:
         if self._path and (collision := self._find_load_collision(self._path[0])):
             self.run_into(f"{collision.part} ran into {collision.obstacle}, {collision.position_text}")
         elif self._path:
-            self._tool_pose = self._path.pop(0)
+            self.tool_pose = self._path.pop(0)
             if self.next_obstacle is not None and len(self._path) <= self._half_pose_count:
-                self._collision_message, self.next_obstacle = self.next_obstacle, None
+                self.collision, self.next_obstacle = self.next_obstacle, None
                 self.stop()
         if (held := self._world.held_object) is not None:
             height = self._world.classes[held.label].height
-            held.position = self._tool_pose.position - np.array([0.0, 0.0, height / 2])
+            held.position = self.tool_pose.position - np.array([0.0, 0.0, height / 2])
 
     def _find_load_collision(self, pose: Pose) -> Collision | None:
         """Return the collision of the held object on the way to `pose`, or None.
@@ -175,7 +168,7 @@ class FakeArm:
         held = self._world.held_object
         if held is None:
             return None
-        tip_positions = np.array([self._tool_pose.position, pose.position])
+        tip_positions = np.array([self.tool_pose.position, pose.position])
         return self._obstacles.find_collision(tip_positions, self._world.classes[held.label])
 
     def _plan_motion(self, start: Array, goal: Goal | str, task: Task) -> FakeMotion:
@@ -273,12 +266,6 @@ class FakeTool:
         if fake_object is not None:
             fake_object.position[2] = self._world.classes[fake_object.label].height / 2
             fake_object.rest_positions.append(fake_object.position.copy())
-
-
-def compute_named_poses(config: CellConfig) -> dict[str, Pose]:
-    """Return the tool pose of each named pose of a cell file."""
-    kinematics = build_kinematics(config)
-    return {name: kinematics.compute_tool_pose(np.radians(q)) for name, q in config.arm.poses_deg.items()}
 
 
 def check_reachable(position: Array) -> None:

@@ -29,19 +29,20 @@ class FakeVisuals:
         config: The cell file.
         world: The world with all objects.
         get_tool_pose: Returns the pose of the tool centre point.
+
+    Attributes:
+        shapes: All shapes of the cell.
     """
 
     def __init__(self, config: CellConfig, world: FakeWorld, get_tool_pose: Callable[[], Pose]) -> None:
         self._world = world
         self._get_tool_pose = get_tool_pose
         self._names = {body: f"object {number}" for number, body in enumerate(world.objects)}
-        tool_shapes = _make_tool_shapes(config)
-        self._shapes = (*_make_fixed_shapes(config), *tool_shapes, *self._make_object_shapes(config))
-
-    @property
-    def shapes(self) -> Sequence[Shape]:
-        """All shapes of the cell."""
-        return self._shapes
+        # The origin of the tool frame is the tip of the tool, and z points out of the tool.
+        tool_size = (2 * TOOL_RADIUS, 2 * TOOL_RADIUS, config.tool.length)
+        tool_centre = Pose.of((0.0, 0.0, -config.tool.length / 2))
+        tool = Shape(TOOL_NAME, "cylinder", tool_size, tool_centre, TOOL_COLOUR)
+        self.shapes: Sequence[Shape] = (*_make_fixed_shapes(config), tool, *self._make_object_shapes(config))
 
     def poses(self) -> Mapping[str, Pose]:
         """Return the poses of the tool and of the objects, by name."""
@@ -66,9 +67,3 @@ def _make_fixed_shapes(config: CellConfig) -> Iterator[Shape]:
         for (half_length, half_width, half_height), centre in list_bin_boxes(bin.size):
             size = 2 * half_length, 2 * half_width, 2 * half_height
             yield Shape("", "box", size, Pose.of(np.add(bin.position, centre)), bin.colour)
-
-
-def _make_tool_shapes(config: CellConfig) -> Iterator[Shape]:
-    """Yield the shape of the tool; the origin of its frame is the tip, and z points out of the tool."""
-    size = (2 * TOOL_RADIUS, 2 * TOOL_RADIUS, config.tool.length)
-    yield Shape(TOOL_NAME, "cylinder", size, Pose.of((0.0, 0.0, -config.tool.length / 2)), TOOL_COLOUR)

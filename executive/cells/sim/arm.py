@@ -48,6 +48,7 @@ class SimArm:
 
     Attributes:
         planner: Motion planner of the arm.
+        collision: Description of the collision that ended the last motion; None: no collision.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class SimArm:
         interrupted_state: InterruptedState | None = None,
     ) -> None:
         self.planner = planner
+        self.collision: str | None = None
         self._world = world
         self._poses = {name: np.radians(pose) for name, pose in config.arm.poses_deg.items()}
         self._plans = PlanFactory(self._plan_motion, clock, config.motion.planning_time, emit)
@@ -69,7 +71,6 @@ class SimArm:
         self._motion_time = 0.0
         self._braking_times: list[float] | None = None
         self._fault_message: str | None = None
-        self._collision_message: str | None = None
         self._commanded_q = self.q
         # A run may be interrupted before the first joint command is logged.
         if interrupted_state is None or not interrupted_state.command.size:
@@ -113,11 +114,6 @@ class SimArm:
         self._raise_fault()
         return self._motion is None
 
-    @property
-    def collision(self) -> str | None:
-        """Description of the collision that ended the last motion; None: no collision."""
-        return self._collision_message
-
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[Trajectory]:
         """Begin to plan a motion from the current position to a goal, or to a named pose of the cell file.
 
@@ -150,7 +146,7 @@ class SimArm:
             raise Fault(f"the simulated arm follows its own planned motions, not a {type(motion).__name__}")
         self._check_positions(motion.start, START_TOLERANCE, "the start of the motion")
         self._raise_fault()
-        self._motion, self._motion_time, self._collision_message = motion, 0.0, None
+        self._motion, self._motion_time, self.collision = motion, 0.0, None
         self._contact_monitor.reset()
         self._world.log.append_motion(motion)
 
@@ -163,7 +159,7 @@ class SimArm:
     def run_into(self, obstacle: str) -> None:
         """Set `collision` to `obstacle` and brake; do nothing if the arm is at rest or brakes already."""
         if self._motion is not None and self._braking_times is None:
-            self._collision_message = obstacle
+            self.collision = obstacle
             self.stop()
 
     def send_command(self) -> None:
@@ -180,8 +176,8 @@ class SimArm:
             return
         if self._braking_times is None:
             lip_may_touch = self._motion_time >= self._motion.guarded_start_time
-            self._collision_message = self._contact_monitor.describe_new_contact(lip_may_touch)
-            if self._collision_message is not None:
+            self.collision = self._contact_monitor.describe_new_contact(lip_may_touch)
+            if self.collision is not None:
                 self.stop()
         if self._braking_times is None:
             self._motion_time += STEP
