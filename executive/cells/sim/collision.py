@@ -81,20 +81,17 @@ class ClearanceChecker:
             Blocked: The path violates the margin; the message states bodies, distance and tool position.
         """
         with self._place_obstacles(task.obstacles):
-            self._check_path(path, task.load)
-
-    def _check_path(self, path: Array, load: Load | None) -> None:
-        # A pair that starts closer than the margin must keep its initial distance until the pair has been
-        # apart by the margin once. Every other pair must keep the margin.
-        start_approaches = self._find_closest_approaches(path[0], load)
-        start_distances = {pair: approach.distance for pair, approach in start_approaches.items()}
-        for q in path[1:]:
-            approaches = self._find_closest_approaches(q, load)
-            for pair, approach in approaches.items():
-                min_distance = min(approach.min_distance, start_distances.get(pair, math.inf))
-                if approach.distance < min_distance - ROUNDING_ERROR:
-                    raise Blocked(self._describe_violation(approach))
-            start_distances = {pair: start_distances[pair] for pair in start_distances.keys() & approaches}
+            # A pair that starts closer than the margin must keep its initial distance until the pair has been
+            # apart by the margin once. Every other pair must keep the margin.
+            start_approaches = self._find_closest_approaches(path[0], task.load)
+            start_distances = {pair: approach.distance for pair, approach in start_approaches.items()}
+            for q in path[1:]:
+                approaches = self._find_closest_approaches(q, task.load)
+                for pair, approach in approaches.items():
+                    min_distance = min(approach.min_distance, start_distances.get(pair, math.inf))
+                    if approach.distance < min_distance - ROUNDING_ERROR:
+                        raise Blocked(self._describe_violation(approach))
+                start_distances = {pair: d for pair, d in start_distances.items() if pair in approaches}
 
     def _find_closest_approaches(self, q: Array, load: Load | None) -> dict[tuple[str, str], ClosestApproach]:
         """Return the closest approach of each pair of part and body within the margin at `q` `(n,)` [rad]."""
@@ -167,8 +164,7 @@ class ClearanceChecker:
             size = round(obstacle.radius, 4), round(obstacle.top, 4)
             bodies = self._cylinders.setdefault(size, [])
             if len(bodies) == placed_counts[size]:
-                shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=size[0], height=size[1])
-                bodies.append(int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION)))
+                bodies.append(self._add_cylinder(*size))
             body = bodies[placed_counts[size]]
             placed_counts[size] += 1
             position = [obstacle.x, obstacle.y, obstacle.top / 2]
@@ -185,7 +181,11 @@ class ClearanceChecker:
     def _get_load_body(self, load: ObjectClass) -> int:
         """Return the body that models a held object of a class, created at the first call."""
         if load not in self._load_bodies:
-            client, radius = self.world.client, load.radius + load.contact_radius
-            shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=load.height)
-            self._load_bodies[load] = int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION))
+            self._load_bodies[load] = self._add_cylinder(load.radius + load.contact_radius, load.height)
         return self._load_bodies[load]
+
+    def _add_cylinder(self, radius: float, height: float) -> int:
+        """Add a cylinder at `PARKING_POSITION`, and return the body."""
+        client = self.world.client
+        shape = client.createCollisionShape(pybullet.GEOM_CYLINDER, radius=radius, height=height)
+        return int(client.createMultiBody(0, shape, basePosition=PARKING_POSITION))

@@ -16,7 +16,6 @@ import numpy as np
 
 from executive.cells.log_file import LogFile
 from executive.errors import Fault, InputError, explain_os_errors
-from executive.geometry import Array
 from executive.motion.joints import JointState
 from executive.motion.trajectory import Trajectory
 
@@ -44,13 +43,12 @@ class Command(NamedTuple):
     Attributes:
         kind: Kind of the command, for example `RUN_STEP`.
         numbers: Arguments of the command.
-        states: Positions, velocities and accelerations of the `n` joints at the `N` samples of a motion
-            `(N, 3 n)`; None for other kinds.
+        states: States of the joints at the samples of a motion, as arrays `(N, n)`; None for other kinds.
     """
 
     kind: int
     numbers: tuple[float, ...] = ()
-    states: Array | None = None
+    states: JointState | None = None
 
 
 class CommandLog:
@@ -156,10 +154,11 @@ def _read_with_offsets(path: Path) -> Iterator[tuple[Command, int]]:
             number_count = state_size * int(numbers[-1])
             if offset + 8 * number_count > len(data):
                 return
-            states = np.frombuffer(data, "<f8", number_count, offset).reshape(-1, state_size)
+            samples = np.frombuffer(data, "<f8", number_count, offset).reshape(-1, state_size)
+            states = JointState(*np.hsplit(samples, 3))
             offset += 8 * number_count
         # The second number of a motion, the start time of the guarded part, is infinite without this part.
-        finite_numbers = numbers if states is None else (numbers[0], *states.flat)
+        finite_numbers = (numbers[0], *np.ravel(states)) if states else numbers
         if not all(map(math.isfinite, finite_numbers)):
             raise _make_damage_error(path, command_offset)
         yield Command(kind, numbers, states), offset
@@ -177,9 +176,3 @@ def _read_content(path: Path) -> bytes:
     consequence = "without it a simulated run can neither be resumed nor filmed"
     with explain_os_errors(InputError, f'cannot read the log of the world "{path}"', consequence):
         return path.read_bytes()
-
-
-def get_joint_states(command: Command) -> JointState:
-    """Return the states of the joints in a MOTION command, as arrays `(N, n)`."""
-    assert command.states is not None
-    return JointState(*np.hsplit(command.states, 3))

@@ -173,12 +173,6 @@ def get_inertial_pose(client: BulletClient, body: int) -> Pose:
     return Pose.of(*client.getDynamicsInfo(body, -1)[3:5])
 
 
-def get_upright_pose(client: BulletClient, body: int, config: ObjectConfig) -> Pose:
-    """Return `X_WO`, the pose of the upright frame O of an object in the world."""
-    X_WI = Pose.of(*client.getBasePositionAndOrientation(body))
-    return X_WI @ get_inertial_pose(client, body).inverse() @ compute_upright_pose(config).inverse()
-
-
 @lru_cache(maxsize=64)
 def load_mesh(config: ObjectConfig) -> Mesh:
     """Return the scaled visual mesh of an object class in the upright frame O.

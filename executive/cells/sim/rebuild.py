@@ -12,7 +12,7 @@ from scipy.interpolate import BPoly
 
 from executive.cell.clock import STEP
 from executive.cells.sim import command_log
-from executive.cells.sim.command_log import Command, get_joint_states
+from executive.cells.sim.command_log import Command
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.world import World
 from executive.geometry import Array, Pose
@@ -70,7 +70,7 @@ class WorldRebuilder:
 
     def execute(self, command: Command) -> None:
         """Execute the next command."""
-        kind, numbers, _ = command
+        kind, numbers, states = command
         if kind in (command_log.MOTION, command_log.VACUUM_ON, command_log.VACUUM_OFF):
             self._last_command_step = self._step_count
         world, tool = self._world, self._tool
@@ -85,8 +85,9 @@ class WorldRebuilder:
             self._motion_time, self._joint_targets = numbers[0], np.array(numbers[1:])
             world.command_arm(self._joint_targets, self._motion_time)
         elif kind == command_log.MOTION:
+            assert states is not None
             duration, guarded_start_time, _ = numbers
-            self._motion = build_trajectory(get_joint_states(command), duration, guarded_start_time)
+            self._motion = build_trajectory(states, duration, guarded_start_time)
             self._motion_time = 0.0
         elif kind == command_log.MOTION_END:
             self._motion = None

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from executive.cell.config import CameraConfig, CellConfig, Colour, NoiseConfig, Section
+from executive.cell.config import CellConfig, Colour, NoiseConfig, Section
 from executive.cell.config.section import Fraction, Natural, check_ascending
 from executive.cells.sim.arrangements import DAMAGED_MODEL_NUMBER, UNKNOWN_MODEL_COUNT
 from executive.cells.sim.camera import Light
@@ -189,11 +189,6 @@ def _find_cell_findings(scene: SceneConfig, root: YamlNode, config: CellConfig) 
             f"camera.orbit_deg moves a fixed camera, and the camera {name} of the cell {config.cell} is "
             "mounted on the wrist; use shift and turn_deg",
         )  # fmt: skip
-    yield from _check_field_of_view(scene, root, camera)
-
-
-def _check_field_of_view(scene: SceneConfig, root: YamlNode, camera: CameraConfig) -> Iterator[Finding]:
-    """Yield a finding if the field of view of the camera in the scene exceeds `MAX_FOV_DEG`."""
     declared_fov = compute_field_of_view(compute_calibration(camera)[0], camera.height)
     if declared_fov * scene.camera.fov_factor > MAX_FOV_DEG:
         yield make_error(

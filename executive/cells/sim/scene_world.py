@@ -31,8 +31,7 @@ from executive.perception.camera_model import (
 
 def apply_scene(config: CellConfig, scene: SceneConfig) -> CellConfig:
     """Return the cell configuration with the objects, the table and the camera of a scene."""
-    settings = {key: getattr(scene.table, key) for key in ("objects", "gap", "stacked")}
-    table = {key: value for key, value in settings.items() if value is not None}
+    table = scene.table.model_dump(include={"objects", "gap", "stacked"}, exclude_none=True)
     name, camera = next(iter(config.cameras.items()))
     return config.model_copy(
         update={

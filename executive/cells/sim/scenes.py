@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
-from executive.cell.frame import Box
 from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.sim import arrangements, variations
 from executive.cells.sim.arrangements import SceneObject
@@ -162,9 +161,7 @@ class SceneRenderer:
             world.table_top.paint(colour, texture)
             rendered = render(world, matrix, X_WC, region, light)
         sample = _build_sample(rendered, MIN_CONTRAST * noise.read, objects_by_body)
-        if sample is None:
-            return None
-        return replace(sample, image=_resize(add_noise(rendered.image, noise, rng)))
+        return sample and replace(sample, image=_resize(add_noise(rendered.image, noise, rng)))
 
     def _render_initial(self, rng: np.random.Generator) -> Sample | None:
         """Return the sample of an initial scene, or None if too many objects are heavily occluded."""
@@ -190,12 +187,16 @@ class SceneRenderer:
         view = replace(rendered, image=rendered.image[pixels], bodies=rendered.bodies[pixels], region=region)
         # The minimum contrast depends on the declared noise, so that more noise does not reduce the labels.
         sample = _build_sample(view, MIN_CONTRAST * self._declared_camera.noise.read, objects)
-        if sample is None:
-            return None
         # A run uses the declared matrix and pose, even if the scene has calibration errors.
-        sample = replace(sample, matrix=compute_calibration(self._declared_camera)[0], X_WC=declared_X_WC)
-        image = _resize(frame[pixels])
-        return replace(sample, image=image, frame=frame, depth=depth, second_frame=second_frame)
+        return sample and replace(
+            sample,
+            image=_resize(frame[pixels]),
+            matrix=compute_calibration(self._declared_camera)[0],
+            X_WC=declared_X_WC,
+            frame=frame,
+            depth=depth,
+            second_frame=second_frame,
+        )
 
 
 def _build_sample(
@@ -217,17 +218,17 @@ def _build_sample(
         vertices = scene_object.X_WO.apply(mesh.vertices)
         pixels = project(rendered.matrix, rendered.X_WC, vertices)
         fraction = compute_visible_fraction(mesh, pixels, mask)
-        unclipped_box = compute_bounding_box(pixels)
-        box = _transform_box(unclipped_box, corner, scale)
         if fraction < MIN_VISIBLE_FRACTION:
             continue
+        unclipped_box = np.array(compute_bounding_box(pixels)).reshape(2, 2)
+        box = ((unclipped_box - corner) * scale).clip(0, IMAGE_SIZE).ravel()
         is_heavily_occluded = fraction < MIN_LABELLED_VISIBLE_FRACTION
         heavily_occluded_count += is_heavily_occluded
-        if is_heavily_occluded or measure_contrast(rendered.image, mask) < min_contrast:
+        if is_heavily_occluded or _measure_contrast(rendered.image, mask) < min_contrast:
             ignored.append(box)
             continue
         centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-        pixel = ((unclipped_box[0] + unclipped_box[2]) / 2, (unclipped_box[1] + unclipped_box[3]) / 2)
+        pixel = (unclipped_box[0] + unclipped_box[1]) / 2
         labels.append(scene_object.label)
         boxes.append(box)
         fractions.append(fraction)
@@ -259,7 +260,7 @@ def _remove_at_end(world: World, bodies: Iterable[int]) -> Iterator[None]:
             world.remove_object(body)
 
 
-def measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
+def _measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
     """Return the contrast between an object and a ring of two pixels around the object [grey level].
 
     The contrast of a pixel is the maximum difference from the median of the ring over the three channels.
@@ -276,15 +277,6 @@ def measure_contrast(image: Image, mask: NDArray[np.bool_]) -> float:
     return float(np.median(np.abs(image[mask] - background).max(axis=1)))
 
 
-def _transform_box(box: Box, corner: Array, scale: float) -> list[float]:
-    """Return a box of the camera image as a box in the image of a sample, clipped at the borders."""
-    points = (np.array(box).reshape(2, 2) - corner) * scale
-    return [float(value) for value in points.clip(0, IMAGE_SIZE).ravel()]
-
-
 def _resize(image: Image) -> Image:
     """Return a square image in the size of a sample."""
-    if image.shape[0] == IMAGE_SIZE:
-        return image
-    size = (IMAGE_SIZE, IMAGE_SIZE)
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return np.asarray(cv2.resize(image, (IMAGE_SIZE, IMAGE_SIZE), interpolation=cv2.INTER_AREA), np.uint8)

@@ -10,7 +10,7 @@ import pytest
 from executive.cell.arm import Goal
 from executive.cell.config import CellConfig
 from executive.cells.sim import command_log as log
-from executive.cells.sim.command_log import CommandLog, get_joint_states, read_commands
+from executive.cells.sim.command_log import CommandLog, read_commands
 from executive.errors import InputError
 from executive.motion.arms import build_planner
 
@@ -50,7 +50,7 @@ def test_a_command_that_was_torn_is_left_out_wherever_it_was(path: Path, overhea
     written.close()
     *_, command = read_commands(path)
     assert command.numbers[:2] == (motion.duration, motion.guarded_start_time)
-    for one, other in zip(get_joint_states(command), motion.samples, strict=True):
+    for one, other in zip(command.states, motion.samples, strict=True):
         assert np.array_equal(one, other)
     content = path.read_bytes()
     for length in (whole, whole + 1, whole + 64, whole + 65, whole + 70, len(content) - 1):
