@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -147,7 +148,7 @@ class FakeCell(CellWithoutHardware):
     @staticmethod
     def min_times(config: CellConfig) -> MinTimes:
         """Return the minimum times of descent, transport and detection in the cell of a cell file."""
-        return FakeMinTimes(config)
+        return FakeMinTimes(config, TOUCH_DISTANCE)
 
     def log_to(self, path: Path) -> None:
         """Write the state of the world to a log file, now and after every control step."""
@@ -188,11 +189,9 @@ class FakeCell(CellWithoutHardware):
         """Return the name of the bin that contains an object, or ""."""
         # An object on the wall of a bin counts as in this bin, unless the object is inside another bin.
         wall_margin = BIN_THICKNESS + self.cell.classes[fake_object.label].radius / 2
-        for margin in (0.0, wall_margin):
-            for name, bin in self.cell.bins.items():
-                if bin.contains(fake_object.position, margin):
-                    return name
-        return ""
+        position = fake_object.position
+        margins_and_bins = itertools.product((0.0, wall_margin), self.cell.bins.values())
+        return next((bin.name for margin, bin in margins_and_bins if bin.contains(position, margin)), "")
 
     def close(self) -> None:
         """Close the log."""
@@ -202,9 +201,6 @@ class FakeCell(CellWithoutHardware):
 
 class FakeMinTimes(CellMinTimes):
     """Durations of straight paths at the maximum speed of the fake arm; implements `MinTimes`."""
-
-    def __init__(self, config: CellConfig) -> None:
-        super().__init__(config, TOUCH_DISTANCE)
 
     def _compute_min_transport_time(self, bin: str) -> float:
         """Return the time [s] to lift the tallest object to travel height and to move to the nearest slot."""

@@ -97,10 +97,8 @@ class NoisyDetector:
 
     def _shift_box(self, detection: Detection, rng: np.random.Generator) -> Detection:
         """Return the detection with a randomly shifted box."""
-        shift_x, shift_y = rng.normal(0.0, self._config.jitter, 2)
-        left, top, right, bottom = detection.box
-        box = (left + shift_x, top + shift_y, right + shift_x, bottom + shift_y)
-        return replace(detection, box=box)
+        shift = rng.normal(0.0, self._config.jitter, 2)
+        return replace(detection, box=tuple(np.add(detection.box, [*shift, *shift])))
 
     def _make_false_detection(self, frame: Frame, view: str, rng: np.random.Generator) -> Detection:
         """Return a detection with random class, confidence and box in the region of a view."""

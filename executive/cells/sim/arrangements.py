@@ -95,8 +95,8 @@ def draw_objects(config: CellConfig, count: int, table_colour: Colour, rng: Gene
     unknown_fraction = rng.uniform(0.05, 0.4) if rng.random() < 0.35 else 0.0
     scaled_fraction = rng.uniform(0.2, 1.0) if rng.random() < 0.35 else 0.0
     objects = []
-    for label in rng.choice(list(config.objects), count):
-        label, model = str(label), config.objects[str(label)]
+    for label in map(str, rng.choice(list(config.objects), count)):
+        model = config.objects[label]
         colour = draw_object_colour(model.colours, table_colour, rng)
         if rng.random() < unknown_fraction:
             label, model = UNKNOWN_LABEL, load_unknown_model(int(rng.choice(TRAINING_MODEL_NUMBERS)))
@@ -151,16 +151,12 @@ def draw_arrangement(
         return simulate_fall(config, _draw_heap(objects[:MAX_SPARSE_OBJECT_COUNT], low, high, bins, rng))
     objects = _place_side_by_side(config, objects, low, high, bins, rng)
     if random_number < 0.23:
-        return simulate_fall(config, [_lift_and_rotate(scene_object, rng) for scene_object in objects])
+        drop_offset = np.array([0, 0, 0.04])
+        raised = [replace(o, X_WO=Pose(_draw_rotation(rng), o.X_WO.position + drop_offset)) for o in objects]
+        return simulate_fall(config, raised)
     if random_number < 0.40:
         _stack_randomly(objects, rng)
     return objects
-
-
-def _lift_and_rotate(scene_object: SceneObject, rng: Generator) -> SceneObject:
-    """Return an object lifted by 4 cm and randomly rotated."""
-    position = scene_object.X_WO.position + np.array([0, 0, 0.04])
-    return replace(scene_object, X_WO=Pose(_draw_rotation(rng), position))
 
 
 def draw_held_object(X_WT: Pose, config: CellConfig, rng: Generator) -> SceneObject:

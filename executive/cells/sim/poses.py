@@ -55,8 +55,7 @@ def find_pose_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """
     with contextlib.closing(ClearanceChecker(config)) as checker:
         for name, pose in config.arm.poses_deg.items():
-            violation = checker.find_violation(np.radians(pose))
-            if violation:
+            if violation := checker.find_violation(np.radians(pose)):
                 message = f'the pose "{name}" brings {violation}; {config.motion.margin:.3f} m must stay free'
                 yield ("arm", "poses_deg", name), message
         yield from _find_occluding_poses_and_bins(config, checker.world)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -87,7 +86,7 @@ class WorldRebuilder:
         elif kind == command_log.MOTION:
             assert states is not None
             duration, guarded_start_time, _ = numbers
-            self._motion = build_trajectory(states, duration, guarded_start_time)
+            self._motion = Trajectory([SampledMotion(states, duration)], guarded_start_time)
             self._motion_time = 0.0
         elif kind == command_log.MOTION_END:
             self._motion = None
@@ -137,8 +136,3 @@ class SampledMotion:
         else:
             q = BPoly.from_derivatives(self._motion_times, np.stack(self._states, axis=1))
         return q, q.derivative(), q.derivative(2)
-
-
-def build_trajectory(states: JointState, duration: float, guarded_start_time: float = math.inf) -> Trajectory:
-    """Return a trajectory from the `samples` of the original trajectory."""
-    return Trajectory([SampledMotion(states, duration)], guarded_start_time)

@@ -28,7 +28,9 @@ def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
     size = np.ceil((pixels.max(axis=0) - corner + 1) * SUBPIXEL_COUNT).astype(int)
     mask = np.zeros((size[1], size[0]), np.uint8)
     triangles = ((pixels - corner) * SUBPIXEL_COUNT)[mesh.triangles]
-    for triangle in _select_front_faces(triangles).round().astype(np.int32):
+    (ax, ay), (bx, by) = (triangles[:, 1] - triangles[:, 0]).T, (triangles[:, 2] - triangles[:, 0]).T
+    # The triangles on the side of the camera, whose corners are clockwise, cover the whole silhouette.
+    for triangle in triangles[ax * by - ay * bx > 0].round().astype(np.int32):
         cv2.fillConvexPoly(mask, triangle, 1)
     return float(mask.sum()) / SUBPIXEL_COUNT**2
 
@@ -36,9 +38,3 @@ def compute_silhouette_area(mesh: Mesh, pixels: Array) -> float:
 def compute_visible_fraction(mesh: Mesh, pixels: Array, visible_mask: NDArray[np.bool_]) -> float:
     """Return the fraction (0 to 1) of the silhouette of a mesh that `visible_mask` `(H, W)` contains."""
     return min(1.0, float(visible_mask.sum()) / max(compute_silhouette_area(mesh, pixels), 1.0))
-
-
-def _select_front_faces(triangles: Array) -> Array:
-    """Return the projected triangles `(M, 3, 2)` with clockwise corners, which cover the whole silhouette."""
-    (ax, ay), (bx, by) = (triangles[:, 1] - triangles[:, 0]).T, (triangles[:, 2] - triangles[:, 0]).T
-    return np.asarray(triangles[ax * by - ay * bx > 0])

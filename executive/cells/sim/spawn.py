@@ -197,8 +197,7 @@ def _try_stack(world: World, upper: int, lower: int, rng: np.random.Generator) -
     world.place_object(upper, goals[upper])
     _step_until_rest(world, list(goals), lambda: _has_moved(world, goals))
     angle = rng.uniform(0, math.tau)
-    velocity = [PUSH_SPEED * math.cos(angle), PUSH_SPEED * math.sin(angle), 0.0]
-    world.client.resetBaseVelocity(upper, velocity)
+    world.client.resetBaseVelocity(upper, [PUSH_SPEED * math.cos(angle), PUSH_SPEED * math.sin(angle), 0.0])
     _step_until_rest(world, list(goals), lambda: _has_moved(world, goals))
     if not _has_moved(world, goals):
         return True
