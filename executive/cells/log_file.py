@@ -12,7 +12,7 @@ class LogFile:
     """A file without a write buffer, so that a killed process loses no written data.
 
     Args:
-        path: Path of the file.
+        path: Path of the file; None: all data are discarded.
         content_name: Name of the content, for the message of a fault.
         length: Length to which an existing file is truncated [byte], or None to keep its content.
 
@@ -20,10 +20,13 @@ class LogFile:
         InputError: The file cannot be opened.
     """
 
-    def __init__(self, path: Path, content_name: str, length: int | None = None) -> None:
+    def __init__(self, path: Path | None, content_name: str, length: int | None = None) -> None:
         self._path, self._content_name = path, content_name
+        self._file: int | None = None
+        if path is None:
+            return
         with explain_os_errors(InputError, f'cannot write "{path}"'):
-            self._file: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
             if length is not None:
                 os.ftruncate(self._file, length)
 

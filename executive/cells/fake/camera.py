@@ -139,17 +139,13 @@ class FakeDetector:
                 continue
             column, row = x / depth, y / depth
             if left <= column < right and top <= row < bottom:
-                scale = frame.matrix[0, 0] / depth
-                true_detections.append(self._make_detection(fake_object.label, column, row, scale))
+                half_side = frame.matrix[0, 0] / depth * self.world.classes[fake_object.label].radius
+                box = (column - half_side, row - half_side, column + half_side, row + half_side)
+                confidence = max(DEFAULT_CONFIDENCE, self.config.threshold)
+                true_detections.append(Detection(fake_object.label, confidence, box))
         answer = self.make_answer(self.request_count, true_detections)
         due_time = self.clock.now + self.config.latency
         return FakeRequest(due_time, self.clock, answer, self.name, self.config.error_rates)
 
     def close(self) -> None:
         """Do nothing: the detector holds no resources."""
-
-    def _make_detection(self, label: str, column: float, row: float, scale: float) -> Detection:
-        """Return the detection of an object from the pixel of its centre and the image scale [pixel/m]."""
-        half_side = scale * self.world.classes[label].radius
-        box = (column - half_side, row - half_side, column + half_side, row + half_side)
-        return Detection(label, max(DEFAULT_CONFIDENCE, self.config.threshold), box)

@@ -36,13 +36,7 @@ def list_final_objects(
             label, position = world.removed_objects[body]
         else:
             label, position = world.labels[body], world.get_object_pose(body).position
-        bin = _find_bin(position, bins)
-        yield FinalObject(label, bin, positions, body in dropped_bodies, body == held_body, is_removed)
-
-
-def _find_bin(position: Array, bins: Mapping[str, Bin]) -> str | None:
-    """Return the name of the bin that contains a position, "" outside of all bins, None below the table."""
-    if position[2] < MIN_CENTRE_HEIGHT:
-        return None
-    # The centre of an object that leans on a bin wall may be above the wall.
-    return next((name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS)), "")
+        # The centre of an object that leans on a bin wall may be above the wall.
+        names = (name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS))
+        bin_name = None if position[2] < MIN_CENTRE_HEIGHT else next(names, "")
+        yield FinalObject(label, bin_name, positions, body in dropped_bodies, body == held_body, is_removed)

@@ -64,11 +64,10 @@ class CommandLog:
     """
 
     def __init__(self, path: Path | None = None, joint_count: int = 0, *, resume: bool = False) -> None:
-        self._file: LogFile | None = None
-        if path is None:
-            return
         header = FILE_SIGNATURE + f"{FORMAT_VERSION} joints {joint_count}\n".encode()
-        self._length = max((end for _, end in _read_with_offsets(path)), default=len(header)) if resume else 0
+        self._length = 0
+        if path and resume:
+            self._length = max((end for _, end in _read_with_offsets(path)), default=len(header))
         self._file = LogFile(path, "the log of the world", self._length)
         if not resume:
             try:
@@ -76,27 +75,22 @@ class CommandLog:
             except Fault as fault:
                 raise InputError(str(fault)) from fault
 
-    def append(self, kind: int, *numbers: float) -> None:
-        """Append a command."""
-        if self._file is not None:
-            payload_format = f"{len(numbers)}d" if kind == JOINT_TARGETS else _PAYLOAD_FORMATS[kind]
-            self._write(bytes([kind]) + struct.pack(f"<{payload_format}", *numbers))
+    def append(self, kind: int, *numbers: float, samples: bytes = b"") -> None:
+        """Append a command, for a motion with the bytes of its `samples`."""
+        payload_format = f"{len(numbers)}d" if kind == JOINT_TARGETS else _PAYLOAD_FORMATS[kind]
+        self._write(bytes([kind]) + struct.pack(f"<{payload_format}", *numbers) + samples)
 
     def append_motion(self, motion: Trajectory) -> None:
         """Append the start of a motion with its states, so that a resumed run can brake along its path."""
-        if self._file is not None:
-            states = np.hstack(motion.samples)
-            numbers = motion.duration, motion.guarded_start_time, len(states)
-            payload = struct.pack(f"<{_PAYLOAD_FORMATS[MOTION]}", *numbers) + states.astype("<f8").tobytes()
-            self._write(bytes([MOTION]) + payload)
+        states = np.hstack(motion.samples)
+        numbers = motion.duration, motion.guarded_start_time, len(states)
+        self.append(MOTION, *numbers, samples=states.astype("<f8").tobytes())
 
     def close(self) -> None:
         """Close the file; further calls do nothing."""
-        if self._file is not None:
-            self._file.close()
+        self._file.close()
 
     def _write(self, data: bytes) -> None:
-        assert self._file is not None
         self._file.write(data, self._length)
         self._length += len(data)
 

@@ -117,17 +117,13 @@ class SuctionTool:
 
     def advance(self) -> None:
         """Update the seal after a physics step."""
-        if self._grip is not None:
-            self._check_pull(self._grip)
+        if (grip := self._grip) is not None:
+            force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
+            grip.pull += PULL_SMOOTHING * (force - grip.pull)
+            if self.pull > grip.breakaway_force:
+                self.break_seal()
         elif self._is_vacuum_on:
             self._try_to_seal()
-
-    def _check_pull(self, grip: _Grip) -> None:
-        """Filter the pull on the seal, and break the seal if the pull exceeds the breakaway force."""
-        force = np.array(self._world.client.getConstraintState(grip.constraint)[:3])
-        grip.pull += PULL_SMOOTHING * (force - grip.pull)
-        if float(np.linalg.norm(grip.pull)) > grip.breakaway_force:
-            self.break_seal()
 
     def _try_to_seal(self) -> None:
         """Hold a body within reach if the seal is strong enough."""
