@@ -109,7 +109,7 @@ def test_what_hangs_in_the_air_and_cannot_be_carried_on_is_not_let_fall(fake: Fa
             next(steps)
             fake.advance()
             if fake.arm.tool_pose.position[2] > 0.1:
-                fake.arm.run_into("a hand")
+                fake.arm.stop_after_collision("a hand")
     assert (failure.value.reason, fake.tool.holding) == ("blocked", True)
 
 

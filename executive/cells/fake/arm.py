@@ -141,16 +141,18 @@ class FakeArm:
             self.commands.append("stop")
         self._path = []
 
-    def run_into(self, obstacle: str) -> None:
-        """Stop the running motion and set `collision` to an obstacle; do nothing if the arm is at rest."""
+    def stop_after_collision(self, message: str) -> None:
+        """Stop the running motion and set `collision` to a message; do nothing if the arm is at rest."""
         if self._path:
-            self.collision = obstacle
+            self.collision = message
             self.stop()
 
     def advance(self) -> None:
         """Move tool and held object to the next pose; stop before the object enters the table or a bin."""
         if self._path and (collision := self._find_load_collision(self._path[0])):
-            self.run_into(f"{collision.part} ran into {collision.obstacle}, {collision.position_text}")
+            self.stop_after_collision(
+                f"{collision.part} ran into {collision.obstacle}, {collision.position_text}"
+            )
         elif self._path:
             self.tool_pose = self._path.pop(0)
             if self.next_obstacle is not None and len(self._path) <= self._half_pose_count:

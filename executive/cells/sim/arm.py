@@ -156,10 +156,10 @@ class SimArm:
             limits = self.planner.limits
             self._braking_times = list(plan_braking(self._motion, self._motion_time, limits, STEP))
 
-    def run_into(self, obstacle: str) -> None:
-        """Set `collision` to `obstacle` and brake; do nothing if the arm is at rest or brakes already."""
+    def stop_after_collision(self, message: str) -> None:
+        """Set `collision` to a message and brake; do nothing if the arm is at rest or brakes already."""
         if self._motion is not None and self._braking_times is None:
-            self.collision = obstacle
+            self.collision = message
             self.stop()
 
     def send_command(self) -> None:

@@ -59,7 +59,7 @@ class Light(Section):
 CELL_LIGHT = Light()
 """Default light of simulated cells: white, from above, slightly from the front left, without shadows."""
 DEPTH_SEED = 1
-"""Additional number in the seed of the depth noise, which is otherwise the seed of the image noise."""
+"""Last number of the seed of the depth noise; the other numbers are the seed of the image noise."""
 
 
 @dataclass(frozen=True, eq=False)

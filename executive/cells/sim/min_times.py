@@ -36,20 +36,15 @@ class SimMinTimes(CellMinTimes):
         super().__init__(config, TOUCH_DISTANCE, self._pile_height - min_height)
         self._limits = JointLimits.from_config(config.arm.limits)
         self._kinematics = build_kinematics(config)
-        self._transport_times: dict[str, float] = {}
 
     def _compute_min_transport_time(self, bin: str) -> float:
-        if bin not in self._transport_times:
-            slots = build_bin(bin, self._config.bins[bin]).slots
-            low, high = np.transpose([self._config.table.x, self._config.table.y])
-            safe_place = np.broadcast_to(self._config.safe_place[:2], slots.shape)
-            starts = np.clip(slots, low, high), safe_place
-            try:
-                times = [self._compute_min_time(start, slots) for start in starts]
-                self._transport_times[bin] = SAFETY_FACTOR * min(times)
-            except Unreachable:
-                self._transport_times[bin] = 0.0
-        return self._transport_times[bin]
+        slots = build_bin(bin, self._config.bins[bin]).slots
+        low, high = np.transpose([self._config.table.x, self._config.table.y])
+        starts = np.clip(slots, low, high), np.broadcast_to(self._config.safe_place[:2], slots.shape)
+        try:
+            return SAFETY_FACTOR * min(self._compute_min_time(positions, slots) for positions in starts)
+        except Unreachable:
+            return 0.0
 
     def _compute_min_time(self, positions: Array, slots: Array) -> float:
         """Return the minimum time [s] between the nearest rows of `positions` and `slots`, `(N, 2)` [m]."""

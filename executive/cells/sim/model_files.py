@@ -119,9 +119,14 @@ def read_wavefront(path: Path) -> tuple[Array, NDArray[np.intp]]:
                 indices = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
                 triangles += [(indices[0], *pair) for pair in pairwise(indices[1:])]
         _check_triangle_count(path, len(triangles))
-        mesh = np.array(vertices, dtype=float), np.array(triangles, dtype=np.intp).reshape(-1, 3)
-        _check_mesh(*mesh)
-        return mesh
+        points, faces = np.array(vertices, dtype=float), np.array(triangles, dtype=np.intp).reshape(-1, 3)
+        if not triangles:
+            raise ValueError("it has no faces (lines beginning with f)")
+        if points.shape != (len(vertices), 3) or not np.isfinite(points).all():
+            raise ValueError("a vertex (lines beginning with v) needs three finite numbers")
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise ValueError(f"a face names a vertex that is not there; there are {len(vertices)}")
+        return points, faces
     except (OSError, ValueError, IndexError, OverflowError) as error:
         raise InputError(f"the model {path.name} is no Wavefront mesh: {error}") from None
 
@@ -141,13 +146,3 @@ def parse_numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, 
     if len(numbers) != len(default) or not np.isfinite(numbers).all():
         raise InputError(f'a URDF has "{text}" instead of {len(default)} finite number(s)')
     return numbers
-
-
-def _check_mesh(vertices: Array, triangles: NDArray[np.intp]) -> None:
-    """Raise `ValueError` if vertices `(N, 3)` and triangles `(M, 3)` are no valid mesh."""
-    if not triangles.size:
-        raise ValueError("it has no faces (lines beginning with f)")
-    if vertices.shape != (len(vertices), 3) or not np.isfinite(vertices).all():
-        raise ValueError("a vertex (lines beginning with v) needs three finite numbers")
-    if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise ValueError(f"a face names a vertex that is not there; there are {len(vertices)}")

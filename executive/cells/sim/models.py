@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -127,11 +127,9 @@ def build_simulated_class(label: str, config: ObjectConfig) -> ObjectClass:
 def find_model_errors(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield key and message for each model of a cell file that is missing, invalid, or of a wrong size."""
     for label, object_config in config.objects.items():
+        check: Callable[[ObjectConfig], object] = load_mesh if object_config.mesh else compute_mass
         try:
-            if object_config.mesh:
-                load_mesh(object_config)
-            else:
-                compute_mass(object_config)
+            check(object_config)
         except InputError as error:
             yield ("objects", label, "mesh" if object_config.mesh else "urdf"), str(error)
         else:
@@ -151,7 +149,7 @@ def _find_wrong_sizes(label: str, config: ObjectConfig) -> Iterator[tuple[KeyPat
         declared_size = getattr(config, name)
         if not abs(declared_size - model_size) <= SIZE_TOLERANCE:  # also True for NaN
             message = f"the model of {label} has a {name} of {model_size:.4f} m, not {declared_size:g} m; "
-            yield ("objects", label, name), message + "correct the figure, scale or upright_deg"
+            yield ("objects", label, name), message + f"correct {name}, scale or upright_deg"
 
 
 @lru_cache(maxsize=64)

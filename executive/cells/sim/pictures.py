@@ -100,8 +100,7 @@ def render_pictures_in_process(source: PictureSource, steps: Sequence[int]) -> l
                 command = next(commands)
                 rebuilder.execute(command)
                 executed_step_count += command.kind == RUN_STEP
-            region = (0, 0, *viewpoint.size)
-            rendered = render(world, viewpoint.matrix, viewpoint.X_WC, region, PICTURE_LIGHT)
+            rendered = render(world, viewpoint.matrix, viewpoint.X_WC, (0, 0, *viewpoint.size), PICTURE_LIGHT)
             pictures.append(_compose_picture(rendered))
         return pictures
     finally:

@@ -22,8 +22,8 @@ class RobotModel:
         wrist_link: Index of the first link that a held object may touch.
         self_collision_pairs: Pairs of indices of links that can collide with each other.
         link_radius: Radius of a cylinder around the housing of each link [m].
-        forward_pose_deg: Positions of the joints except the first [degree] at the start of the numerical
-            inverse kinematics.
+        ik_start_deg: Positions of the joints except the first [degree] from which the numerical inverse
+            kinematics starts.
     """
 
     flange_link: str
@@ -33,7 +33,7 @@ class RobotModel:
     wrist_link: int
     self_collision_pairs: tuple[tuple[int, int], ...]
     link_radius: float
-    forward_pose_deg: tuple[float, ...]
+    ik_start_deg: tuple[float, ...]
 
     @property
     def joint_count(self) -> int:
@@ -54,7 +54,7 @@ ROBOT_MODELS: Mapping[str, RobotModel] = {
         # A long tool (index 7) also collides with the lowest links (indices 0 to 2), mostly with the first.
         self_collision_pairs=((4, 6), (7, 0), (7, 1), (7, 2)),
         link_radius=0.09,
-        forward_pose_deg=(30, 0, -85, 0, 65, 0),
+        ik_start_deg=(30, 0, -85, 0, 65, 0),
     )
 }
 """Model of each supported arm, by the value of `arm.urdf` in a cell file."""

@@ -41,18 +41,14 @@ class TableTop:
     def paint(self, colour: Colour, texture: str = WOOD_TEXTURE) -> None:
         """Give the table a texture of `TEXTURES`, with RGB values multiplied by `colour`."""
         if texture not in self._textures:
-            self._textures[texture] = self._load_pattern(texture)
+            seed = TEXTURES.index(texture)
+            # PyBullet caches textures by path, so that each texture needs its own path.
+            with tempfile.TemporaryDirectory() as folder:
+                path = str(Path(folder) / f"{seed}.png")
+                cv2.imwrite(path, generate_pattern(seed))
+                self._textures[texture] = int(self._client.loadTexture(path))
         texture_id = self._textures[texture]
         self._client.changeVisualShape(self._table, -1, textureUniqueId=texture_id, rgbaColor=[*colour, 1])
-
-    def _load_pattern(self, texture: str) -> int:
-        """Generate a texture, load it into the physics server, and return its id there."""
-        seed = TEXTURES.index(texture)
-        # PyBullet caches textures by path, so that each texture needs its own path.
-        with tempfile.TemporaryDirectory() as folder:
-            path = str(Path(folder) / f"{seed}.png")
-            cv2.imwrite(path, generate_pattern(seed))
-            return int(self._client.loadTexture(path))
 
 
 def generate_pattern(seed: int) -> NDArray[np.uint8]:

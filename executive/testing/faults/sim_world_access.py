@@ -55,7 +55,7 @@ class SimWorldAccess(WorldAccess):
 
     def simulate_collision(self, message: str) -> None:
         """Simulate a collision of the arm; `message` is the reported cause."""
-        self._arm.run_into(message)
+        self._arm.stop_after_collision(message)
 
     def settle(self) -> None:
         """Simulate `SETTLING_STEPS` control steps between two runs."""

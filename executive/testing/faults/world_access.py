@@ -97,7 +97,7 @@ class FakeWorldAccess(WorldAccess):
 
     def simulate_collision(self, message: str) -> None:
         """Simulate a collision of the arm; `message` is the reported cause."""
-        self._fake.arm.run_into(message)
+        self._fake.arm.stop_after_collision(message)
 
     def settle(self) -> None:
         """Write the states of the objects to the log; in a fake world all objects are at rest."""

@@ -51,17 +51,17 @@ def test_a_seal_gives_way_and_the_object_falls(rig: Rig, held: int) -> None:
 def test_an_arm_that_runs_into_something_brakes_and_says_what(rig: Rig) -> None:
     rig.arm.start(rig.planned(OVER))
     rig.step(60)
-    rig.arm.run_into("a hand")
+    rig.arm.stop_after_collision("a hand")
     assert not rig.arm.at_rest
     assert rig.run() <= 120
     assert rig.arm.collision == "a hand"
     rig.go("home")
     assert rig.arm.collision is None
-    rig.arm.run_into("a hand")
+    rig.arm.stop_after_collision("a hand")
     assert (rig.arm.collision, rig.arm.at_rest) == (None, True), "at rest or braking it runs into nothing"
     rig.arm.start(rig.planned(OVER))
     rig.step(60)
     rig.arm.stop()
-    rig.arm.run_into("a hand")
+    rig.arm.stop_after_collision("a hand")
     rig.run()
     assert rig.arm.collision is None
