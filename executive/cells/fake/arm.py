@@ -149,10 +149,8 @@ class FakeArm:
 
     def advance(self) -> None:
         """Move tool and held object to the next pose; stop before the object enters the table or a bin."""
-        if self._path and (collision := self._find_load_collision(self._path[0])):
-            self.stop_after_collision(
-                f"{collision.part} ran into {collision.obstacle}, {collision.position_text}"
-            )
+        if self._path and (hit := self._find_load_collision(self._path[0])):
+            self.stop_after_collision(f"{hit.part} ran into {hit.obstacle}, {hit.position_text}")
         elif self._path:
             self.tool_pose = self._path.pop(0)
             if self.next_obstacle is not None and len(self._path) <= self._half_pose_count:

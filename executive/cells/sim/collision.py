@@ -103,7 +103,7 @@ class ClearanceChecker:
         return closest
 
     def find_violation(self, q: Array) -> ClosestApproach | None:
-        """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], or None if the margin is kept."""
+        """Return the closest approach of the unloaded arm at `q` `(n,)` [rad], or None if it is allowed."""
         closest = min(self._find_approaches(q, None), key=lambda approach: approach.distance, default=None)
         return closest if closest and closest.distance < closest.min_distance - ROUNDING_ERROR else None
 

@@ -33,7 +33,7 @@ f -2 -5 -4 -1
 f 1 5 6 4
 """
 
-ADVICE = "correct the figure, scale or upright_deg"
+ADVICE = "scale or upright_deg"
 
 
 @pytest.fixture(scope="module")
@@ -134,8 +134,8 @@ def test_missing_and_broken_meshes_and_wrong_sizes_are_named_with_their_keys(
     assert found == {
         "gone.mesh": "there is no model gone.obj, neither beside the cell file nor in pybullet_data",
         "empty.mesh": "the model empty.obj is no Wavefront mesh: it has no faces (lines beginning with f)",
-        "flat.height": f"the model of flat has a height of 0.0300 m, not 0.02 m; {ADVICE}",
-        "flat.radius": f"the model of flat has a radius of 0.0112 m, not 0.03 m; {ADVICE}",
-        "cube.height": f"the model of cube has a height of 0.0250 m, not 0.05 m; {ADVICE}",
-        "cube.radius": f"the model of cube has a radius of 0.0177 m, not 0.0354 m; {ADVICE}",
+        "flat.height": f"the model of flat has a height of 0.0300 m, not 0.02 m; correct height, {ADVICE}",
+        "flat.radius": f"the model of flat has a radius of 0.0112 m, not 0.03 m; correct radius, {ADVICE}",
+        "cube.height": f"the model of cube has a height of 0.0250 m, not 0.05 m; correct height, {ADVICE}",
+        "cube.radius": f"the model of cube has a radius of 0.0177 m, not 0.0354 m; correct radius, {ADVICE}",
     }
