@@ -46,13 +46,13 @@ class SceneObject:
         label: Class of the object, or `UNKNOWN_LABEL`.
         model: Model of the object, already scaled.
         X_WO: Pose of the object in the world.
-        colour: Red, green and blue of the object, each 0 to 1.
+        colour: Red, green and blue of the object, each 0 to 1; black if unknown.
     """
 
     label: str
     model: ObjectConfig
     X_WO: Pose
-    colour: Colour
+    colour: Colour = (0.0, 0.0, 0.0)
 
 
 def move_arm_randomly(world: World, camera: CameraConfig, rng: Generator) -> bool:

@@ -22,7 +22,7 @@ from executive.cells.sim.poses import find_places_out_of_reach, find_pose_errors
 from executive.cells.sim.rebuild import InterruptedState, rebuild_world
 from executive.cells.sim.scene_file import load_scene
 from executive.cells.sim.scene_world import build_light
-from executive.cells.sim.spawn import PartSeeds, build_initial_world, find_lack_of_room
+from executive.cells.sim.spawn import build_initial_world, derive_seeds, find_lack_of_room
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.visuals import SimVisuals
 from executive.cells.without_hardware import CellWithoutHardware
@@ -68,7 +68,7 @@ class SimCell(CellWithoutHardware):
             raise InputError(f"cell {config.cell}: {message}")
         super().__init__(config, seed=seed, routes=routes, emit=emit, options=options)
         clock, bins = self.cell.clock, self.cell.bins.values()
-        seeds = PartSeeds.of(seed)
+        _, camera_seed, detector_seed = derive_seeds(seed)
         scene = load_scene(options.scene, config)
         world = self._world = build_initial_world(config, seed, gui=options.gui, scene=scene)
         self._initial_positions = {body: world.get_object_pose(body).position for body in world.labels}
@@ -83,7 +83,7 @@ class SimCell(CellWithoutHardware):
             name,
             camera_config,
             clock,
-            seeds.camera,
+            camera_seed,
             occlusion=ArmOcclusion(self._arm, planner.kinematics, config, lambda: self._tool.holding),
             get_change_count=lambda: self.accounts.change_count,
             light=build_light(scene.light),
@@ -97,7 +97,7 @@ class SimCell(CellWithoutHardware):
         # Detectors are built last, because their processes would outlive an exception in a later statement.
         folders = (options.cell_folder, get_shipped_folder() / "cells")
         self._detectors = build_detectors(
-            config, clock=clock, base=options.cell_folder, seed=seeds.detectors, folders=folders
+            config, clock=clock, base=options.cell_folder, seed=detector_seed, folders=folders
         )
         self.cell = replace(
             self.cell,

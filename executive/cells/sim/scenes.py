@@ -39,8 +39,6 @@ from executive.errors import InputError
 from executive.geometry import Array, Pose
 from executive.perception.camera_model import compute_calibration, intersect_plane, project
 
-BLACK = (0.0, 0.0, 0.0)
-"""Placeholder for an unused colour."""
 IMAGE_SIZE = 256
 """Side of the image of a sample, as a detector gets it [pixel]."""
 MIN_VISIBLE_FRACTION, MIN_LABELLED_VISIBLE_FRACTION = 0.15, 0.5
@@ -174,7 +172,7 @@ class SceneRenderer:
             X_WC = get_camera_pose(world, camera)
             declared_X_WC = get_camera_pose(world, self._declared_camera)
             objects = {
-                body: SceneObject(world.labels[body], world.models[body], world.get_object_pose(body), BLACK)
+                body: SceneObject(world.labels[body], world.models[body], world.get_object_pose(body))
                 for body in bodies
             }
             whole_image, light = (0, 0, camera.width, camera.height), build_light(self._scene.light)

@@ -1,10 +1,9 @@
-"""Initial world of a run: seeds of the parts of the cell, and random objects at rest, some in stacks."""
+"""Initial world of a run: random objects at rest, some in stacks; and random seeds of a run."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,25 +35,12 @@ MAX_DISPLACEMENT = 0.005
 """Maximum distance of an object in a stable stack from its goal position [m]."""
 
 
-@dataclass(frozen=True)
-class PartSeeds:
-    """Random seeds of the parts of a simulated cell.
-
-    Attributes:
-        objects: Seed of the objects and their poses.
-        camera: Seed of the noise of the camera.
-        detectors: Seed of the random numbers of detectors.
-    """
-
-    objects: int
-    camera: int
-    detectors: int
-
-    @staticmethod
-    def of(seed: int) -> PartSeeds:
-        """Return the seeds of the parts for the seed of a run."""
-        parts = np.random.SeedSequence(seed).spawn(3)
-        return PartSeeds(*(int(part.generate_state(1)[0]) for part in parts))
+def derive_seeds(seed: int) -> tuple[int, int, int]:
+    """Return the random seeds of objects, camera noise and detectors for the seed of a run."""
+    objects, camera, detectors = (
+        int(sequence.generate_state(1)[0]) for sequence in np.random.SeedSequence(seed).spawn(3)
+    )
+    return objects, camera, detectors
 
 
 def build_initial_world(
@@ -69,7 +55,8 @@ def build_initial_world(
     """
     world = World(apply_scene(config, scene), gui=gui)
     paint_table(world, scene)
-    spawn_objects(world, world.config, PartSeeds.of(seed).objects, unknown=scene.unknown)
+    object_seed, _, _ = derive_seeds(seed)
+    spawn_objects(world, world.config, object_seed, unknown=scene.unknown)
     world.rest_positions.clear()
     return world
 

@@ -15,7 +15,7 @@ from executive.cell.workcell import CellOptions
 from executive.cells.fake.cell import SilentOperator
 from executive.cells.sim.min_times import SimMinTimes
 from executive.cells.sim.models import load_mesh
-from executive.cells.sim.spawn import PartSeeds, build_initial_world, spawn_objects
+from executive.cells.sim.spawn import build_initial_world, derive_seeds, spawn_objects
 from executive.cells.sim.world import World
 from executive.errors import InputError
 from executive.events import discard_event
@@ -123,4 +123,4 @@ def test_the_first_world_is_the_one_that_a_cell_of_the_same_seed_begins_with(ove
 
 
 def test_the_parts_draw_from_seeds_of_their_own() -> None:
-    assert PartSeeds.of(5) == PartSeeds(objects=803261128, camera=3767054407, detectors=3210010690)
+    assert derive_seeds(5) == (803261128, 3767054407, 3210010690)
