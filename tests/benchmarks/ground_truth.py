@@ -14,8 +14,7 @@ from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
 from executive.cells.audit import UNKNOWN_LABEL, audit_objects
-from executive.cells.sim.audit import list_final_objects
-from executive.cells.sim.cell import SimCell
+from executive.cells.sim.cell import SimCell, list_final_objects
 from executive.events import Emit, ItemChanged
 from executive.ledger.item import State
 from executive.mission.load import load_mission

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.audit import audit_objects
+from executive.cells.audit import FinalObject, audit_objects
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.arm_occlusion import ArmOcclusion
-from executive.cells.sim.audit import list_final_objects
 from executive.cells.sim.camera import SimCamera
 from executive.cells.sim.collision import ClearanceChecker
 from executive.cells.sim.command_log import CommandLog, read_commands
@@ -25,9 +25,11 @@ from executive.cells.sim.scene_world import build_light
 from executive.cells.sim.spawn import build_initial_world, derive_seeds, find_lack_of_room
 from executive.cells.sim.tool import SuctionTool
 from executive.cells.sim.visuals import SimVisuals
+from executive.cells.sim.world import World
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import InputError
 from executive.events import Emit
+from executive.geometry import Array
 from executive.mission.text.file_search import get_shipped_folder
 from executive.motion.arms import build_planner, find_arm_errors
 from executive.perception.detectors.detector_registry import find_detectable_labels, find_detector_errors
@@ -35,6 +37,9 @@ from executive.perception.detectors.requests import ClosableDetector
 from executive.perception.detectors.screening import screen_detectors
 from executive.perception.envelope.rated_detectors import build_rated_detectors
 from executive.perception.localization import build_localizer
+
+MIN_CENTRE_HEIGHT = -0.05
+"""Minimum height of the centre of an object that is still on the table [m]."""
 
 
 class SimCell(CellWithoutHardware):
@@ -183,3 +188,32 @@ def _find_missing_depth_sensors(config: CellConfig) -> Iterator[tuple[KeyPath, s
         if config.localization == "depth" and camera.depth is None:
             message = f'localization "depth" needs a camera with depth, and {name} has none; give it a '
             yield ("localization",), message + 'section "depth: {}", or use "plane"'
+
+
+def list_final_objects(
+    world: World,
+    rest_positions: Mapping[int, Sequence[Array]],
+    bins: Mapping[str, Bin],
+    held_body: int | None = None,
+    dropped_bodies: Collection[int] = (),
+) -> Iterator[FinalObject]:
+    """Yield the objects of a simulated world, including removed objects, at the end of a run.
+
+    Args:
+        world: The simulated world at the end of the run.
+        rest_positions: Positions `(3,)` [m] of each body: initial position, and position after each move by
+            a test and after each release by the tool.
+        bins: The bins of the cell.
+        held_body: Body that the tool holds, or None.
+        dropped_bodies: Bodies that fell from the tool and have not been picked up since.
+    """
+    for body, positions in rest_positions.items():
+        is_removed = body not in world.labels
+        if is_removed:
+            label, position = world.removed_objects[body]
+        else:
+            label, position = world.labels[body], world.get_object_pose(body).position
+        # The centre of an object that leans on a bin wall may be above the wall.
+        names = (name for name, bin in bins.items() if bin.contains(position, BIN_THICKNESS))
+        bin_name = None if position[2] < MIN_CENTRE_HEIGHT else next(names, "")
+        yield FinalObject(label, bin_name, positions, body in dropped_bodies, body == held_body, is_removed)

@@ -12,7 +12,7 @@ import pytest
 from executive.cell.bins import Bin
 from executive.cell.workcell import AUDIT_KEYS
 from executive.cells.audit import UNKNOWN_LABEL, audit_objects
-from executive.cells.sim.audit import list_final_objects
+from executive.cells.sim.cell import list_final_objects
 from executive.geometry import Pose
 
 IN_BIN, ON_TABLE, ON_FLOOR = (0.2, -0.44, 0.12), (0.5, 0.0, 0.025), (1.4, 0.0, -0.6)
