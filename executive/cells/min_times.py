@@ -18,7 +18,7 @@ class CellMinTimes:
 
     def __init__(self, config: CellConfig, touch_distance: float, max_excess_height: float = 0.0) -> None:
         self._config = config
-        self._compute_transport_time = functools.cache(self._compute_min_transport_time)
+        self._get_min_transport_time = functools.cache(self._compute_min_transport_time)
         self._max_descent_shortening = touch_distance + max_excess_height
 
     @property
@@ -33,7 +33,7 @@ class CellMinTimes:
         The time is 0 for a bin that the cell lacks or that the arm does not reach.
         """
         names = self._config.bins if bin is None else {bin} & set(self._config.bins)
-        return min(map(self._compute_transport_time, names), default=0.0)
+        return min(map(self._get_min_transport_time, names), default=0.0)
 
     def get_answer_time(self, detector: str) -> float:
         """Return the latency of a detector [s], "" for the first one; 0 if the cell lacks the detector."""
