@@ -15,7 +15,7 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import compute_travel_height, find_unreachable_places
 from executive.cell.protocols import Clock
 from executive.cell.workcell import KeyPath
-from executive.cells.fake.obstacles import Collision, FakeObstacles
+from executive.cells.fake.fake_obstacles import Collision, FakeObstacles
 from executive.cells.fake.world import FakeWorld
 from executive.errors import Blocked, Fault, Unreachable
 from executive.events import Emit, discard_event
