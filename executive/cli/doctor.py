@@ -180,11 +180,9 @@ def _make_result(
 
 def measure_frame_time(renderer: str) -> tuple[float, str]:
     """Render with `tiny` or `egl` in a subprocess; return the time per frame [ms], and an error or ""."""
-    arguments = build_command("executive.cli.doctor", renderer)
+    argv = build_command("executive.cli.doctor", renderer)
     try:
-        process = subprocess.run(
-            arguments, capture_output=True, text=True, timeout=RENDER_TIMEOUT, check=False
-        )
+        process = subprocess.run(argv, capture_output=True, text=True, timeout=RENDER_TIMEOUT, check=False)
     except subprocess.TimeoutExpired:
         return 0.0, f"no frame within {RENDER_TIMEOUT:.0f} s"
     # Drivers may print text before and after the result, and may crash afterwards.

@@ -68,5 +68,4 @@ def report_polygons(folder: Path) -> None:
 
 def print_halt() -> None:
     """Print the consequences of the received Ctrl-C or SIGTERM."""
-    consequences = "no new runs start, and current runs are halted"
-    click.echo(f"halting: {consequences}; press Ctrl-C again to quit immediately", err=True)
+    click.echo("halting: no new runs start; current runs halt; press Ctrl-C again to quit at once", err=True)

@@ -117,9 +117,9 @@ def keep_stdout_clean() -> Iterator[None]:
     """Redirect Python's stdout to stderr, and drop the stdout of C libraries (pybullet), in this context."""
     sys.stdout.flush()
     real_stdout = os.dup(1)
-    null_device = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(null_device, 1)
+        with open(os.devnull, "w") as null_file:
+            os.dup2(null_file.fileno(), 1)
         with contextlib.redirect_stdout(sys.stderr):
             yield
     finally:
@@ -127,7 +127,6 @@ def keep_stdout_clean() -> Iterator[None]:
         ctypes.CDLL(None).fflush(None)
         os.dup2(real_stdout, 1)
         os.close(real_stdout)
-        os.close(null_device)
 
 
 def print_json(value: Any) -> None:

@@ -40,9 +40,8 @@ def command(dataset: Path, out: Path, model: Path | None, rate: float | None, ep
 
         for split in list_splits(dataset):
             report_polygons(split)
-        with show_progress("training") as report_batch:
-            settings = Settings(model, rate, epochs, seed)
-            train(dataset, out, settings, _make_epoch_printer(epochs), report_batch)
+        with show_progress("training") as progress:
+            train(dataset, out, Settings(model, rate, epochs, seed), _make_epoch_printer(epochs), progress)
         click.echo(
             "add these lines to the cell file, with paths relative to the folder of the cell file:\n\n"
             "detectors:\n  trained:\n    kind: rfdetr\n"

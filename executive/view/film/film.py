@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -39,15 +39,16 @@ def write_film(
     steps_per_frame = speed / film_format.frame_rate / source.start.step
     steps = select_steps(count_steps(source.directory.world_log), steps_per_frame)
     result_frame_count = round(RESULT_DISPLAY_TIME * film_format.frame_rate)
+    frame_count = len(steps) + result_frame_count
 
-    def iterate_with_progress() -> Generator[Image.Image, None, None]:
-        for frame_count, frame in enumerate(frames, start=1):
-            progress(frame_count, len(steps) + result_frame_count)
+    def iterate_with_progress(frames: Iterable[Image.Image]) -> Iterator[Image.Image]:
+        for number, frame in enumerate(frames, start=1):
+            progress(number, frame_count)
             yield frame
 
     with closing(_draw_frames(source, steps, result_frame_count, speed, workers)) as frames:
-        film_format.write(file, iterate_with_progress(), film_format.frame_rate)
-    return len(steps) + result_frame_count
+        film_format.write(file, iterate_with_progress(frames), film_format.frame_rate)
+    return frame_count
 
 
 def select_steps(step_count: int, steps_per_frame: float) -> list[int]:

@@ -24,9 +24,7 @@ _CHARACTERS_PER_LEVEL = 3
 """Number of characters per tree level in a prefix from `draw_line_prefixes`."""
 _COLUMN_STARTS = {"item": 0.0, "class": 0.32, "state": 0.53, "bin": 0.74}
 """Left edge of each column [fraction of the width of the panel]."""
-_STATE_COLOURS = {
-    "placed": SUCCESS, "rejected": FAILURE, "lost": FAILURE, "held": RUNNING, "dropped": RUNNING,
-}  # fmt: skip
+STATE_COLOURS = {"placed": SUCCESS, "rejected": FAILURE, "lost": FAILURE, "held": RUNNING, "dropped": RUNNING}
 """Colour of the text of an item state; the text of any other state has the colour `SECONDARY_TEXT`."""
 _FINAL_STATES = ("placed", "rejected", "skipped", "lost", "phantom")
 """States of items that the run has finished."""
@@ -88,21 +86,20 @@ def draw_items(
     `items` contains the last change of each item, `bin_colours` the colour of each bin by name.
     """
     left, top, right, _ = box
-    draw = ImageDraw.Draw(image)
+    draw, font = ImageDraw.Draw(image), style.load_font(TEXT_SIZE)
     starts = [left + fraction * (right - left) for fraction in _COLUMN_STARTS.values()]
-    ends = [start - 8 for start in starts[1:]] + [right]
+    text_starts, ends = [*starts[:-1], starts[-1] + _SWATCH_SIZE + 6], [*(x - 8 for x in starts[1:]), right]
     for title, start in zip(_COLUMN_STARTS, starts, strict=True):
         draw.text((start, top + ITEM_ROW_HEIGHT / 2), title, INACTIVE, style.load_font(HEADING_SIZE), "lm")
     for number, item in enumerate(select_items(items), start=1):
         middle = top + ITEM_ROW_HEIGHT * (number + 0.5)
         texts = (item.item, item.label, item.state, item.bin)
         name_colour = SECONDARY_TEXT if item.state in _FINAL_STATES else TEXT
-        state_colour = _STATE_COLOURS.get(item.state, SECONDARY_TEXT)
+        state_colour = STATE_COLOURS.get(item.state, SECONDARY_TEXT)
         colours = (name_colour, SECONDARY_TEXT, state_colour, SECONDARY_TEXT)
-        offsets = (0, 0, 0, _SWATCH_SIZE + 6)
-        for text, colour, offset, start, end in zip(texts, colours, offsets, starts, ends, strict=True):
-            visible_text = style.truncate_text(text, TEXT_SIZE, end - start - offset)
-            draw.text((start + offset, middle), visible_text, colour, style.load_font(TEXT_SIZE), "lm")
+        for text, colour, start, end in zip(texts, colours, text_starts, ends, strict=True):
+            visible_text = style.truncate_text(text, TEXT_SIZE, end - start)
+            draw.text((start, middle), visible_text, colour, font, "lm")
         if item.bin:
             x, y = starts[-1], round(middle) - _SWATCH_SIZE // 2
             swatch = (x, y, x + _SWATCH_SIZE - 1, y + _SWATCH_SIZE - 1)

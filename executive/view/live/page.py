@@ -118,7 +118,7 @@ class LivePage:
                 self._last_frame = replace(event.frame, depth=None)
             elif isinstance(event, FrameSearched) and self._last_frame is not None:
                 self._last_camera_image = messages.CameraImage(self._last_frame, event)
-                if self._browser_count and self._is_queue_short:
+                if self._can_send_images:
                     self._enqueue(self._last_camera_image)
             elif not isinstance(event, InputRead):
                 self._enqueue(timed)
@@ -160,14 +160,14 @@ class LivePage:
             if self._run.control.is_paused != self._was_paused:
                 self._was_paused = not self._was_paused
                 self._enqueue(messages.PageChange(is_paused=self._was_paused))
-            if self._browser_count and self._is_queue_short and self._visuals is not None:
+            if self._can_send_images and self._visuals is not None:
                 self._enqueue(messages.PageChange(clock=self._run.now))
                 self._enqueue(messages.SceneChange(body_poses=messages.encode_poses(self._visuals.poses())))
 
     @property
-    def _is_queue_short(self) -> bool:
-        """True if images and poses may be queued."""
-        return self._queue.qsize() < MAX_QUEUED_MESSAGES
+    def _can_send_images(self) -> bool:
+        """True if a browser shows the page and the queue is short enough for images and poses."""
+        return self._browser_count > 0 and self._queue.qsize() < MAX_QUEUED_MESSAGES
 
     def _enqueue(self, message: messages.Message) -> None:
         """Queue a message for the server, unless the server has ended."""

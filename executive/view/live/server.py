@@ -6,10 +6,11 @@ import asyncio
 import contextlib
 import json
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from importlib.resources import files
 
 from aiohttp import WSMsgType, web
+from aiohttp.typedefs import Handler
 
 from executive.view.live.messages import PageCommand
 from executive.view.live.page_state import PageState
@@ -47,9 +48,6 @@ _FILES = {
     "colours.css": ("colours.css", "text/css"),
 }
 """Path in `executive/view` and content type of each served file, by the last part of its address."""
-
-Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
-"""Function that answers a request."""
 
 
 class Server:
@@ -139,8 +137,7 @@ class Server:
 
     def _report_browsers(self) -> None:
         """Report to the run how many browsers show the page, and whether a browser renders on the CPU."""
-        is_cpu_rendering = any(self._browsers.values())
-        self._send_command(PageCommand("browsers", "", len(self._browsers), is_cpu_rendering))
+        self._send_command(PageCommand("browsers", "", len(self._browsers), any(self._browsers.values())))
 
 
 def find_access_error(request: web.Request, token: str, host: str) -> str:
