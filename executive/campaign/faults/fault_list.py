@@ -169,11 +169,12 @@ class _FaultLister:
                 continue
             middle_activation = 1 + len(self._nominal_run.steps_by_path[node.path]) // 2
             for occasion, fraction in QUARTER_FRACTIONS:
+                cause = f"after {fraction:.0%} of the motion"
                 removed = effects.object_removed("node", fraction)
                 bumped = effects.object_bumped(x, y, "node", fraction)
                 for kind, effect in (("target removed", removed), ("target bumped", bumped)):
                     cell_fault = during(node.path, effect, activations=middle_activation)
-                    yield self._make_node_fault(node, kind, occasion, _describe_time(fraction), cell_fault)
+                    yield self._make_node_fault(node, kind, occasion, cause, cell_fault)
 
     def list_tool_faults(self) -> Iterator[PlannedFault]:
         """Yield losses of the seal during a transport, and times in which the suction cup cannot seal."""
@@ -183,7 +184,7 @@ class _FaultLister:
                 continue
             for occasion, fraction in TRANSPORT_FRACTIONS:
                 cell_fault = during(node.path, effects.seal_breaks(fraction), activations=1)
-                cause = _describe_time(fraction)
+                cause = f"after {fraction:.0%} of the motion"
                 yield self._make_node_fault(node, "seal breaks", occasion, cause, cell_fault)
             kind, effect = "seal breaks over a wrong bin", effects.seal_breaks_over_wrong_bin()
             cell_fault = during(node.path, effect)
@@ -220,7 +221,3 @@ def _make_part_fault(part: str, kind: str, occasion: Occasion, cell_fault: Sched
     assert isinstance(cell_fault.time, TimeSpan)
     cause = f"from {cell_fault.time.start:.2f} s on"
     return PlannedFault(part, part, "", kind, occasion, cause, cell_fault)
-
-
-def _describe_time(fraction: float) -> str:
-    return f"after {fraction:.0%} of the motion"

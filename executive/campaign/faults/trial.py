@@ -106,7 +106,7 @@ class _TrialRun:
             *trial_checks.check_tree(run.root),
             *check_journal(self._events, run_end),
             *trial_checks.check_ledger(run_end, items, audit, removed_count, unobserved),
-            *trial_checks.check_success(run_end, audit, self._events),
+            *trial_checks.check_detection(run_end, audit, self._events),
             *trial_checks.check_losses(audit, self._events),
             *check_held_item(run_end, self._workcell),
             *check_arm_at_rest(self._workcell),

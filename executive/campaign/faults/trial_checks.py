@@ -126,7 +126,7 @@ def check_ledger(
         yield f"{ledger_text}; the audit {format_counts(audit)}"
 
 
-def check_success(
+def check_detection(
     run_end: RunEnded, audit: Mapping[str, int] | None, events: Sequence[TimedEvent]
 ) -> Iterator[str]:
     """Yield a problem if detectors were used and the run succeeded, but some objects were never detected."""

@@ -11,10 +11,10 @@ from events import at, frame_searched, item_changed
 from executive.campaign.faults.planned_fault import PlannedFault, SkillFault
 from executive.campaign.faults.trial_checks import (
     UnobservedCounts,
+    check_detection,
     check_end,
     check_ledger,
     check_losses,
-    check_success,
     count_unobserved_objects,
     describe_unexpected_reason,
 )
@@ -102,7 +102,7 @@ def test_what_nobody_saw_is_no_disagreement_unless_the_run_says_success(
 ) -> None:
     unseen = {**AUDIT, "left": 2, "unseen": 1}
     assert books(outcome(status, reason), ITEMS, unseen) == []
-    assert list(check_success(outcome(status, reason), unseen, [at(1, frame_searched())] * looked)) == said
+    assert list(check_detection(outcome(status, reason), unseen, [at(1, frame_searched())] * looked)) == said
 
 
 def test_what_fell_just_before_a_run_ended_early_may_lie_anywhere() -> None:
