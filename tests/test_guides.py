@@ -64,7 +64,7 @@ def in_time(event: Event) -> None:
 def assert_does_its_work(loaded: LoadedMission) -> None:
     # A detector behind a server cannot be measured here.
     assert [one for one in loaded.warnings if one.code != "not-measured"] == []
-    options = RunOptions(0, [*loaded.routes], kind=FakeCell)
+    options = RunOptions(0, [*loaded.routes], make_cell=FakeCell)
     run = assemble(loaded, load_skills(), options, [in_time])
     try:
         outcome = run.execute()

@@ -24,13 +24,13 @@ class Candidate:
 
     Attributes:
         min_duration: Minimum duration of the free part [s].
-        entry: Joint state at the end of the free part.
-        arrival: Straight motion of the tool downwards from `entry`, or None.
+        free_part_end: Joint state at the end of the free part.
+        arrival: Straight motion of the tool downwards from `free_part_end`, or None.
         branch: Branch of the inverse kinematics at the end, or None for given joint positions.
     """
 
     min_duration: float
-    entry: JointState
+    free_part_end: JointState
     arrival: CartesianLine | None
     branch: BranchKey | None
 
@@ -58,9 +58,9 @@ def find_candidates(
         if any(np.max(np.abs(goal_q - q)) <= MIN_JOINT_DIFFERENCE for q in previous_qs):
             continue
         previous_qs.append(goal_q)
-        arrival, entry = None, JointState.at_rest(goal_q)
+        arrival, free_part_end = None, JointState.at_rest(goal_q)
         if length > 0:
             waypoints = solve_vertical_waypoints(kinematics, goal_q, length, branch)[::-1]
             arrival = CartesianLine(waypoints, length, limits, goal.guarded_speed, starts_in_motion=True)
-            entry = arrival.state_at(0.0)
-        yield Candidate(float(durations[index]), entry, arrival, branch)
+            free_part_end = arrival.state_at(0.0)
+        yield Candidate(float(durations[index]), free_part_end, arrival, branch)

@@ -90,9 +90,8 @@ class CartesianLine:
 
         The chain rule in the module docstring is solved for `v`, then for `a`, then for `j`.
         """
-        q_s, q_ss, q_sss = (
-            np.abs(self._spline(_CHECKED_FRACTIONS * length, order)).max(axis=0) for order in (1, 2, 3)
-        )
+        distances = _CHECKED_FRACTIONS * length
+        q_s, q_ss, q_sss = (np.abs(self._spline(distances, order)).max(axis=0) for order in (1, 2, 3))
         max_speeds = (
             limits.velocity / (q_s + _MIN_DIVISOR),
             # Speed that the tool reaches with its maximum acceleration on the whole line.

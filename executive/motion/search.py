@@ -155,11 +155,11 @@ class MotionSearch:
             if min(costs, default=math.inf) <= candidate.min_duration + candidate.arrival_duration:
                 break
             problem = OptimizationProblem(
-                self._start, candidate.entry, self._connector, self._kinematics, self._clearance,
+                self._start, candidate.free_part_end, self._connector, self._kinematics, self._clearance,
                 self._discs, self._payload,
             )  # fmt: skip
             with contextlib.suppress(JointLimitError, Unreachable):
-                free_part = self._connector.connect(self._start, candidate.entry)
+                free_part = self._connector.connect(self._start, candidate.free_part_end)
                 qs = free_part.sample(SAMPLE_FRACTIONS * free_part.duration).q
                 if problem.compute_slack(qs).min() >= 0:
                     duration = free_part.duration + candidate.arrival_duration
@@ -197,19 +197,20 @@ class MotionSearch:
             Unreachable: A corner is out of reach in the branch of the candidate.
             JointLimitError: No motion connects two of the states.
         """
-        height, entry, connect = self._travel_height + extra_height, candidate.entry, self._connector.connect
+        height, end = self._travel_height + extra_height, candidate.free_part_end
+        connect = self._connector.connect
         if (height, is_straight) not in self._rises:
             self._rises[height, is_straight] = self._plan_rise(height, is_straight)
         rise, start_corner = self._rises[height, is_straight]
-        (x, y, z), _ = self._locate_tool(entry.q)
+        (x, y, z), _ = self._locate_tool(end.q)
         if candidate.branch is None or z >= height:
-            return [*rise, connect(start_corner, entry)]
+            return [*rise, connect(start_corner, end)]
         if is_straight and candidate.arrival is None:
-            waypoints = solve_vertical_waypoints(self._kinematics, entry.q, height - z, candidate.branch)
+            waypoints = solve_vertical_waypoints(self._kinematics, end.q, height - z, candidate.branch)
             descent = CartesianLine(waypoints[::-1], height - z, self._limits)
             return [*rise, connect(start_corner, JointState.at_rest(waypoints[-1])), descent]
-        goal_corner = self._solve_corner((x, y, height), candidate.branch, entry.q)
-        return [*rise, connect(start_corner, goal_corner), connect(goal_corner, entry)]
+        goal_corner = self._solve_corner((x, y, height), candidate.branch, end.q)
+        return [*rise, connect(start_corner, goal_corner), connect(goal_corner, end)]
 
     def _plan_rise(self, height: float, is_straight: bool) -> tuple[list[MotionPiece], JointState]:
         """Return the motion from the start up to a corner at a height [m], and the state at the corner.

@@ -80,7 +80,7 @@ def replay_run(
         InputError: The directory contains no run that can be replayed.
     """
     log = InputLog.from_events(journal)
-    start = log.start
+    start = log.start_event
     if start is None or not log.inputs:
         raise InputError(f'"{path}" contains no run that can be replayed: its journal has no inputs of a run')
     loaded = read_mission_of_run(path, start, skills, mission)

@@ -113,7 +113,7 @@ def _describe_missing_commands(replayed_cell: ReplayedCell) -> str:
     interruption = replayed_cell.last_interruption
     if interruption is None or interruption.last_action != UNKNOWN_ACTION:
         return ""
-    count = interruption.resume_tick - interruption.complete_step_count
+    count = interruption.resume_tick - interruption.kept_step_count
     steps = f"{count} control steps ({count * replayed_cell.log.control_period:.2f} s)"
     problem = f"the journal ends {steps} before the log of the world and may lack commands to the tool"
     return f"{problem}; the scene is observed before the run continues"

@@ -120,10 +120,8 @@ def decode_answer(value: Any) -> Answer:
 
 def encode_observations(observations: Sequence[Observation]) -> list[Any]:
     """Return the attributes of each observation as a list."""
-    attributes = (vars(observation).values() for observation in observations)
-    return [
-        [encode_detection(detection), position.tolist(), *rest] for detection, position, *rest in attributes
-    ]
+    rows = (vars(observation).values() for observation in observations)
+    return [[encode_detection(detection), position.tolist(), *rest] for detection, position, *rest in rows]
 
 
 def decode_observations(value: Any) -> list[Observation]:

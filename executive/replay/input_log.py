@@ -36,13 +36,13 @@ class Interruption:
     """Interruption of a run between the end of one process and the resumption in another process.
 
     Attributes:
-        complete_step_count: Number of control steps before the interruption that the resumed run keeps.
+        kept_step_count: Number of control steps before the interruption that the resumed run keeps.
         last_action: Last action of the tool, `open` or `close`; "" without an action, or `UNKNOWN_ACTION`.
         restarts_tree: True if the run ended as INCOMPLETE; the resumption then restarts the tree.
         resume_tick: First control step after the resumption.
     """
 
-    complete_step_count: int
+    kept_step_count: int
     last_action: str
     restarts_tree: bool
     resume_tick: int
@@ -62,7 +62,7 @@ class InputLog:
     Attributes:
         events: Events of the journal in order, without the control steps that a resumed run did not keep.
         inputs: Recorded values by name of the input, in order; equal consecutive values are recorded once.
-        interruptions: Interruptions after which the run was resumed, by `complete_step_count`.
+        interruptions: Interruptions after which the run was resumed, by `kept_step_count`.
         halt: The last halt, or None.
     """
 
@@ -96,15 +96,15 @@ class InputLog:
         return InputLog(kept_events, inputs, interruptions, halt)
 
     @property
-    def start(self) -> RunStarted | None:
+    def start_event(self) -> RunStarted | None:
         """First event of the run, or None if the run was interrupted before this event."""
         return next((timed.event for timed in self.events if isinstance(timed.event, RunStarted)), None)
 
     @property
     def control_period(self) -> float:
         """Duration of a control step [s]."""
-        assert self.start is not None, "the journal of a replayed run contains its start"
-        return self.start.step
+        assert self.start_event is not None, "the journal of a replayed run contains its start"
+        return self.start_event.step
 
     @property
     def last_tick(self) -> int:
@@ -123,7 +123,7 @@ class InputLog:
         """Return the interruption at the end of the log.
 
         The resumed run does not keep control steps in which the arm only braked, after a halt or during an
-        interrupted resumption. All steps are kept of a run that ended as INCOMPLETE.
+        interrupted resumption. If the run ended as INCOMPLETE, the resumed run keeps all steps.
 
         Args:
             step_count: Number of control steps that the cell has executed.
@@ -139,7 +139,7 @@ class InputLog:
         may_lack_commands = self._may_lack_command(last_command_tick, is_truncated)
         for interruption in reversed(list(self.interruptions.values())):
             if interruption.resume_tick >= kept_count:
-                kept_count = min(kept_count, interruption.complete_step_count)
+                kept_count = min(kept_count, interruption.kept_step_count)
                 may_lack_commands |= interruption.last_action == UNKNOWN_ACTION
         action = UNKNOWN_ACTION if may_lack_commands else self.last_action
         return Interruption(kept_count, action, kept_count - 1 in incomplete_end_ticks, step_count)

@@ -74,7 +74,7 @@ _CODEC_BY_PATTERN = {
     re.sub(r"{\w+}", "*", input_format.name): input_format.codec
     for input_format in sorted(INPUT_FORMATS.values(), key=lambda input_format: -len(input_format.name))
 }
-"""Codec by pattern of input names (`detector.*`); the longest pattern is first and the most specific."""
+"""Codec by pattern of input names (`detector.*`), sorted from long (specific) to short patterns."""
 
 
 def find_input_format(access: Access) -> InputFormat:

@@ -92,7 +92,7 @@ class ReplayedCell(CellWrapper):
 
     def __init__(self, inner: Workcell, log: InputLog, last_interruption: Interruption | None = None) -> None:
         super().__init__(inner)
-        step_count = None if last_interruption is None else last_interruption.complete_step_count
+        step_count = None if last_interruption is None else last_interruption.kept_step_count
         self.log = log if step_count is None else log.select_before(step_count)
         self.last_interruption = last_interruption
         self._replayer = InputReplayer(self.log)
@@ -139,7 +139,7 @@ class ReplayedCell(CellWrapper):
         if interruption is not self.last_interruption:
             self._begin_step(interruption.resume_tick)
             return
-        while self.inner.steps < interruption.complete_step_count:
+        while self.inner.steps < interruption.kept_step_count:
             self.inner.advance()
         self.is_live = True
 
@@ -174,7 +174,7 @@ class ReplayedCell(CellWrapper):
 
     def _find_interruption(self, step_count: int) -> Interruption | None:
         """Return the interruption after `step_count` control steps, or None."""
-        if self.last_interruption is not None and step_count == self.last_interruption.complete_step_count:
+        if self.last_interruption is not None and step_count == self.last_interruption.kept_step_count:
             return self.last_interruption
         return self.log.interruptions.get(step_count)
 

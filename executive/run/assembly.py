@@ -37,7 +37,7 @@ class RunOptions:
         has_keyboard: True if a person can type at the terminal.
         gui: True to show the simulated world in a window.
         is_realtime: True to execute the run at the speed of the wall clock.
-        kind: Factory of the work cell, or None to use the kind that the cell file names.
+        make_cell: Factory of the work cell, or None for the kind of cell that the cell file names.
         substitutes: Skill that replaces the skills of nodes, by a pattern for the node paths (`*/Grasp`).
         scene: Scene file, which changes the world of a simulated cell, or None.
     """
@@ -47,7 +47,7 @@ class RunOptions:
     has_keyboard: bool = True
     gui: bool = False
     is_realtime: bool = False
-    kind: Callable[..., Workcell] | None = None
+    make_cell: Callable[..., Workcell] | None = None
     substitutes: Mapping[str, type[Skill]] = field(default_factory=dict)
     scene: Path | None = None
 
@@ -72,7 +72,7 @@ def assemble(
     builder = _RunBuilder(loaded, skills, options, RunContext(observers))
     workcell = builder.build_workcell()
     builder.context.connect(workcell, LookaheadPlanner(workcell.cell))
-    start = RunStarted(
+    start_event = RunStarted(
         mission=loaded.mission.name,
         file=str(loaded.path),
         seed=options.seed,
@@ -85,7 +85,7 @@ def assemble(
     )
     return Run(
         builder.context, builder.build_tree(), builder.control, loaded.mission.name,
-        start_event=start, is_realtime=options.is_realtime,
+        start_event=start_event, is_realtime=options.is_realtime,
     )  # fmt: skip
 
 
@@ -129,7 +129,7 @@ def assemble_replay(
     observers: Sequence[Observer] = (),
 ) -> ResumedRun:
     """Return a run that replays a recorded run without hardware or simulation."""
-    options = RunOptions(seed, requests=(), kind=CellWithoutHardware)
+    options = RunOptions(seed, requests=(), make_cell=CellWithoutHardware)
     builder = _RunBuilder(loaded, skills, options, RunContext(observers))
     return builder.build_resumed_run(builder.build_workcell(), log)
 
@@ -165,7 +165,7 @@ class _RunBuilder:
             operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, request_count)
         config, base = loaded.cell_config, loaded.cell_path.parent
         cell_options = CellOptions(operator, base, options.gui, resume=resume_point, scene=options.scene)
-        make_cell = options.kind or load_cell_kind(config.kind)
+        make_cell = options.make_cell or load_cell_kind(config.kind)
         return make_cell(config, seed=options.seed, routes=loaded.routes, emit=emit, options=cell_options)
 
     def build_tree(self) -> TreeNode:

@@ -45,7 +45,7 @@ class LookaheadPlanner:
             self._may_plan_approach = True
 
     def plan_next_motion(self) -> None:
-        """Plan the next motion if the last tick made it predictable; called after each tick."""
+        """Plan the next motion if the events of the run make it predictable; called after each tick."""
         cell, held_item = self._cell, self._cell.ledger.find_held_item()
         if self._may_plan_transit and self._item_and_bin and held_item is None and cell.tool.holding:
             self._may_plan_transit = False

@@ -34,7 +34,7 @@ HALTED = LoopEnd("HALTED", "halted", "halted by the user")
 """End of a tick loop that was halted by a person or by a signal."""
 
 
-def to_loop_end(failure: Failure | None) -> LoopEnd:
+def make_loop_end(failure: Failure | None) -> LoopEnd:
     """Return the end of the tick loop; `failure` is the failure of the tree, or None after its success."""
     if failure is None:
         return LoopEnd("SUCCESS")

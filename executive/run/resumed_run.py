@@ -28,7 +28,7 @@ class ResumedRun(Run):
     """Run that replays an interrupted run, and then may continue on the real cell.
 
     The replay includes earlier resumptions of the run. Observers receive all events; recorders receive only
-    the events on the real cell.
+    the events after the replay.
 
     Args:
         is_realtime: True to execute the run on the real cell at the speed of the wall clock.
@@ -58,7 +58,7 @@ class ResumedRun(Run):
         control.call_between_ticks(self._stop_or_resume)
 
     def add_recorder(self, recorder: Observer) -> None:
-        """Call `recorder` with every event on the real cell, before the observers."""
+        """Call `recorder` with every event after the replay, before the observers."""
         self._recorders.append(recorder)
 
     def _execute_tree(self) -> RunEnded:
@@ -94,7 +94,7 @@ class ResumedRun(Run):
         context.begin_step(replayed_cell.steps)
         if replayed_cell.is_live:
             self._wall_start = time.monotonic() - context.now
-            step_count, versions = interruption.complete_step_count, dict(list_versions())
+            step_count, versions = interruption.kept_step_count, dict(list_versions())
             context.emit(RunResumed(step_count, interruption.last_action, versions))
         self._is_scene_known &= interruption.last_action != UNKNOWN_ACTION
         if self._is_scene_known:
@@ -135,7 +135,7 @@ def restart_skills(root: Behaviour) -> None:
 
 
 def reconcile_ledger(cell: Cell, last_action: str) -> None:
-    """Correct the ledger by the sensor of the tool, and mark the positions of all items as invalid.
+    """Correct the ledger with the sensor of the tool, and mark the positions of all items as invalid.
 
     During the interruption, a person may have moved objects, and the tool may have dropped its item.
 

@@ -12,7 +12,7 @@ from py_trees.common import Status
 from executive.cell.workcell import Workcell
 from executive.errors import ExecutiveError, Fault, Stopped
 from executive.events import FaultRaised, Observer, RunEnded, RunHalted, RunStarted
-from executive.run.outcome import HALTED, LoopEnd, catch_problems, check_items, finalize_items, to_loop_end
+from executive.run.outcome import HALTED, LoopEnd, catch_problems, check_items, finalize_items, make_loop_end
 from executive.run.run_context import RunContext, brake_arm
 from executive.run.run_control import RunControl
 from executive.run.signals import halt_on_signals
@@ -139,7 +139,7 @@ class Run:
                 if control.is_stopped:
                     break
                 if self.root.status is not Status.RUNNING:
-                    return to_loop_end(self.root.failure)
+                    return make_loop_end(self.root.failure)
                 context.plan_ahead()
                 context.advance()
                 is_tree_ticked = False

@@ -55,7 +55,7 @@ class RunControl:
         self._wake_up.set()
 
     def add_request(self, text: str) -> None:
-        """Store a request for `TerminalOperator`; its next question discards all earlier requests."""
+        """Store a request for `TerminalOperator`, which discards all requests from before its question."""
         self._requests.append(text)
 
     def take_request(self) -> str | None:

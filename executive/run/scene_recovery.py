@@ -83,9 +83,8 @@ def _look(cell: Cell, goal: Goal | str) -> Generator[None, None, Frame]:
         yield
     try:
         answer = request.result()
-        detections = Detections(
-            **vars(answer), frame=frame, view="full", area=cell.camera.get_view_box("full")
-        )
+        area = cell.camera.get_view_box("full")
+        detections = Detections(**vars(answer), frame=frame, view="full", area=area)
         observations = cell.localizer.localize(detections)
     except (Unavailable, NoDepth):
         return frame

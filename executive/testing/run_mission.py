@@ -113,7 +113,7 @@ def run_mission(
         return workcell
 
     make_cell = with_faults(make_arranged_cell, faults, timeout=timeout)
-    options = RunOptions(seed, requests, kind=make_cell, substitutes=substitutes or {})
+    options = RunOptions(seed, requests, make_cell=make_cell, substitutes=substitutes or {})
     run = assemble(loaded, skills, options, [events.append, *observers])
     workcell = run.workcell
     assert isinstance(workcell, FaultyCell)

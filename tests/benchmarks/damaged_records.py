@@ -143,7 +143,7 @@ def measure(
 def _record_whole(subject: MissionUnderTest, runs: Path) -> Snapshots:
     """Run the mission to its end, and return the snapshots of its record."""
     snapshots = Snapshots(runs)
-    options = RunOptions(subject.seed, subject.requests, kind=subject.make_cell)
+    options = RunOptions(subject.seed, subject.requests, make_cell=subject.make_cell)
     record_run(subject.loaded, subject.skills, options, runs, RecordOptions([snapshots]))
     return snapshots
 
@@ -189,7 +189,7 @@ def _replay(subject: MissionUnderTest, path: Path) -> None:
 
 
 def _resume_to_first_tick(subject: MissionUnderTest, path: Path) -> None:
-    options = RunOptions(subject.seed, kind=subject.make_cell)
+    options = RunOptions(subject.seed, make_cell=subject.make_cell)
     resume_run(path, subject.skills, options, RecordOptions([StopAtFirstTick()], saves_pictures=False))
 
 
@@ -247,7 +247,7 @@ def _resume(subject: MissionUnderTest, path: Path, case: str) -> Figures:
     """Resume a run in a child; return whether ledger and audit agree, its status and its problems."""
 
     def resume() -> Figures:
-        options = RunOptions(subject.seed, kind=subject.make_cell)
+        options = RunOptions(subject.seed, make_cell=subject.make_cell)
         try:
             result = resume_run(path, subject.skills, options, RecordOptions(saves_pictures=False))
         except InputError as error:

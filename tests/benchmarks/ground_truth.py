@@ -273,7 +273,7 @@ def _run_in_this_process(
     skills = load_skills()
     loaded = load_mission(mission, skills, {}, load_cell_kind)
     maker = AuditedCellMaker(detectors)
-    options = RunOptions(seed, kind=maker, scene=scene)
+    options = RunOptions(seed, make_cell=maker, scene=scene)
     result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))
     reports = read_reports(Path(result.run) / "journal.jsonl")
     objects = tuple(

@@ -184,7 +184,7 @@ class _RunWithHalts:
         self._run = assemble(
             subject.loaded,
             subject.skills,
-            RunOptions(subject.seed, subject.requests, kind=make_cell),
+            RunOptions(subject.seed, subject.requests, make_cell=make_cell),
             [lambda event: self._journal(event), self._trace],
         )
         self._arm = self._run.workcell.cell.arm

@@ -24,7 +24,7 @@ def measure(subject: MissionUnderTest, runs: Path) -> Figures:
     runs.mkdir(parents=True, exist_ok=True)
     times: list[float] = []
     began = time.perf_counter()
-    options = RunOptions(subject.seed, subject.requests, kind=subject.make_cell)
+    options = RunOptions(subject.seed, subject.requests, make_cell=subject.make_cell)
     run = assemble(subject.loaded, subject.skills, options)
     with closing(run), tempfile.TemporaryDirectory(prefix=".journal-", dir=runs) as folder:
         with closing(Recorder(RunDirectory(Path(folder)), saves_pictures=False)) as recorder:

@@ -101,7 +101,7 @@ def run_and_kill(subject: MissionUnderTest, seed: int, runs: Path, delay: float)
         entries = read_journal(find_run(LATEST_LINK, runs) / "journal.jsonl")
     except ExecutiveError:
         return False
-    return InputLog.from_events(entries).start is not None and find_run_end(entries) is None
+    return InputLog.from_events(entries).start_event is not None and find_run_end(entries) is None
 
 
 def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: str) -> Figures:
@@ -120,7 +120,7 @@ def resume_killed_run(subject: MissionUnderTest, seed: int, runs: Path, change: 
 
     def resume() -> Figures:
         done = change_world(subject, seed, path, past, change) if change else ""
-        options = RunOptions(seed, kind=subject.make_cell)
+        options = RunOptions(seed, make_cell=subject.make_cell)
         result = resume_run(path, subject.skills, options, RecordOptions(saves_pictures=False))
         after = InputLog.from_events(read_journal(path / "journal.jsonl"))
         problems = [*check_result(result, change_made=done), *find_handled_twice(after.events)]
@@ -158,8 +158,8 @@ def change_world(subject: MissionUnderTest, seed: int, path: Path, past: InputLo
                 world.move(thing, tuple(random.choice(shifts)))
                 done.append(f"moved {thing.label}")
 
-    assert past.start is not None
-    loaded = read_mission_of_run(path, past.start, subject.skills)
+    assert past.start_event is not None
+    loaded = read_mission_of_run(path, past.start_event, subject.skills)
     meanwhile(
         path / "world.log", loaded, seed, act, subject.make_cell or load_cell_kind(loaded.cell_config.kind)
     )

@@ -123,7 +123,7 @@ def _run(loaded: LoadedMission, skills: Mapping[str, type[Skill]], seed: int) ->
     wishes = random.Random(seed).choices([*loaded.routes, "rescan"], k=5)
     witness = Witness(loaded, skills, scope := Blackboard())
     with mock.patch.object(assembly, "Blackboard", lambda: scope):
-        options = RunOptions(seed, wishes, kind=UnkindCell)
+        options = RunOptions(seed, wishes, make_cell=UnkindCell)
         run = assemble(loaded, skills, options, [witness])
     assert isinstance(run.workcell, UnkindCell)
     witness.cell = run.workcell

@@ -115,7 +115,7 @@ def run_crowded(
     """Run a shipped mission and return its result and its journal."""
     skills = load_skills()
     loaded = load_mission(mission, skills, find_cell_kind=load_cell_kind)
-    options = RunOptions(1, has_keyboard=False, kind=kind)
+    options = RunOptions(1, has_keyboard=False, make_cell=kind)
     result = record_run(loaded, skills, options, runs, RecordOptions(saves_pictures=False))
     return result, (Path(result.run) / "journal.jsonl").read_text()
 

@@ -58,7 +58,7 @@ class FailedRun:
             file.write_text(HEAD + mission)
         self.loaded = load_mission(file, load_skills(), overrides or {})
         self.timeline = Timeline(has_history=False)
-        options = RunOptions(3, requests, kind=FakeCell)
+        options = RunOptions(3, requests, make_cell=FakeCell)
         self.run = assemble(self.loaded, load_skills(), options, [self.timeline])
         assert isinstance(self.run.workcell, FakeCell)
         self.fake = self.run.workcell

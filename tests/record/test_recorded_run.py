@@ -48,7 +48,8 @@ def run(bring_one, tmp_path, monkeypatch):
         loaded = load_mission(bring_one, load_skills())
         try:
             record = RecordOptions(views, **options)
-            return record_run(loaded, load_skills(), RunOptions(3, kind=FakeCell), tmp_path / "runs", record)
+            run_options = RunOptions(3, make_cell=FakeCell)
+            return record_run(loaded, load_skills(), run_options, tmp_path / "runs", record)
         finally:
             assert len(closed) == 1
 

@@ -36,7 +36,7 @@ QUICK = "sort_overhead"
 def recorded(missions: Path, runs: Path, name: str, kind: Any = FakeCell) -> Path:
     loaded = load_mission(missions / f"{name}.yaml", load_skills())
     requests = [*loaded.routes] * 4
-    options = RunOptions(3, requests, kind=kind)
+    options = RunOptions(3, requests, make_cell=kind)
     record_run(loaded, load_skills(), options, runs, RecordOptions(saves_pictures=False))
     return find_run("latest", runs)
 

@@ -24,7 +24,7 @@ def make(
     events: list[Event] = []
     loaded = load_mission(missions / f"{name}.yaml", load_skills())
     observers = [events.append, *options.pop("observers", [])]
-    return assemble(loaded, load_skills(), RunOptions(seed, kind=FakeCell, **options), observers), events
+    return assemble(loaded, load_skills(), RunOptions(seed, make_cell=FakeCell, **options), observers), events
 
 
 def fake_of(run: Run) -> FakeCell:

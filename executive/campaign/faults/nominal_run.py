@@ -72,7 +72,7 @@ def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
         KeyboardInterrupt: The user halted the run.
     """
     activations = ActivationRecorder()
-    options = RunOptions(mission.seed, mission.requests, kind=mission.make_cell)
+    options = RunOptions(mission.seed, mission.requests, make_cell=mission.make_cell)
     run = assemble(mission.loaded, mission.skills, options, [activations])
     with closing(run):
         end = run.execute()

@@ -79,7 +79,7 @@ class _TrialRun:
         self.options = RunOptions(
             mission.seed,
             mission.requests,
-            kind=with_faults(self._make_cell, cell_faults, timeout=nominal_run.timeout),
+            make_cell=with_faults(self._make_cell, cell_faults, timeout=nominal_run.timeout),
             substitutes=make_substitutes(self._skill_faults, skills_by_path),
         )
         self.run = assemble(mission.loaded, mission.skills, self.options, [self._store_event, self._recorder])

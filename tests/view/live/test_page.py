@@ -59,7 +59,7 @@ def watch(text: str, folder: Path, do: Callable[[Watched], Awaitable[None]]) -> 
     loaded = load_mission(file, load_skills())
     page = LivePage()
     # In real time, so that there is something to pause.
-    options = RunOptions(3, has_keyboard=False, is_realtime=True, kind=FakeCell)
+    options = RunOptions(3, has_keyboard=False, is_realtime=True, make_cell=FakeCell)
     run = assemble(loaded, load_skills(), options, [page])
     run.control.pause()
     page.open(run)
@@ -152,7 +152,9 @@ def test_a_page_that_died_costs_the_run_nothing(tmp_path: Path) -> None:
     file = tmp_path / "mission.yaml"
     file.write_text(MISSION)
     page = LivePage()
-    run = assemble(load_mission(file, load_skills()), load_skills(), RunOptions(3, kind=FakeCell), [page])
+    run = assemble(
+        load_mission(file, load_skills()), load_skills(), RunOptions(3, make_cell=FakeCell), [page]
+    )
     page.open(run)
     page._server.kill()
     assert run.execute().status == "SUCCESS"

@@ -47,7 +47,7 @@ def test_a_run_that_ended_is_described_by_its_result(failed):
 def test_an_interrupted_and_resumed_run_is_described_as_one(killed, copy):
     run = copy(killed)
     assert ReportData(run).status == INTERRUPTED
-    resume_run(run, load_skills(), RunOptions(3, kind=FakeCell), RecordOptions(saves_pictures=False))
+    resume_run(run, load_skills(), RunOptions(3, make_cell=FakeCell), RecordOptions(saves_pictures=False))
     facts = ReportData(run)
     assert (facts.status, facts.resume_command) == ("SUCCESS", "")
     transits = [one for one in facts.timeline.activations if one.node.endswith("/Transit")]
