@@ -9,6 +9,9 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+# Without this variable, albumentations, which rfdetr imports, queries a package index for its newest version.
+os.environ.setdefault("NO_ALBUMENTATIONS_UPDATE", "1")
+
 RESOLUTION = 256
 """Side of the square input image [pixel]."""
 ARCHITECTURE: dict[str, Any] = {
@@ -35,8 +38,6 @@ def create_model(class_count: int, checkpoint: Path | None = None, device: str =
         checkpoint: File with the initial weights; None: random weights.
         device: Torch device of the weights.
     """
-    # Without this variable, albumentations queries a package index for its newest version at import.
-    os.environ.setdefault("NO_ALBUMENTATIONS_UPDATE", "1")
     declare_missing_operators()
     from rfdetr import RFDETRNano
 
@@ -60,7 +61,7 @@ def declare_missing_operators() -> object | None:
     """Declare the operators of torchvision if its compiled library cannot be loaded; return the declarations.
 
     A CPU build of torch cannot load the compiled library of the default build of torchvision. The import of
-    torchvision then fails without declared operators. The cache of the function keeps the declarations valid.
+    torchvision then fails without declared operators. The cache keeps the declarations alive.
     """
     import torch
 

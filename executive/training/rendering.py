@@ -43,7 +43,7 @@ def generate_dataset(
         seed: Seed of the random scenes.
         layout: `coco` or `yolo`.
         worker_count: Number of rendering processes.
-        valid_fraction: Fraction of the images in the split `valid`, 0 to 1; the split has the last images.
+        valid_fraction: Fraction of the images in the split `valid`, 0 to 1; these are the last images.
         progress: Called after each block of `BLOCK_SIZE` images.
 
     Raises:

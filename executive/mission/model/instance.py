@@ -23,11 +23,7 @@ BuildChild = Callable[[Node], Child]
 
 
 class ChildPlaceholder(Behaviour):
-    """Behaviour that represents a mission node in a control node made for inspection; never executed.
-
-    Attributes:
-        node: The mission node.
-    """
+    """Behaviour that represents the mission node `node` for checks and the diagnosis; never executed."""
 
     def __init__(self, node: Node) -> None:
         super().__init__(node.path)

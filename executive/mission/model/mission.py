@@ -14,7 +14,7 @@ from executive.mission.source import Span
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of a subtree, and the span of its name; None as default makes the argument mandatory."""
+    """An argument of a subtree, and the position of its name; without default, the argument is mandatory."""
 
     span: Span
     default: Value | None

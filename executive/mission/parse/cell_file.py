@@ -171,7 +171,7 @@ def _merge_entry(entry: YamlEntry, base: YamlMapping) -> YamlEntry:
 
 
 def _merge_detector(detector: YamlNode, base_detector: YamlNode | None) -> YamlNode:
-    """Return a detector with the missing keys of the base's detector, if both have the same kind."""
+    """Return a detector, completed by keys of the base's detector if both detectors have the same kind."""
     if not isinstance(detector, YamlMapping) or not isinstance(base_detector, YamlMapping):
         return detector
     kind, base_kind = detector.get("kind"), base_detector.get("kind")
@@ -180,7 +180,7 @@ def _merge_detector(detector: YamlNode, base_detector: YamlNode | None) -> YamlN
 
 
 def _inherit_entries(mapping: YamlMapping, base: YamlMapping, excluded: tuple[str, ...] = ()) -> YamlMapping:
-    """Return a mapping with its missing entries from the base, except those with a key in `excluded`."""
+    """Return a mapping, completed by entries of the base except those with a key in `excluded`."""
     keys = {*mapping.keys, *excluded}
     base_entries = (entry for entry in base.entries if entry.key.text not in keys)
     return replace(mapping, entries=(*mapping.entries, *base_entries))

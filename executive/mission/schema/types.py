@@ -94,7 +94,7 @@ def make_settings_schema(name: str, skill: type[Skill]) -> Schema:
 
 
 def make_name_schemas(skills: Mapping[str, type[Skill]]) -> list[Schema]:
-    """Return the schemas of the names of skills without required params, which need no mapping."""
+    """Return the schemas of skills that may be written as a name only: they require no params."""
     return [
         {"const": name, "title": name, **_document_skill(skill), **NO_ARRAY_ITEM}
         for name, skill in skills.items()
