@@ -26,7 +26,7 @@ _TYPE_PHRASES = {
 }
 """Description of the expected type, by the type of pydantic's error."""
 _BOOLEAN_BY_WORD = {"yes": "true", "on": "true", "no": "false", "off": "false"}
-"""Spelling in YAML 1.2 of each word that is a boolean in YAML 1.1, but a string in YAML 1.2."""
+"""Boolean of YAML 1.2 for each word that is a boolean in YAML 1.1 only."""
 _NUMBER_WITH_UNIT = re.compile(r"[-+]?[0-9.]+ *[A-Za-z]+")
 _BOUND_PHRASES = {
     "greater_than": ("more than", "gt"),

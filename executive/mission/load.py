@@ -20,7 +20,7 @@ from executive.mission.model.mission import Mission
 from executive.mission.model.node_paths import assign_paths
 from executive.mission.model.nodes import InvalidNode, Node
 from executive.mission.parse.cell_file import CellFile
-from executive.mission.parse.read_mission import MissionFiles, read_mission
+from executive.mission.parse.read_mission import read_mission
 from executive.mission.parse.validate import find_span
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
@@ -92,17 +92,21 @@ def load_mission(
     """
     mission_path, node_classes = find_mission(path), load_control_nodes()
     files = read_mission(mission_path, overrides or {}, skills, node_classes, recorded_cell)
-    mission, config = files.mission, files.cell.config if files.cell else None
-    findings = list(files.findings)
-    cell_kind = _resolve_cell_kind(files, find_cell_kind, findings)
-    classes_by_detector, min_times = {}, None
-    if cell_kind is not None and files.cell is not None:
-        folder = files.cell.path.parent
-        errors = cell_kind.check(config, folder)
-        cell_findings = [files.cell.make_error(keys, "robot", message) for keys, message in errors]
-        findings += cell_findings
-        classes_by_detector = dict(cell_kind.labels(config, folder))
-        min_times = None if cell_findings else cell_kind.min_times(config)
+    mission, cell, findings = files.mission, files.cell, list(files.findings)
+    config = cell.config if cell else None
+    cell_kind, classes_by_detector, min_times = None, {}, None
+    if cell is not None and config is not None and find_cell_kind is not None:
+        try:
+            cell_kind = find_cell_kind(config.kind)
+        except InputError as error:
+            findings.append(cell.make_error(("kind",), "unknown-kind", str(error)))
+        else:
+            folder = cell.path.parent
+            errors = cell_kind.check(config, folder)
+            cell_findings = [cell.make_error(keys, "robot", message) for keys, message in errors]
+            findings += cell_findings
+            classes_by_detector = dict(cell_kind.labels(config, folder))
+            min_times = None if cell_findings else cell_kind.min_times(config)
     expansion = expand(mission, skills)
     tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))
     context = CheckContext(
@@ -110,12 +114,12 @@ def load_mission(
     )
     findings += (*expansion.findings, *run_checks(context))
     has_errors = expansion.tree is None or any(finding.severity == "error" for finding in findings)
-    if config is None or files.cell is None or has_errors:
+    if config is None or cell is None or has_errors:
         raise MissionError(sort_findings(findings, files.source.path))
     if cell_kind is not None:
-        findings += _warn_about_unmeasured_detectors(files.cell)
+        findings += _warn_about_unmeasured_detectors(cell)
     return LoadedMission(
-        mission, tree, config, files.source.text, mission_path, files.cell.path, files.libraries,
+        mission, tree, config, files.source.text, mission_path, cell.path, files.libraries,
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
         dict(overrides or {}),
     )  # fmt: skip
@@ -128,16 +132,3 @@ def _warn_about_unmeasured_detectors(cell: CellFile) -> Iterator[Finding]:
     for keys, message in find_unmeasured_detectors(cell.config, cell.path.parent, folders):
         span = find_span(cell.root, keys, at_key=True) if cell.root else cell.source.make_span()
         yield make_warning(span, "not-measured", message)
-
-
-def _resolve_cell_kind(
-    files: MissionFiles, find_cell_kind: CellKindFinder | None, findings: list[Finding]
-) -> CellKind | None:
-    """Return the kind of the cell, or None; add a finding if the kind is not installed."""
-    if files.cell is None or files.cell.config is None or find_cell_kind is None:
-        return None
-    try:
-        return find_cell_kind(files.cell.config.kind)
-    except InputError as error:
-        findings.append(files.cell.make_error(("kind",), "unknown-kind", str(error)))
-        return None

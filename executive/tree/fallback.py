@@ -61,7 +61,7 @@ class Fallback(ControlNode):
         return min(map(get_min_time, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause for which `child` never runs: an earlier child cannot fail."""
+        """Return a text that explains why `child` never runs: an earlier child cannot fail."""
         del child
         return "an earlier child never fails"
 

@@ -60,6 +60,10 @@ class FlowState:
             tool_states = self.tool_states | other.tool_states
         return FlowState(frozenset.intersection(*known_sets) if known_sets else None, tool_states)
 
+    def may_be_unwritten(self, variable: str) -> bool:
+        """Return True if an execution path to the point does not write a variable."""
+        return self.written_variables is not None and variable not in self.written_variables
+
     def with_variables(self, names: Iterable[str]) -> FlowState:
         """Return the state after a node has written the variables `names`."""
         variables = self.written_variables

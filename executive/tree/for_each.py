@@ -77,20 +77,14 @@ class ForEach(Loop):
         variable = self.in_
         if not isinstance(variable, VariableName):
             return variable
-        if variable not in self.blackboard:
-            raise Fault(
-                f"{self.name}: it reads ${variable}, which no node has written yet; "
-                f"written so far: {', '.join(self.blackboard) or 'nothing'}",
-                self.path,
-            )
-        value = self.blackboard[variable]
-        if not isinstance(value, list | tuple):
-            raise Fault(
-                f"{self.name}: ${variable} holds a {type(value).__name__}, not a list; "
-                "name a variable that holds a list, or write the elements in the mission",
-                self.path,
-            )
-        return tuple(value)
+        value = self.blackboard.get(variable)
+        if isinstance(value, list | tuple):
+            return tuple(value)
+        problem = f"it reads {self.blackboard.describe_missing(variable)}"
+        if variable in self.blackboard:
+            advice = "name a variable that holds a list, or write the elements in the mission"
+            problem = f"${variable} holds a {type(value).__name__}, not a list; {advice}"
+        raise Fault(f"{self.name}: {problem}", self.path)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
         """Return the possible ends; each further iteration starts in the state after success of the body."""
@@ -113,7 +107,7 @@ class ForEach(Loop):
         return 0.0 if isinstance(self.in_, VariableName) else len(self.in_) * get_min_time(self.do)
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause for which the body never runs: the list is empty."""
+        """Return a text that explains why the body never runs: the list is empty."""
         del child
         return "the body runs 0 times"
 

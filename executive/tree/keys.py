@@ -51,13 +51,13 @@ class Key:
         doc: Meaning of the key, one sentence.
         default: Value if the key is missing; `...` for a required key.
         ge, gt: Inclusive and exclusive lower bound of a number, or None.
-        max_key: For a number: key with a list of nodes whose length is the maximum of the number; or "".
+        max_key: For a number: key of a list of nodes; its length is the maximum of the number. Otherwise "".
         max_count: For a list of nodes: maximum number of nodes, or None.
         is_shorthand: True if the key may be omitted and its value written directly under the keyword.
         is_sibling: True if the key is a sibling of the keyword in the mission file: `catch` next to `try`.
         is_in_path: True if the paths of the nodes under the key contain the key.
         raising_key: For a list of reasons: key with the nodes that may fail with the reasons.
-        list_key: For a loop variable: key with the list whose elements the variable holds; or "".
+        list_key: For a loop variable: key of the list of its values; otherwise "".
         name: Name of the key in the mission file.
         attribute: Name of the attribute in the class.
         kind: Kind of the value.

@@ -46,7 +46,7 @@ class NodeContext:
 
 
 class TreeNode(Behaviour):
-    """Base class of control nodes and skill leaves: a py_trees behaviour that `tick_once` ticks.
+    """Base class of control nodes and skill leaves: a py_trees behaviour with a method `tick_once`.
 
     Attributes:
         path: Unique path from the root of the tree.
@@ -150,7 +150,7 @@ class ControlNode(KeyOwner, TreeNode):
         yield from ()
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause for which a child never runs; "" if another finding reports the cause."""
+        """Return a text that explains why a child never runs; "" if another finding explains it."""
         del child
         return ""
 
@@ -172,7 +172,7 @@ class ControlNode(KeyOwner, TreeNode):
     # Methods for the diagnosis.
 
     def explain(self, failure: PropagatedFailure) -> str:
-        """Return the cause for which the node passed a failure on; "" if the node passes on all failures."""
+        """Return a text that explains why the node passed a failure on; "" if it passes on all failures."""
         del failure
         return ""
 
@@ -187,7 +187,7 @@ class ControlNode(KeyOwner, TreeNode):
         yield from ()
 
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
-        """Yield name in reports and node of each child that runs only after a failure or at the end."""
+        """Yield each child that runs only after a failure or at the end, after its name for reports."""
         yield from ()
 
     # Methods that subclasses call.

@@ -100,16 +100,12 @@ class Parallel(ControlNode):
         return Status.RUNNING
 
     def _tick_all(self) -> Status:
-        statuses = {self.tick_child(child) for child in self._running_children}
-        return Status.RUNNING if statuses == {Status.RUNNING} else self._decide()
-
-    def _decide(self) -> Status:
-        """Count the children that ended in the current tick, and return the status of the node."""
-        ended_children = [child for child in self._running_children if child.status is not Status.RUNNING]
-        running_children = [child for child in self._running_children if child.status is Status.RUNNING]
+        """Tick all running children, count the children that end, and return the status of the node."""
+        statuses = [(child, self.tick_child(child)) for child in self._running_children]
+        running_children = [child for child, status in statuses if status is Status.RUNNING]
+        failures = [self.get_failure(child) for child, status in statuses if status is Status.FAILURE]
         self._running_children = running_children
-        failures = [self.get_failure(child) for child in ended_children if child.status is Status.FAILURE]
-        self._missing_successes -= len(ended_children) - len(failures)
+        self._missing_successes -= len(statuses) - len(running_children) - len(failures)
         self._first_failure = self._first_failure or next(iter(failures), None)
         if self._missing_successes <= 0:
             self.halt_children(running_children)

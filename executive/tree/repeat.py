@@ -73,7 +73,7 @@ class Repeat(Loop):
         return 0.0 if self.until else (self.times or 0) * get_min_time(self.do)
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause for which the body never runs: the number of iterations is 0."""
+        """Return a text that explains why the body never runs: the number of iterations is 0."""
         del child
         return "the body runs 0 times"
 

@@ -159,7 +159,7 @@ class Retry(Loop):
             yield NodeFinding("attempts", "unchanging-retry", message, is_warning=True)
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause for which the recovery never runs, or "" if `child` is the body."""
+        """Return a text that explains why the recovery never runs; "" if `child` is the body."""
         if child is not self.recover or (self.on and self.attempts > 1):
             return ""
         return "there is only one attempt" if self.attempts == 1 else "the body never fails"

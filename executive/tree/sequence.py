@@ -52,7 +52,7 @@ class Sequence(ControlNode):
         return sum(map(get_min_time, self.do))
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause for which `child` never runs: an earlier child cannot succeed."""
+        """Return a text that explains why `child` never runs: an earlier child cannot succeed."""
         del child
         return "an earlier child never succeeds"
 

@@ -77,7 +77,9 @@ class SkillLeaf(TreeNode):
             run = self._start() if self._run is None else self._run
             has_succeeded = run.step()
         except SkillFailed as error:
-            self._fail(error)
+            self.failure = Failure(error.reason, error.message, self.skill_name, self.path)
+            self.failure = self.failure.with_label(self.label)
+            self._end(Status.FAILURE, error.reason, error.message)
         except Exception as error:
             message = str(error) if isinstance(error, Fault) else f"{type(error).__name__}: {error}"
             raise self._end_with_fault(message) from error
@@ -117,10 +119,7 @@ class SkillLeaf(TreeNode):
             if variable in self.blackboard:
                 inputs[port] = self.blackboard[variable]
             elif self.skill_type.ports[port].is_required:
-                raise Fault(
-                    f'the input "{port}" reads ${variable}, which no node has written yet; '
-                    f"written so far: {', '.join(self.blackboard) or 'nothing'}"
-                )
+                raise Fault(f'the input "{port}" reads {self.blackboard.describe_missing(variable)}')
         return inputs
 
     def _find_item(self, values: Mapping[str, object]) -> str:
@@ -136,11 +135,6 @@ class SkillLeaf(TreeNode):
         self._item = self._find_item(outputs) or self._item
         json_outputs = {port: to_json_or_type_name(value) for port, value in outputs.items()}
         self._end(Status.SUCCESS, outputs=json_outputs)
-
-    def _fail(self, error: SkillFailed) -> None:
-        failure = Failure(error.reason, error.message, self.skill_name, self.path)
-        self.failure = failure.with_label(self.label)
-        self._end(Status.FAILURE, error.reason, error.message)
 
     def _end_with_fault(self, message: str) -> Fault:
         """End the node, and return the fault, which the caller raises."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 from py_trees.common import Status
 
 from executive.tree.failure import Failure, Reason
-from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
+from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
 from executive.tree.inspection import (
     Advice,
     MinTimeFunction,
@@ -66,19 +66,14 @@ class TryCatch(ControlNode):
             if status is Status.RUNNING:
                 return status
             failure = self.get_failure(child) if status is Status.FAILURE else None
-            if child is self.finally_:
-                return self._end_with(self._pending_failure or failure)
             if failure is not None and child is self.do and (handler := self._find_handler(failure)):
                 self.report_choice("catch", failure)
                 self._current_child = handler
-            elif self.finally_ is not None:
-                self._pending_failure = failure
-                self._current_child = self.finally_
+            elif self.finally_ is not None and child is not self.finally_:
+                self._pending_failure, self._current_child = failure, self.finally_
             else:
-                return self._end_with(failure)
-
-    def _end_with(self, failure: Failure | None) -> Status:
-        return Status.SUCCESS if failure is None else self.fail(failure)
+                failure = self._pending_failure or failure
+                return Status.SUCCESS if failure is None else self.fail(failure)
 
     def _find_handler(self, failure: Failure) -> Child | None:
         return next((handler.do for handler in self.catch if failure.matches(handler.on)), None)
@@ -159,16 +154,11 @@ class TryCatch(ControlNode):
 
 def _append_finally(finally_child: Child, flow: Flow, get_flow: FlowFunction) -> Flow:
     """Return the possible ends of `finally_child`, which runs after each end in `flow`."""
-    success, halted = None, flow.halted
-    failures: dict[PossibleFailure, FlowState] = {}
-    if flow.success is not None:
-        finally_flow = get_flow(finally_child, flow.success)
-        success, halted = finally_flow.success, join_states((halted, finally_flow.halted))
-        failures.update(finally_flow.failures)
+    after_success = get_flow(finally_child, flow.success) if flow.success else Flow(None, {}, None)
+    failures, halted = dict(after_success.failures), join_states((flow.halted, after_success.halted))
     for failure, entry in flow.failures.items():
-        finally_flow = get_flow(finally_child, entry)
-        halted = join_states((halted, finally_flow.halted))
+        after_failure = get_flow(finally_child, entry)
+        halted = join_states((halted, after_failure.halted))
         # The node passes on `failure` after success and failure of `finally`.
-        ends = (finally_flow.success, *finally_flow.failures.values())
-        failures[failure] = join_states(ends) or entry
-    return Flow(success, failures, halted)
+        failures[failure] = join_states((after_failure.success, *after_failure.failures.values())) or entry
+    return Flow(after_success.success, failures, halted)

@@ -70,7 +70,7 @@ class While(Loop):
             yield NodeFinding("", "endless", message, "Use repeat with times or until.")
 
     def explain_unreachable(self, child: Child) -> str:
-        """Return the cause for which the body never runs: the condition cannot succeed."""
+        """Return a text that explains why the body never runs: the condition cannot succeed."""
         del child
         return "the condition never succeeds"
 

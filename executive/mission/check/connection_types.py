@@ -110,7 +110,7 @@ class ElementLoop:
                 yield make_error(span, "port-type", message, f"It is written by {writer.describe(span)}.")
 
     def make_element_writers(self, list_writer: Writer) -> Iterator[Writer]:
-        """Yield the control node as the writer of the elements of the list that `list_writer` writes."""
+        """Yield a writer of the elements of the list that `list_writer` writes: the control node."""
         if list_writer.values is not None:
             literal = self.elements if isinstance(self.elements, Literal) else None
             values = [

@@ -12,9 +12,10 @@ from executive.cell.protocols import MinTimes
 from executive.mission.findings import suggest_choice
 from executive.mission.flow_analysis import FlowAnalysis
 from executive.mission.model.mission import Mission
+from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.values import Reference
-from executive.mission.model.wiring import Wire, find_wires, find_written_variables
+from executive.mission.model.wiring import Wire, find_control_node_inputs, find_wires, find_written_variables
 from executive.mission.source import Span
 from executive.skill import Direction, Skill
 from executive.tree.node_registry import ControlNodes
@@ -28,12 +29,15 @@ class VariableRead(NamedTuple):
         input_name: Name in messages: `Approach.target`, or the keyword of a control node.
         variable: Name of the variable.
         span: Position of the variable; position of the skill if the mission names no variable.
+        is_explicit, is_required: True if the mission names the variable; True if the input has no default.
     """
 
     node: Node
     input_name: str
     variable: str
     span: Span
+    is_explicit: bool
+    is_required: bool
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,15 @@ class CheckContext:
         for node in self.iterate_nodes():
             if isinstance(node, SkillNode) and node.skill in self.skills:
                 yield node, self.skills[node.skill]
+
+    def iterate_reads(self, root: Node) -> Iterator[VariableRead]:
+        """Yield every read of a variable by `root` and the nodes below it."""
+        for node in root.walk():
+            for reference in find_control_node_inputs(node):
+                yield VariableRead(node, get_type_name(node), reference.name, reference.span, True, False)
+            for wire in self.find_wires(node, Direction.IN):
+                flags = wire.is_explicit, wire.port.is_required
+                yield VariableRead(node, str(wire), wire.variable, wire.span, *flags)
 
     @cached_property
     def cell_names_by_kind(self) -> Mapping[str, list[str]]:

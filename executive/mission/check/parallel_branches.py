@@ -11,7 +11,7 @@ from executive.mission.findings import Finding, make_error
 from executive.mission.model.instance import get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
-from executive.mission.model.wiring import find_control_node_inputs, find_control_node_outputs
+from executive.mission.model.wiring import find_control_node_outputs
 from executive.mission.source import Span
 from executive.skill import Direction
 
@@ -72,15 +72,15 @@ def find_read_races(context: CheckContext) -> Iterator[Finding]:
             safe_node = _find_first_leaf(branches[reading_index]) if is_read_first else None
             # `find_shared_variables` reports a variable that both branches write.
             racing_variables = writes[writing_index].keys() - writes[reading_index].keys()
-            for node, input_name, variable, span in reads[reading_index]:
-                if node is not safe_node and variable in racing_variables:
-                    writing_name, write_span, hint = writes[writing_index][variable]
+            for read in reads[reading_index]:
+                if read.node is not safe_node and read.variable in racing_variables:
+                    writing_name, write_span, hint = writes[writing_index][read.variable]
+                    place = write_span.describe_place(read.span.source)
                     message = (
-                        f"{input_name} reads ${variable}, while {writing_name} in "
-                        f"{write_span.describe_place(span.source)} may write it, "
-                        "in another branch of the same parallel"
+                        f"{read.input_name} reads ${read.variable}, while {writing_name} in {place} "
+                        "may write it, in another branch of the same parallel"
                     )
-                    yield make_error(span, "shared-variable", message, hint)
+                    yield make_error(read.span, "shared-variable", message, hint)
 
 
 def _list_concurrent_branches(context: CheckContext) -> Iterator[list[Node]]:
@@ -100,17 +100,10 @@ def _find_first_leaf(node: Node) -> Node:
 
 def _find_reads(context: CheckContext, branch: Node) -> Iterator[VariableRead]:
     """Yield the reads below `branch`, except those that `find_unwritten_inputs` reports."""
-    for node in branch.walk():
-        state = context.flow_analysis.entry_states.get(node.path)
-        if state is None:
-            continue
-        for reference in find_control_node_inputs(node):
-            yield VariableRead(node, get_type_name(node), reference.name, reference.span)
-        for wire in context.find_wires(node, Direction.IN):
-            written_variables = state.written_variables
-            is_written = written_variables is None or wire.variable in written_variables
-            if is_written or not wire.port.is_required:
-                yield VariableRead(node, str(wire), wire.variable, wire.span)
+    for read in context.iterate_reads(branch):
+        state = context.flow_analysis.entry_states.get(read.node.path)
+        if state and not (read.is_required and state.may_be_unwritten(read.variable)):
+            yield read
 
 
 def _find_resource_users(context: CheckContext, branch: Node) -> dict[str, SkillNode]:

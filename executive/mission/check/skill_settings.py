@@ -74,14 +74,11 @@ def _find_unknown_names(
         return
     choices = declaration.choices if isinstance(declaration, Param) else None
     allowed_names = [*context.cell_names_by_kind[declaration.refers_to], *(choices or ())]
-    is_list = isinstance(value.value, list)
     for index, name in enumerate(value.value if isinstance(value.value, list) else [value.value]):
         if isinstance(name, str) and name not in allowed_names:
             message = f'the cell has no {declaration.refers_to} "{name}" for {node.skill}.{declaration.name}'
-            choices_hint = suggest_choice(name, allowed_names, "Allowed names")
-            hint = context.make_variable_hint(name) or choices_hint
-            span = value.get_element_span(index) if is_list else value.span
-            yield make_error(span, f"unknown-{declaration.refers_to}", message, hint)
+            hint = context.make_variable_hint(name) or suggest_choice(name, allowed_names, "Allowed names")
+            yield make_error(value.get_element_span(index), f"unknown-{declaration.refers_to}", message, hint)
 
 
 def find_param_problem(param: Param, value: object) -> tuple[str, str]:

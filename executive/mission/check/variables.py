@@ -9,36 +9,31 @@ from executive.mission.findings import Finding, find_similar_word, make_error, m
 from executive.mission.model.node_paths import get_type_name
 from executive.mission.model.nodes import Node, SubtreeNode
 from executive.mission.model.values import Reference
-from executive.mission.model.wiring import (
-    find_control_node_inputs,
-    find_control_node_outputs,
-    find_wires,
-    find_written_variables,
-)
+from executive.mission.model.wiring import find_control_node_outputs, find_wires, find_written_variables
 from executive.mission.source import Span
-from executive.skill import Direction, Skill
+from executive.skill import Direction
 
 
 def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every input in the mission file that may read an unwritten variable."""
-    for _, input_name, variable, span in _find_unwritten_reads(context, in_libraries=False):
+    for read in _find_unwritten_reads(context, in_libraries=False):
         # In the expanded tree, a local variable of a subtree has the prefix `subtree.`.
-        name_in_file = variable.rpartition(".")[2]
-        if variable in context.written_variables:
+        name_in_file = read.variable.rpartition(".")[2]
+        if read.variable in context.written_variables:
             problem = "is not written on every path to this node"
-            hint = f"It is written by {_describe_writers(context, variable, span)}."
+            hint = f"It is written by {_describe_writers(context, read.variable, read.span)}."
         else:
-            problem, hint = "no node writes", _make_unwritten_hint(context, variable)
-        message = f"{input_name} reads ${name_in_file}, which {problem}"
-        yield make_error(span, "unwritten", message, hint)
+            problem, hint = "no node writes", _make_unwritten_hint(context, read.variable)
+        message = f"{read.input_name} reads ${name_in_file}, which {problem}"
+        yield make_error(read.span, "unwritten", message, hint)
 
 
 def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
     """Yield an error for every use of a library in which inputs may read unwritten variables."""
     inputs_by_use: dict[str, dict[str, str]] = {}
-    for node, input_name, variable, _ in _find_unwritten_reads(context, in_libraries=True):
-        path = context.library_uses_by_path[node.path].path
-        inputs_by_use.setdefault(path, {}).setdefault(variable, input_name)
+    for read in _find_unwritten_reads(context, in_libraries=True):
+        path = context.library_uses_by_path[read.node.path].path
+        inputs_by_use.setdefault(path, {}).setdefault(read.variable, read.input_name)
     uses = {use.path: use for use in context.library_uses_by_path.values()}
     for path, inputs in inputs_by_use.items():
         use = uses[path]
@@ -52,21 +47,18 @@ def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
 
 def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator[VariableRead]:
     """Yield the reads of possibly unwritten variables, either in libraries or in the mission file."""
-    mission_source = context.tree.span.source
-    for read in _iterate_reads(context):
+    mission_source, uses = context.tree.span.source, context.library_uses_by_path
+    for read in context.iterate_reads(context.tree):
         state = context.flow_analysis.entry_states.get(read.node.path)
-        if state is None or state.written_variables is None or read.variable in state.written_variables:
-            continue
-        is_in_library = (
-            read.node.path in context.library_uses_by_path and read.span.source is not mission_source
-        )
-        if is_in_library is in_libraries:
-            yield read
+        if state and state.may_be_unwritten(read.variable) and (read.is_explicit or read.is_required):
+            is_in_library = read.node.path in uses and read.span.source is not mission_source
+            if is_in_library is in_libraries:
+                yield read
 
 
 def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
     """Yield a warning for every variable that the mission names for an output and no node reads."""
-    read_variables = {read.variable for read in _iterate_reads(context, include_implicit=True)}
+    read_variables = {read.variable for read in context.iterate_reads(context.tree)}
     for node in context.tree.walk():
         for _, variable in find_control_node_outputs(node):
             if variable.name not in read_variables | set(context.mission.params):
@@ -131,16 +123,6 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
             yield make_error(span, "unwritten", message, hint)
 
 
-def _iterate_reads(context: CheckContext, include_implicit: bool = False) -> Iterator[VariableRead]:
-    """Yield the reads of the tree; `include_implicit` adds those of optional inputs without a setting."""
-    for node in context.tree.walk():
-        for reference in find_control_node_inputs(node):
-            yield VariableRead(node, get_type_name(node), reference.name, reference.span)
-        for wire in context.find_wires(node, Direction.IN):
-            if include_implicit or wire.port.is_required or wire.is_explicit:
-                yield VariableRead(node, str(wire), wire.variable, wire.span)
-
-
 def _describe_writers(context: CheckContext, variable: str, span: Span) -> str:
     """Return the skills that write a variable: `Grasp in line 3 and Grasp in line 9`."""
     return " and ".join(_list_writers(context, variable, span)) or "a loop, for the nodes in its body only"
@@ -161,8 +143,7 @@ def _suggest_writers(context: CheckContext, variable: str, span: Span) -> str:
     """Return the skills that write a variable in the file of `span`, otherwise all skills that can."""
     all_writers = _list_writers(context, variable, span)
     writers_in_file = [writer for writer in all_writers if " in line " in writer]
-    skills = [name for name, skill in context.skills.items() if _has_output(skill, variable)]
-    return " and ".join(writers_in_file) or ", ".join(skills) or "no skill"
+    return " and ".join(writers_in_file) or _list_skills_with_output(context, variable) or "no skill"
 
 
 def _make_unwritten_hint(context: CheckContext, variable: str) -> str:
@@ -171,15 +152,14 @@ def _make_unwritten_hint(context: CheckContext, variable: str) -> str:
     if local_names:
         subtree = min(name.rpartition(".")[0] for name in local_names)
         return f'The subtree "{subtree}" writes a local variable {variable}: add {variable} to its returns.'
-    skills = [name for name, skill in context.skills.items() if _has_output(skill, variable)]
-    if skills:
-        return f"It is written by: {', '.join(skills)}."
-    # Local variables of subtrees contain a dot.
+    if skills := _list_skills_with_output(context, variable):
+        return f"It is written by: {skills}."
     global_names = sorted(name for name in context.written_variables if "." not in name)
     similar = find_similar_word(variable, global_names)
     names = ", ".join(f"${name}" for name in global_names) or "none"
     return (f'Did you mean "${similar}"? ' if similar else "") + f"Variables that are written: {names}."
 
 
-def _has_output(skill: type[Skill], name: str) -> bool:
-    return name in skill.ports and skill.ports[name].direction is Direction.OUT
+def _list_skills_with_output(context: CheckContext, name: str) -> str:
+    outputs = {skill: context.skills[skill].ports.get(name) for skill in context.skills}
+    return ", ".join(skill for skill, port in outputs.items() if port and port.direction is Direction.OUT)
