@@ -85,7 +85,7 @@ def command(
     )
     results: dict[str, Any] = {}
     # Only a measurement under the conditions of a run predicts the error rates in runs.
-    has_run_conditions = not (weights or varied or scene or threshold) and view == "table"
+    has_run_conditions = threshold is None and view == "table" and not (weights or varied or scene)
     is_stored = bool(cells) and has_run_conditions and (out is not None or not overrides)
     with keep_stdout_clean():
         from executive.campaign import evaluation

@@ -94,6 +94,13 @@ def test_a_cell_with_other_values_is_measured_and_stored_in_a_named_file_only(mi
     assert read_measurements(tmp_path / "o.json")[0].fingerprint["threshold"] == "0.7"
 
 
+def test_a_measurement_with_a_threshold_of_zero_is_not_stored(tmp_path):
+    stored = tmp_path / "overhead.measured.json"
+    options = ("--cell", "overhead", "--images", 1, "--workers", 1, "--out", stored)
+    evaluate(*options, "--threshold", 0)
+    assert not stored.exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -98,7 +98,7 @@ class FaultCampaignResults:
 
     Attributes:
         mission: Name of the mission.
-        cell: Kind of the cell, and source of the detections, as text.
+        cell_description: Kind of the cell, and source of the detections, as text.
         seed: Seed of the random numbers.
         robot_time: Duration of a run without faults on its clock [s].
         fault_count: Number of single faults that can be injected into the mission.
@@ -109,7 +109,7 @@ class FaultCampaignResults:
     """
 
     mission: str
-    cell: str
+    cell_description: str
     seed: int
     robot_time: float
     fault_count: int
@@ -132,7 +132,7 @@ class FaultCampaignResults:
 def results_to_json(results: FaultCampaignResults) -> dict[str, object]:
     """Return the results of a campaign as JSON values by key; times are in s."""
     return {
-        "mission": results.mission, "cell": results.cell, "seed": results.seed,
+        "mission": results.mission, "cell": results.cell_description, "seed": results.seed,
         "listed": results.fault_count, "pairs": results.has_pairs, "complete": results.is_complete,
         "robot_time_s": results.robot_time, "runs": len(results.trials), "failed": len(results.failed_trials),
         "branches": [
@@ -170,8 +170,8 @@ def _list_result_lines(results: FaultCampaignResults) -> Iterator[str]:
     trials = results.trials
     faults_text = "pairs of faults" if results.has_pairs else "faults"
     yield (
-        f"{results.mission} ({results.cell}), seed {results.seed}: {len(trials)} runs with {faults_text}; "
-        f"a run without faults takes {results.robot_time:.1f} s"
+        f"{results.mission} ({results.cell_description}), seed {results.seed}: {len(trials)} runs with "
+        f"{faults_text}; a run without faults takes {results.robot_time:.1f} s"
     )
     if not results.is_complete:
         yield "  ended by the user before the last run"

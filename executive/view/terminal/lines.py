@@ -35,7 +35,7 @@ class LineView:
         self._skill_names_by_path = find_skill_names(nodes)
 
     def __call__(self, timed: events.TimedEvent) -> None:
-        """Write the line about an event, if the event has a line."""
+        """Write a line about an event if `_describe_event` returns a text."""
         if text := self._describe_event(timed.event):
             self._stream.write(f"{timed.clock:9.2f} s  {text}\n")
             self._stream.flush()
@@ -49,7 +49,7 @@ class LineView:
         self._stream.write(f"note: {message}\n")
 
     def _describe_event(self, event: events.Event) -> str:
-        """Return the text about an event; "" if the event has no line."""
+        """Return the text about an event; "" for events that this view does not show."""
         match event:
             case events.RunStarted():
                 return f"{event.mission} starts, seed {event.seed}"
