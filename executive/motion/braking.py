@@ -27,7 +27,7 @@ _ROUNDING_ERROR = 1e-9  # fraction of a control period
 _BRAKING_TIMES = np.geomspace(MIN_BRAKING_TIME, MAX_BRAKING_TIME, 18)
 """Candidates for the time from full speed to rest, the shortest first [s]."""
 _RAMP_FRACTIONS = (1 / 2, 1 / 3)
-"""Candidates for the duration of each of the two ramps of the deceleration, per braking time."""
+"""Candidates for the duration of each ramp of the deceleration, as fractions of the braking time."""
 
 
 class _BrakingProfile(NamedTuple):

@@ -76,7 +76,7 @@ class MotionSearch:
             self._discs = self._discs._replace(min_cosine=-1.0)
         self._payload = PayloadLimit(task.load, kinematics) if task.load else None
         start_tcp_and_axis = kinematics.compute_tcps_and_axes(start[None])
-        tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, self._find_free_end(), strict=True))
+        tcps, axes = map(np.concatenate, zip(start_tcp_and_axis, self._locate_free_part_end(), strict=True))
         self._clearance = ClearanceModel(config, task.obstacles, tcps[:, :2])
         self._clearance.relax_end_margins(tcps, axes, self._discs)
         # Results of `_plan_rise` by its arguments, because all candidates share them.
@@ -102,7 +102,7 @@ class MotionSearch:
         """
         self._clearance.require_clearance(*self._kinematics.compute_tcps_and_axes(qs), self._discs)
 
-    def _find_free_end(self) -> tuple[Array, Array]:
+    def _locate_free_part_end(self) -> tuple[Array, Array]:
         """Return tool centre point [m] and tool axis, `(1, 3)` each, at the end of the free part."""
         if not isinstance(self._end, Goal):
             return self._kinematics.compute_tcps_and_axes(self._end[None])

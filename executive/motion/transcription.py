@@ -147,19 +147,19 @@ class Transcription:
         return self._solve(step, program, np.empty((0, inner_count + 2)), np.empty(0))
 
     def shorten(
-        self, last: DiscreteMotion, constraints: Sequence[LinearizedConstraints], trust_radius: float
+        self, last_motion: DiscreteMotion, constraints: Sequence[LinearizedConstraints], trust_radius: float
     ) -> DiscreteMotion | None:
         """Return the fastest motion near the last motion, with small violations; None without a solution.
 
         Args:
-            last: Motion about which the constraints are linearized.
+            last_motion: Motion about which the constraints are linearized.
             constraints: Groups of constraints; a violation has the cost `VIOLATION_COST`.
             trust_radius: Maximum change of an acceleration as a fraction of its limit.
         """
-        step, start, inner_count = last.step, self._start, self._inner_count
+        step, start, inner_count = last_motion.step, self._start, self._inner_count
         program = self._build_program(step)
         program.gradient[inner_count:] = STEP_COUNT * step, VIOLATION_COST * _VIOLATION_UNIT
-        last_values = (last.accelerations[:, 1:-1] / self._max_acceleration[:, None]).ravel()
+        last_values = (last_motion.accelerations[:, 1:-1] / self._max_acceleration[:, None]).ravel()
         program.lower[:inner_count] = last_values - trust_radius
         program.upper[:inner_count] = last_values + trust_radius
         end_accelerations = np.stack([start.qdd, self._end.qdd])
@@ -175,7 +175,7 @@ class Transcription:
             rows[:, inner_count] = -linear - 2 * step * quadratic - group.step_derivatives
             rows[:, inner_count + 1] = -1.0
             row_groups.append(rows)
-            offset = np.einsum("rkj,rkj->r", gradients, start.q - last.qs[group.samples])
+            offset = np.einsum("rkj,rkj->r", gradients, start.q - last_motion.qs[group.samples])
             slack = group.slack - EXTRA_DISTANCE + offset
             row_uppers.append(slack - step**2 * quadratic - step * group.step_derivatives)
         return self._solve(step, program, np.concatenate(row_groups), np.concatenate(row_uppers))

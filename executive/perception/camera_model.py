@@ -41,14 +41,13 @@ def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) 
     Raises:
         ValueError: The arguments do not determine a pose.
     """
-    origin = np.asarray(position, dtype=float)
+    origin, upward = np.asarray(position, dtype=float), np.asarray(up, dtype=float)
     axis = np.asarray(target, dtype=float) - origin
-    right = np.cross(axis, np.asarray(up, dtype=float))
+    right = np.cross(axis, upward)
     if np.linalg.norm(right) < 1e-9:
         raise ValueError(
-            f"a camera at {origin.tolist()} with axis {axis.tolist()} cannot have "
-            f"{np.asarray(up, dtype=float).tolist()} as its upward direction: "
-            "look_at must differ from position, and up must not be parallel to the axis"
+            f"a camera at {origin.tolist()} with axis {axis.tolist()} cannot have {upward.tolist()} as "
+            "its upward direction: look_at must differ from position, and up must not be parallel to the axis"
         )
     z = axis / np.linalg.norm(axis)
     x = right / np.linalg.norm(right)

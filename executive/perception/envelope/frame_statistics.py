@@ -78,7 +78,7 @@ def compute_frame_statistics(frame: Frame, table: TableConfig) -> FrameStatistic
     colours = cv2.blur(frame.image, (3, 3))[mask].astype(float)
     grey = colours.mean(axis=1)
     brightness = float(np.median(grey))
-    red, green, blue = (float(value) for value in np.median(colours, axis=0))
+    red, green, blue = np.median(colours, axis=0).tolist()
     return FrameStatistics(brightness, float(np.median(np.abs(grey - brightness))), red, green, blue)
 
 
