@@ -133,8 +133,7 @@ class SkillLeaf(TreeNode):
         outputs = {port: port_values[port] for port in self.wiring.outputs}
         self.blackboard.update({self.wiring.outputs[port]: value for port, value in outputs.items()})
         self._item = self._find_item(outputs) or self._item
-        json_outputs = {port: to_json_or_type_name(value) for port, value in outputs.items()}
-        self._end(Status.SUCCESS, outputs=json_outputs)
+        self._end(Status.SUCCESS, outputs={port: to_json_or_type_name(outputs[port]) for port in outputs})
 
     def _end_with_fault(self, message: str) -> Fault:
         """End the node, and return the fault, which the caller raises."""
