@@ -12,7 +12,7 @@ from statistics import median_low
 from executive.cell.detection import Detections
 from executive.ledger.belief import MIN_LOG_ODDS_OF_PROOF, Belief
 from executive.ledger.bin_contents import BinContents, BinNames
-from executive.ledger.item import State
+from executive.ledger.item import ItemRecord, State
 
 
 class BinRecovery:
@@ -41,13 +41,16 @@ class BinRecovery:
         The item is a dropped, untracked item of the same class, or else a new item. The item is placed if the
         bin is permitted for the class, and rejected otherwise. `change_count` is `Ledger.change_count`.
         """
+        found_items: list[ItemRecord] = []
         for label, bin_name in self._find_unknown_objects():
-            dropped_items = self._records.filter_by_state(State.DROPPED)
-            record = next((item for item in dropped_items if item.is_untracked and item.label == label), None)
+            lost_items = [item for item in self._records.filter_by_state(State.DROPPED) if item.is_untracked]
+            same_class = (item for item in lost_items if item.label == label and item not in found_items)
+            record = next(same_class, None)
             if record is None:
                 belief = Belief(label, MIN_LOG_ODDS_OF_PROOF, is_proved=True)
                 position = self._bins.bins[bin_name].position
                 record = self._records.add(belief, position, change_count, 0.0, has_appeared=True)
+            found_items.append(record)
             if bin_name in self._bins.routes.get(label, ()):
                 record.reason = "found in the bin when the run was resumed"
                 self._records.set_placed(record, bin_name)
