@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 from executive.events import (
@@ -106,7 +107,7 @@ class InputLog:
         assert self.start_event is not None, "the journal of a replayed run contains its start"
         return self.start_event.step
 
-    @property
+    @cached_property
     def last_tick(self) -> int:
         """Number of the last control step with an event."""
         return max((timed.tick for timed in self.events), default=0)
