@@ -10,7 +10,8 @@ from typing import Any
 
 from executive.campaign.pool import run_jobs
 from executive.errors import ExecutiveError
-from executive.record.result import Audit, Result
+from executive.record.audit_comparison import Audit
+from executive.record.result import Result
 
 
 @dataclass(frozen=True)

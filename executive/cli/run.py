@@ -68,7 +68,7 @@ def command(
         from executive.record.diagnosis.diagnosis_text import format_diagnosis
         from executive.record.guarded_view import GuardedView
         from executive.record.recorded_run import RecordOptions
-        from executive.record.result import describe_disagreement, find_exit_code
+        from executive.record.result import find_exit_code
         from executive.record.run_directory import RunDirectory
         from executive.run.assembly import RunOptions
         from executive.view.live.page import LivePage
@@ -110,9 +110,12 @@ def command(
         elif result.diagnosis is not None:
             lines = format_diagnosis(result.diagnosis, result.run, repeat_command, report)
             click.echo("\n".join(lines), err=True)
-        elif result.status == "INCOMPLETE" or describe_disagreement(result):
+        elif result.status == "INCOMPLETE" or result.disagreement:
             end_description = describe_end(result.status, result.reason, result.node, result.message)
-            click.echo("\n".join(filter(None, (describe_disagreement(result), end_description))), err=True)
+            click.echo(
+                "\n".join(filter(None, (result.disagreement, end_description))),
+                err=True,
+            )
     if as_json:
         print_json(to_json(result))
     ctx.exit(find_exit_code(result))

@@ -8,7 +8,7 @@ from executive.cell.arm import Arm, Goal, Motion, Task
 from executive.cell.objects import Item, Load
 from executive.cell.protocols import Cell, Steps
 from executive.errors import Blocked, Unreachable
-from executive.manipulation.drops import detect_and_record_drop
+from executive.manipulation.drop_detection import detect_and_record_drop
 from executive.manipulation.obstacles import list_obstacles
 from executive.skill import Skill, SkillFailed
 

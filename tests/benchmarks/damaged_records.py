@@ -25,7 +25,7 @@ from executive.events import NodeEnded, RunResumed, TimedEvent
 from executive.record.journal import read_journal
 from executive.record.recorded_run import RecordOptions, record_run
 from executive.record.replayed_run import replay_and_compare, replay_run
-from executive.record.result import Result, describe_disagreement
+from executive.record.result import Result
 from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, RunDirectory, find_run
 from executive.replay.input_log import InputLog
@@ -257,7 +257,11 @@ def _resume(subject: MissionUnderTest, path: Path, case: str) -> Figures:
         problems = find_wrong_claims(result)
         if difference := replay_and_compare(subject.loaded, subject.skills, after, result.seed).difference:
             problems.append(f"the replay differs: {difference}")
-        return {"agrees": not describe_disagreement(result), "status": result.status, "problems": problems}
+        return {
+            "agrees": not result.disagreement,
+            "status": result.status,
+            "problems": problems,
+        }
 
     figures, problem = ForkRunner(RESUME_TIMEOUT).call(resume)
     if not (figures and figures["problems"]) and not problem:
@@ -274,7 +278,7 @@ def find_wrong_claims(result: Result) -> list[str]:
     ending = f"{result.status} {result.reason}: {result.message}"
     if result.status == "FAULT":
         return [f"it ended with {ending}"]
-    if not describe_disagreement(result) or result.audit is None:
+    if not result.disagreement or result.audit is None:
         return []
     is_named = result.status == "INCOMPLETE" and "-" in result.message
     if is_named and result.items.placed <= result.audit.right:

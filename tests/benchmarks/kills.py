@@ -28,7 +28,7 @@ from executive.record.journal import find_run_end, read_journal
 from executive.record.recorded_mission import read_mission_of_run
 from executive.record.recorded_run import RecordOptions
 from executive.record.replayed_run import replay_and_compare
-from executive.record.result import Result, describe_disagreement
+from executive.record.result import Result
 from executive.record.resume import resume_run
 from executive.record.run_directory import LATEST_LINK, find_run
 from executive.replay.input_log import InputLog
@@ -186,7 +186,7 @@ def is_on_table(position: Array, table: TableConfig) -> bool:
 def check_result(result: Result, *, change_made: str) -> list[str]:
     """Return what is wrong with the end of a resumed run; only a removed or dropped object may be lost."""
     problems = []
-    if describe_disagreement(result):
+    if result.disagreement:
         problems.append(f"the ledger says {result.items}; the audit {result.audit}")
     may_lose = change_made.startswith(("removed", "dropped"))
     if result.status != "SUCCESS" and not (may_lose and result.reason == "lost"):

@@ -26,7 +26,6 @@ from executive.cli.options import json_option, mission_argument, oracle_option, 
 from executive.cli.streams import keep_stdout_clean, print_json
 from executive.errors import ExecutiveError, InputError
 from executive.record.recorded_run import RecordOptions, record_run
-from executive.record.result import describe_disagreement
 from executive.run.assembly import RunOptions
 
 Figures = dict[str, Any]
@@ -92,7 +91,7 @@ def record_subject(subject: MissionUnderTest, seed: int, runs: Path) -> tuple[Fi
     result = record_run(subject.loaded, subject.skills, options, runs, RecordOptions(saves_pictures=False))
     if result.status == "HALTED":
         raise KeyboardInterrupt
-    if result.status == "SUCCESS" and not describe_disagreement(result):
+    if result.status == "SUCCESS" and not result.disagreement:
         return to_json(result), ""
     return to_json(result), (
         f"seed {seed} ended with {result.status} {result.reason}; the ledger says {result.items}, "

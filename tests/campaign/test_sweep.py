@@ -21,7 +21,8 @@ from executive.campaign.sweep import (
     summarize_values,
 )
 from executive.errors import InputError
-from executive.record.result import Audit, ItemCounts, Result
+from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.result import Result
 from executive.record.timeline.timeline import PlanningTotals
 
 

@@ -9,16 +9,8 @@ import pytest
 
 from executive.cell.json_values import to_json
 from executive.errors import ExecutiveError
-from executive.record.result import (
-    Audit,
-    ItemCounts,
-    Result,
-    describe_disagreement,
-    find_exit_code,
-    list_requests,
-    read_result,
-    write_result,
-)
+from executive.record.audit_comparison import Audit, ItemCounts
+from executive.record.result import Result, find_exit_code, list_requests, read_result, write_result
 from executive.record.run_directory import RunDirectory
 from executive.record.timeline.timeline import Timeline
 
@@ -80,8 +72,8 @@ def test_a_disk_that_does_not_take_it_is_a_sentence(tmp_path):
 )
 def test_every_disagreement_of_ledger_and_audit_is_noticed(audit, ended, warning):
     made = result(audit=None if audit is None else AUDIT | audit, **ended)
-    assert warning in describe_disagreement(made)
-    assert bool(describe_disagreement(made)) == bool(warning)
+    assert warning in made.disagreement
+    assert bool(made.disagreement) == bool(warning)
     assert find_exit_code(made) == (1 if warning else 0)
 
 

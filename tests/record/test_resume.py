@@ -76,7 +76,7 @@ def run_of(loaded: LoadedMission, runs: Path, **options: Any) -> Result:
     """Run a mission on the fake cell, asking for every class four times."""
     skills, views = options.pop("skills", load_skills()), options.pop("views", ())
     frames = options.pop("frames", False)
-    run = RunOptions(SEED, [*loaded.routes] * 4, **{"kind": FakeCell, **options})
+    run = RunOptions(SEED, [*loaded.routes] * 4, **{"make_cell": FakeCell, **options})
     return record_run(loaded, skills, run, runs, RecordOptions(views, saves_pictures=frames))
 
 
@@ -89,7 +89,7 @@ def cut_off(loaded: LoadedMission, runs: Path, tick: int, nth: int = 1) -> Path:
 
 def resumed(path: Path, **options: Any) -> Result:
     skills, views = options.pop("skills", load_skills()), options.pop("views", ())
-    run = RunOptions(SEED, **{"kind": FakeCell, **options})
+    run = RunOptions(SEED, **{"make_cell": FakeCell, **options})
     return resume_run(path, skills, run, RecordOptions(views, saves_pictures=False))
 
 
@@ -150,10 +150,10 @@ def test_the_world_of_a_scene_is_rebuilt(missions: Path, tmp_path: Path) -> None
     loaded, scene = load(missions, "sort_overhead"), tmp_path / "scene.yaml"
     scene.write_text("scene: two objects\ntable: {objects: [2, 2]}\nunknown: {count: [1, 1], scale: 0.4}\n")
     with pytest.raises(Cut):
-        run_of(loaded, tmp_path, kind=make_oracle_kind(), scene=scene, views=[Cutter(600)])
+        run_of(loaded, tmp_path, make_cell=make_oracle_kind(), scene=scene, views=[Cutter(600)])
     # What happens to the file afterwards is nothing to the run.
     scene.unlink()
-    result = resumed(find_run("latest", tmp_path), kind=make_oracle_kind())
+    result = resumed(find_run("latest", tmp_path), make_cell=make_oracle_kind())
     assert (result.status, result.audit.right, result.audit.agrees) == ("SUCCESS", 2, True)
 
 
@@ -347,13 +347,13 @@ def unwilling(lets_go: bool) -> Any:
 
 def test_what_was_rejected_is_tried_again(missions: Path, tmp_path: Path) -> None:
     loaded = load_mission(missions / "sort_overhead.yaml", load_skills(), {"attempts": "1"})
-    first = run_of(loaded, tmp_path, kind=unwilling(lets_go=False))
+    first = run_of(loaded, tmp_path, make_cell=unwilling(lets_go=False))
     assert (first.status, first.items.placed, first.items.rejected) == ("INCOMPLETE", 5, 1)
     path = Path(first.run)
-    again = resumed(path, kind=unwilling(lets_go=False))
+    again = resumed(path, make_cell=unwilling(lets_go=False))
     assert (again.status, again.items.placed, again.items.rejected) == ("INCOMPLETE", 5, 1)
     assert redecided(path) == ""
-    result = resumed(path, kind=unwilling(lets_go=True))
+    result = resumed(path, make_cell=unwilling(lets_go=True))
     assert (result.status, result.items.placed, result.items.seen) == ("SUCCESS", 6, 6)
     assert result.audit.agrees
     assert set(placed(path).values()) == {1}
@@ -369,7 +369,7 @@ def test_a_camera_that_was_moved_before_a_run_is_resumed_ends_it(missions: Path,
             self.camera.displacement_message = "camera overhead is not where the cell file says"
 
     path = cut_off(load(missions, "sort_overhead"), tmp_path, 1200)
-    result = resumed(path, kind=Moved)
+    result = resumed(path, make_cell=Moved)
     assert (result.status, result.reason) == ("FAILURE", "Detect.camera_moved")
     assert result.items.placed < result.items.seen
     assert redecided(path) == ""

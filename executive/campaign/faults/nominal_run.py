@@ -11,7 +11,7 @@ from executive.campaign.faults.trial_checks import format_counts
 from executive.campaign.mission_under_test import MissionUnderTest
 from executive.errors import InputError
 from executive.events import NodeEnded, NodeStarted, TimedEvent
-from executive.record.result import is_confirmed_by_audit
+from executive.record.audit_comparison import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 
 MIN_TIMEOUT = 60.0

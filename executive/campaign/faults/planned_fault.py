@@ -8,7 +8,7 @@ from typing import Literal
 
 from executive.cell.protocols import Cell, Steps
 from executive.events import NodeEnded
-from executive.manipulation.drops import detect_and_record_drop
+from executive.manipulation.drop_detection import detect_and_record_drop
 from executive.skill import EMPTY, Skill
 from executive.testing.faults.script import ScheduledFault
 from executive.testing.substitutes import make_raising, make_raising_when_halted, make_substitute

@@ -15,7 +15,6 @@ from executive.perception.evidence import describe_unknown_labels
 from executive.record.atomic_file import write_atomically
 from executive.record.diagnosis.diagnosis_text import list_labelled_sentences
 from executive.record.pictures.palette import PALETTE
-from executive.record.result import describe_disagreement
 from executive.record.run_directory import RunDirectory, convert_os_errors
 from executive.record.timeline.activation import find_last_failure, format_counts, group_by_node
 from executive.view.report.activity_times import LOOK, RETRY, WAITING
@@ -64,7 +63,7 @@ def render_report(data: ReportData) -> str:
     last_picture_file = "" if diagnosis is None else diagnosis.picture
     # A reason that repeats the status, such as "fault", is omitted.
     reason = "" if data.end is None or data.end.reason.upper() == data.status else data.end.reason
-    warning = "" if result is None else describe_disagreement(result)
+    warning = "" if result is None else result.disagreement
     return render_template(
         "report/report.html",
         data=data,

@@ -10,7 +10,7 @@ from pathlib import Path
 from executive.events import ItemChanged
 from executive.perception.evidence import describe_unknown_labels
 from executive.record.diagnosis.diagnosis_text import format_diagnosis, make_resume_command, wrap_lines
-from executive.record.result import Result, describe_disagreement
+from executive.record.result import Result
 
 
 def format_repeat_command(
@@ -53,7 +53,7 @@ def format_summary(
     if labels_text := describe_unknown_labels(result.unknown_labels):
         outcomes.append(f"  {labels_text}")
     outcomes += [f"  detector error rates are assumed: {reason}" for reason in result.assumption_reasons]
-    warning = wrap_lines(describe_disagreement(result), "", "  ", max_lines=3)
+    warning = wrap_lines(result.disagreement, "", "  ", max_lines=3)
     if result.diagnosis is not None:
         diagnosis = format_diagnosis(result.diagnosis, result.run, repeat_command, report_file)
         lines = [times, *outcomes, "", *diagnosis]

@@ -8,7 +8,11 @@ from at_hand import look, pick
 
 from executive.cells.fake.cell import FakeCell
 from executive.geometry import GRAVITY
-from executive.manipulation.drops import MAX_PREDICTABLE_SPEED, detect_and_record_drop, predict_landing
+from executive.manipulation.drop_detection import (
+    MAX_PREDICTABLE_SPEED,
+    detect_and_record_drop,
+    predict_landing,
+)
 from executive.testing.run_skill import run_skill
 from skills.transit import Transit
 
