@@ -79,7 +79,8 @@ def add_result(frame: Image.Image, result: Result | RunEnded | None) -> Image.Im
     lines = [*message_lines, *style.wrap_text(counts, _RESULT_FONT_SIZE, max_text_width, 2)]
     height = 2 * _RESULT_PADDING + _STATUS_FONT_SIZE + _RESULT_LINE_HEIGHT * len(lines) + (10 if lines else 0)
     font, status_font = style.load_font(_RESULT_FONT_SIZE), style.load_font(_STATUS_FONT_SIZE)
-    width = max(status_font.getlength(status), *map(font.getlength, lines)) + 2 * _RESULT_PADDING
+    text_widths = [status_font.getlength(status), *map(font.getlength, lines)]
+    width = max(text_widths) + 2 * _RESULT_PADDING
     left, top = SCENE_SIZE[0] - width - _MARGIN, SCENE_SIZE[1] - height - _MARGIN
     text_left = left + _RESULT_PADDING
     colour = _RESULT_COLOURS.get(status, RUNNING)

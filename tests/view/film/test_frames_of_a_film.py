@@ -11,6 +11,7 @@ from events import item_changed, run_ended, run_started
 from PIL import Image, ImageColor
 from small_tree import NODES, ended, node, started
 
+from executive.events import RunEnded
 from executive.record.audit_comparison import ItemCounts
 from executive.record.result import Result
 from executive.view.film.film import select_steps
@@ -146,6 +147,12 @@ def test_the_end_stands_on_the_picture_and_leaves_the_page_as_it_was() -> None:
     assert (bottom, right) == (700, 780)
     assert (top, left) == (472, 168)
     assert shown.getpixel((700, 690)) == ImageColor.getrgb(BACKGROUND)
+
+
+def test_a_success_without_a_result_file_shows_only_its_status() -> None:
+    page = Image.new("RGB", (1280, 720), "#808080")
+    shown = add_result(page, RunEnded("SUCCESS", "", "", "", True, "", 100, 0.5))
+    assert shown.tobytes() != page.tobytes()
 
 
 @pytest.mark.parametrize(
