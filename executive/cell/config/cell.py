@@ -17,17 +17,17 @@ class LedgerConfig(Section):
     """Thresholds of the ledger."""
 
     gate: Length = 0.025
-    """Maximum distance between a detection and the item to which it is assigned [m]; twice the value if the
-    positions are very uncertain."""
+    """Maximum distance between a detection and the item to which it is assigned [m]. The ledger increases
+    this distance up to twice the value if the positions are uncertain."""
     neighbourhood: Distance = 0.07
     """Radius around a picked item within which other items may have been moved [m]."""
     max_miss_probability: float = Field(0.001, ge=1e-9, lt=1)
     """Maximum probability of a missed object at a position that is assumed to be empty."""
     max_class_error: float = Field(0.005, ge=1e-9, lt=1)
-    """Maximum probability of a wrong class at which an item is sorted."""
+    """Maximum probability that the class of an item that is sorted is wrong."""
     max_position_std: Length = 0.005
-    """Maximum standard error of the position at which an item is picked [m]; two thirds of the value after
-    a failed grasp."""
+    """Maximum standard deviation of the position of an item that may be picked [m]. After a failed grasp, the
+    limit is two thirds of this value."""
 
 
 class DetectorConfig(Section):
@@ -38,14 +38,14 @@ class DetectorConfig(Section):
     kind: str
     """Kind of detector: the name of an entry point of the group `executive.detectors`."""
     threshold: float = Field(0.5, gt=0, lt=1)
-    """Confidence below which a detection is doubtful, 0 to 1."""
+    """Minimum confidence of a detection that confirms an item, 0 to 1; below, more looks are needed."""
     floor: float = Field(0.25, gt=0, lt=1)
     """Minimum confidence of a detection; detections with a lower confidence are discarded."""
     latency: Seconds = 0.05
     """Time from the frame to the answer, on the clock of the run [s]."""
     miss_rate: float = Field(0.03, gt=0, lt=1)
-    """Fraction of the completely visible objects that a fake detector misses in a frame. For other kinds of
-    detectors, measurements replace `miss_rate`, `confusion_rate`, `false_detections` and `jitter`."""
+    """Fraction of the completely visible objects that a fake detector misses in a frame. For other kinds,
+    `executive evaluate` measures `miss_rate`, `confusion_rate`, `false_detections` and `jitter` instead."""
     confusion_rate: float = Field(0.004, gt=0, lt=1)
     """Fraction of the detected objects that get a wrong class."""
     false_detections: float = Field(0.02, gt=0, le=100)
