@@ -1,10 +1,10 @@
-"""Simulated work cell in PyBullet. The import of pybullet prints no greeting on stderr."""
+"""Simulated work cell in PyBullet. The import of pybullet prints no banner on stderr."""
 
 import os
 from importlib import import_module
 
 
-def _import_without_greeting() -> None:
+def _import_without_banner() -> None:
     try:
         saved_stderr = os.dup(2)
     except OSError:  # stderr is closed: nothing can be written to it
@@ -20,4 +20,4 @@ def _import_without_greeting() -> None:
         os.close(null_device)
 
 
-_import_without_greeting()
+_import_without_banner()

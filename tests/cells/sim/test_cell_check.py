@@ -97,7 +97,7 @@ def test_a_check_loads_no_model_and_none_of_what_runs_one(missions: Path) -> Non
     )
     arguments = [sys.executable, "-c", program, str(missions / "cells" / "overhead.yaml")]
     done = subprocess.run(arguments, capture_output=True, text=True, check=True)
-    assert done.stderr.splitlines() == ["loaded:"], "pybullet's greeting is not among it"
+    assert done.stderr.splitlines() == ["loaded:"], "pybullet's banner is not among it"
 
 
 def test_a_pose_too_near_to_something_is_named_with_the_distance(overhead: CellConfig) -> None:
