@@ -28,7 +28,7 @@ HALT_KEY = "halt"
 
 
 class FlowAnalysis:
-    """Possible states and ends of every node of a tree.
+    """Possible entry states and ends (success, failures, halt) of every node of a tree.
 
     Args:
         tree: Expanded tree with paths.
@@ -37,7 +37,7 @@ class FlowAnalysis:
     Attributes:
         nodes: Every node by its path.
         entry_states: Join of the states in which a node may start, by path; without unreachable nodes.
-        flows: Possible ends of a node with the states after them, for the last analysed entry state, by path.
+        flows: Possible ends of each node, for the entry state that was analysed last, by path.
         body_end_states: Join of the states after success of the body of a `use`, by path of the `use`.
         root_flow: Possible ends of the whole tree.
     """
@@ -52,8 +52,8 @@ class FlowAnalysis:
         self._instances: dict[str, ControlNode] = {}
         self.root_flow = self._analyse(tree, INITIAL_STATE)
 
-    def find_skill(self, name: str) -> type[Skill] | None:
-        """Return the skill with a name, otherwise the skill with the most similar name, or None."""
+    def find_skill_or_most_similar(self, name: str) -> type[Skill] | None:
+        """Return the skill `name`; for a typo, the most similar skill, to avoid further findings; or None."""
         known_name = name if name in self._skills else find_similar_word(name, self._skills)
         return self._skills[known_name] if known_name else None
 
@@ -84,7 +84,7 @@ class FlowAnalysis:
         return self._analyse(get_mission_node(child), state)
 
     def _compute_skill_flow(self, node: SkillNode, state: FlowState) -> Flow:
-        skill = self.find_skill(node.skill)
+        skill = self.find_skill_or_most_similar(node.skill)
         if skill is None:
             return make_unknown_flow(node.skill, node.path)
         precondition, postcondition = skill.tool_state

@@ -136,7 +136,7 @@ def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iter
     port = wire.port
     port_type = f"the name of {_add_article(port.refers_to)}" if port.refers_to else describe_type(port.type)
     for value, span in writer.values or ():
-        names = context.cell_names_by_kind.get(port.refers_to)
+        names = context.names_in_cell_by_kind.get(port.refers_to)
         if find_input_problem(value, port):
             message = f"{wire} takes {port_type}, but ${wire.variable} gets {describe_value(value)} here"
             hint = f"{wire} reads ${wire.variable} in {wire.span.describe_place(span.source)}."

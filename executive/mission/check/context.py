@@ -29,7 +29,8 @@ class VariableRead(NamedTuple):
         input_name: Name in messages: `Approach.target`, or the keyword of a control node.
         variable: Name of the variable.
         span: Position of the variable; position of the skill if the mission names no variable.
-        is_explicit, is_required: True if the mission names the variable; True if the input has no default.
+        is_explicit: True if the mission names the variable.
+        is_required: True if the input has no default.
     """
 
     node: Node
@@ -99,7 +100,7 @@ class CheckContext:
                 yield VariableRead(node, str(wire), wire.variable, wire.span, *flags)
 
     @cached_property
-    def cell_names_by_kind(self) -> Mapping[str, list[str]]:
+    def names_in_cell_by_kind(self) -> Mapping[str, list[str]]:
         """Names of the bins, detectors, poses and classes of the cell, by kind; empty if `cell` is None."""
         if self.cell is None:
             return {}
@@ -112,7 +113,7 @@ class CheckContext:
 
     @cached_property
     def library_uses_by_path(self) -> Mapping[str, SubtreeNode]:
-        """For each node of a library, by path, the `use` in the mission file that includes the node."""
+        """By path of each node of a library: the `use` node of the mission file that includes the library."""
         uses: dict[str, SubtreeNode] = {}
 
         def add_uses_below(node: Node, use: SubtreeNode | None) -> None:
@@ -127,7 +128,7 @@ class CheckContext:
         add_uses_below(self.tree, None)
         return uses
 
-    def make_constant_hint(self, reference: Reference) -> str:
+    def make_unknown_param_hint(self, reference: Reference) -> str:
         """Return the hint for a reference to a variable where only a param or an argument is allowed."""
         params = self.mission.params
         if reference.name in params:

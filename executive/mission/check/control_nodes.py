@@ -50,7 +50,7 @@ def _check_constant(
 ) -> Iterator[Finding]:
     if isinstance(value, Reference):
         message = f"{name} must be a constant, but ${value.name} is neither a param nor an argument"
-        yield make_error(value.span, "unknown-param", message, context.make_constant_hint(value))
+        yield make_error(value.span, "unknown-param", message, context.make_unknown_param_hint(value))
     elif isinstance(value, Literal):
         try:
             convert_constant(key, value.value, max_value)

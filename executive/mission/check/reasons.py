@@ -113,7 +113,7 @@ def _find_reasons(flow: FlowAnalysis, body: Node) -> dict[str, list[str]]:
     reasons: dict[str, list[str]] = {}
     for node in body.walk():
         if isinstance(node, SkillNode):
-            skill = flow.find_skill(node.skill)
+            skill = flow.find_skill_or_most_similar(node.skill)
             reasons.setdefault(node.skill, []).extend(skill.reasons if skill else ())
         elif isinstance(node, InnerNode) and node.declaring_class.reasons:
             reasons.setdefault(node.declaring_class.keyword, []).extend(node.declaring_class.reasons)

@@ -38,7 +38,7 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
             elif name in skill.params:
                 reference = setting.value
                 problem = f"must be a constant, but ${reference.name} is neither a param nor an argument"
-                hint = context.make_constant_hint(reference)
+                hint = context.make_unknown_param_hint(reference)
                 yield make_error(reference.span, "unknown-param", f"{node.skill}.{name} {problem}", hint)
         for param in skill.params.values():
             if param.is_required and param.name not in node.settings:
@@ -70,10 +70,10 @@ def _find_unknown_names(
     context: CheckContext, node: SkillNode, declaration: Param | Port, value: Literal
 ) -> Iterator[Finding]:
     """Yield an error for each constant that names a bin, class, pose or detector that the cell lacks."""
-    if declaration.refers_to not in context.cell_names_by_kind or value.value == declaration.default:
+    if declaration.refers_to not in context.names_in_cell_by_kind or value.value == declaration.default:
         return
     choices = declaration.choices if isinstance(declaration, Param) else None
-    allowed_names = [*context.cell_names_by_kind[declaration.refers_to], *(choices or ())]
+    allowed_names = [*context.names_in_cell_by_kind[declaration.refers_to], *(choices or ())]
     for index, name in enumerate(value.value if isinstance(value.value, list) else [value.value]):
         if isinstance(name, str) and name not in allowed_names:
             message = f'the cell has no {declaration.refers_to} "{name}" for {node.skill}.{declaration.name}'

@@ -44,8 +44,7 @@ class CellFile:
         path: Path of the cell file.
         config: Validated content, or None if the file has errors.
         source: Text of the cell file.
-        root: YAML tree of the file merged with its bases, for positions of findings; None if the YAML is
-            invalid, and for the cell of a recorded run.
+        root: Merged YAML tree, for positions of findings; None for invalid YAML and for a recorded cell.
         findings: Errors in the file and its bases.
     """
 

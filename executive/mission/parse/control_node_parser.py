@@ -62,7 +62,7 @@ def read_control_node(
     siblings = MappingReader(keyword, span, mapping, mapping.keys, parser.findings)
     for name, key in sibling_keys.items():
         if (value := siblings.get(name)) is not None:
-            key_reader.read_key(siblings, key, value, value.span, values)
+            key_reader.add_key_value(siblings, key, value, value.span, values)
     any_of = node_class.any_of
     given_keys = {*mapping.keys, *(entry.value.keys if isinstance(entry.value, YamlMapping) else ())}
     if key_reader.is_mapping_valid and any_of and given_keys.isdisjoint(any_of):
@@ -94,26 +94,26 @@ class _KeyReader:
         values: dict[str, KeyValue] = {}
         shorthand_key, inner_keys = find_shorthand_key(owner), find_inner_keys(owner)
         is_list_required = shorthand_key is not None and shorthand_key.kind is KeyKind.NODES
-        # A mapping is always read as inner keys, although a node in the shorthand form may be a mapping, too.
-        is_wrong_list = is_list_required and isinstance(value, YamlScalar)
-        has_inner_keys = isinstance(value, YamlMapping) or is_wrong_list
-        if shorthand_key is not None and not (has_inner_keys and inner_keys):
+        # A mapping could also be a node in the shorthand form, but is always read as inner keys.
+        is_scalar_for_list = is_list_required and isinstance(value, YamlScalar)
+        reads_inner_keys = isinstance(value, YamlMapping) or is_scalar_for_list  # an error names the keys
+        if shorthand_key is not None and not (reads_inner_keys and inner_keys):
             key_node = YamlScalar(span, name, shorthand_key.name)
             explicit_mapping = YamlMapping(span, (YamlEntry(key_node, value),))
             reader = MappingReader(name, span, explicit_mapping, [shorthand_key.name], self.parser.findings)
-            self.read_key(reader, shorthand_key, value, span, values)
+            self.add_key_value(reader, shorthand_key, value, span, values)
             return values
         reader = MappingReader(name, span, value, inner_keys, self.parser.findings)
         self.is_mapping_valid = self.is_mapping_valid and reader.is_mapping
         for key in inner_keys.values():
             key_value = reader.require(key.name) if key.is_required else reader.get(key.name)
             if key_value is not None:
-                self.read_key(reader, key, key_value, reader.get_key_span(key.name), values)
+                self.add_key_value(reader, key, key_value, reader.get_key_span(key.name), values)
             elif key.kind is KeyKind.NODE and key.is_required:
                 values[key.name] = InvalidNode(span, "")
         return values
 
-    def read_key(
+    def add_key_value(
         self, reader: MappingReader, key: Key, node: YamlNode, span: Span, values: dict[str, KeyValue]
     ) -> None:
         """Add a valid value of a key to `values`; `span` is the position of an error about a missing node."""

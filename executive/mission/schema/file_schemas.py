@@ -13,12 +13,12 @@ from executive.mission.parse.node_parser import Skills
 from executive.mission.parse.params import PARAM_TYPES
 from executive.mission.schema.types import (
     DIALECT,
-    NO_ARRAY_ITEM,
+    NO_ITEM_SUGGESTION,
     REFERENCE,
     Schema,
-    allow_reference,
     make_name_schemas,
     make_settings_schema,
+    make_value_or_reference_schema,
 )
 from executive.tree.keys import Key, KeyKind
 from executive.tree.node import ControlNode
@@ -70,7 +70,7 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
     label: Schema = {**_make_reference("label"), "description": grammar.LABEL_KEY.doc}
     names = [*skills, *node_classes, grammar.USE_KEYWORD]
     nodes_without_body = [
-        {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ARRAY_ITEM}
+        {"const": word, "title": word, "description": _get_first_line(node_class), **NO_ITEM_SUGGESTION}
         for word, node_class in node_classes.items()
         if has_optional_body(node_class)
     ]
@@ -85,8 +85,8 @@ def _make_node_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
         "anyOf": [
             *make_name_schemas(skills),
             *nodes_without_body,
-            {"type": "array", "items": _make_reference("node"), **NO_ARRAY_ITEM},
-            {"type": "object", **NO_ARRAY_ITEM},
+            {"type": "array", "items": _make_reference("node"), **NO_ITEM_SUGGESTION},
+            {"type": "object", **NO_ITEM_SUGGESTION},
         ],
         "minItems": 1,
         "dependencies": {
@@ -148,9 +148,9 @@ def _make_value_schema(key: Key | GrammarKey) -> Schema:
             if shorthand is None:
                 return section
             value = shorthand.make_validator().json_schema()
-            return allow_reference({**section, **value, "type": [value["type"], "object"]})
+            return make_value_or_reference_schema({**section, **value, "type": [value["type"], "object"]})
     constant = key.make_validator().json_schema()
-    return allow_reference(*constant.get("anyOf", [constant]))
+    return make_value_or_reference_schema(*constant.get("anyOf", [constant]))
 
 
 def _require_any_of(keys: Sequence[str]) -> Schema:
@@ -218,7 +218,7 @@ _SCHEMAS_BY_KIND: Mapping[str, Schema] = {
     "text": {"type": ["string", "number", "boolean"]},
     "word": {"type": "string", **_WORD},
     "words": {**_allow_list({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
-    "list": allow_reference({"type": "array"}),
+    "list": make_value_or_reference_schema({"type": "array"}),
     "value": {},
     "values": _map_names({}),
     "variables": _map_names(REFERENCE),

@@ -17,7 +17,7 @@ from executive.skill import Direction, Param, Port, Skill
 Schema: TypeAlias = JsonSchemaValue
 """A JSON Schema or a subschema."""
 
-NO_ARRAY_ITEM: Schema = {"allOf": [True]}
+NO_ITEM_SUGGESTION: Schema = {"allOf": [True]}
 """Subschema that allows every value, but stops the suggestion "- (array item)" of yaml-language-server."""
 
 REFERENCE: Schema = {"$ref": "#/definitions/reference"}
@@ -73,7 +73,7 @@ def make_cell_schema() -> Schema:
     }
 
 
-def allow_reference(*alternatives: Schema) -> Schema:
+def make_value_or_reference_schema(*alternatives: Schema) -> Schema:
     """Return the schema of a value with one of these schemas, or of a reference `$name`."""
     return {"anyOf": [*alternatives, REFERENCE]}
 
@@ -89,14 +89,14 @@ def make_settings_schema(name: str, skill: type[Skill]) -> Schema:
         "required": required,
         "additionalProperties": False,
     }
-    # With allOf, an editor completes only the name, which is valid in a list and in a mapping.
+    # Due to `allOf`, editors insert only the name of the skill, which is valid as an item and as a key.
     return {"title": name, **_document_skill(skill), "allOf": [mapping]}
 
 
 def make_name_schemas(skills: Mapping[str, type[Skill]]) -> list[Schema]:
     """Return the schemas of skills that may be written as a name only: they require no params."""
     return [
-        {"const": name, "title": name, **_document_skill(skill), **NO_ARRAY_ITEM}
+        {"const": name, "title": name, **_document_skill(skill), **NO_ITEM_SUGGESTION}
         for name, skill in skills.items()
         if not any(param.is_required for param in skill.params.values())
     ]
@@ -128,7 +128,7 @@ def _make_param_schema(param: Param) -> Schema:
         schema["examples" if param.refers_to else "enum"] = list(param.choices)
     if not param.is_required:
         schema["default"] = to_jsonable_python(param.default)
-    return {"description": _describe_param(param), **allow_reference(schema)}
+    return {"description": _describe_param(param), **make_value_or_reference_schema(schema)}
 
 
 def _describe_param(param: Param) -> str:
@@ -145,4 +145,4 @@ def _make_port_schema(port: Port) -> Schema:
     description = f"{'output' if is_output else 'input'}: {port.doc}"
     if is_output or not is_plain_type(port.type):
         return {"description": description, **REFERENCE}
-    return {"description": description, **allow_reference(make_type_schema(port.type))}
+    return {"description": description, **make_value_or_reference_schema(make_type_schema(port.type))}
