@@ -2,7 +2,7 @@
 
 Path time `s` is the time parameter of the planned motion `q(s)`. While the arm brakes, the rate `r = ds/dt`
 falls from 1 to 0 with limited jerk (ruckig's velocity interface). By the chain rule, the acceleration of the
-joints is `q_ss r² + q_s dr/dt`; `q_s` and `q_ss` are the derivatives of `q` by `s`.
+joints is `q_ss r² + q_s dr/dt`; `q_s` and `q_ss` are the derivatives of `q` with respect to `s`.
 """
 
 from __future__ import annotations

@@ -54,12 +54,12 @@ class PayloadLimit:
         acceleration = np.diff(centres[:-1], n=2, axis=0) / STEP**2
         return float(np.min(_find_acceleration_fractions(acceleration, self._max_specific_force)))
 
-    def slow_down(self, trajectory: Trajectory) -> Trajectory:
+    def make_safe_motion(self, trajectory: Trajectory) -> Trajectory:
         """Return the motion, slowed down so that it keeps the safety factor if possible."""
         fraction = self.find_acceleration_fraction(trajectory)
         # Accelerations are proportional to the square of the speed.
         speed_factor = math.sqrt(max(fraction, MIN_ACCELERATION_FRACTION))
-        return trajectory if fraction >= 1 else trajectory.slow_down(speed_factor)
+        return trajectory if fraction >= 1 else trajectory.make_slower_copy(speed_factor)
 
     def linearize(self, qs: Array, sample_time: float, max_slack: float) -> LinearizedConstraints:
         """Return the constraints that keep the seal closed, linearized about a motion.

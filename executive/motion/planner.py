@@ -64,7 +64,7 @@ class Planner:
         start = np.asarray(q_start, dtype=float)
         end = goal if isinstance(goal, Goal) else np.asarray(goal, dtype=float)
         motion = self._find_motion(start, end, task)
-        return PayloadLimit(task.load, self.kinematics).slow_down(motion) if task.load else motion
+        return PayloadLimit(task.load, self.kinematics).make_safe_motion(motion) if task.load else motion
 
     def require_reachable(self, goal: Goal) -> None:
         """Check that the arm reaches both a goal and the travel height above the goal in the same branch.

@@ -131,7 +131,7 @@ class MotionSearch:
         motions, payload = self._list_optimized(candidate, optimizer), self._payload
         if payload is None:
             return motions
-        return sorted(motions, key=lambda motion: payload.slow_down(motion).duration)
+        return sorted(motions, key=lambda motion: payload.make_safe_motion(motion).duration)
 
     def _list_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterator[Trajectory]:
         """Yield the optimized motion to a candidate, first in minimum time, then with exact timing."""

@@ -59,11 +59,11 @@ class Trajectory:
         self.start, self.end = start_state.q, self._end_state.q
         for number, (piece, next_piece) in enumerate(pairwise(pieces), start=1):
             states = piece.state_at(piece.duration), next_piece.state_at(0.0)
-            _require_equal(*states, f"pieces {number} and {number + 1}")
+            _require_equal(*states, f"pieces {number} and {number + 1} do not meet")
         for state, end_name in ((start_state, "start"), (self._end_state, "end")):
-            _require_equal(state, JointState.at_rest(state.q), f"rest and the {end_name} of a trajectory")
+            _require_equal(state, JointState.at_rest(state.q), f"the {end_name} is not at rest")
 
-    def slow_down(self, speed_factor: float) -> Trajectory:
+    def make_slower_copy(self, speed_factor: float) -> Trajectory:
         """Return a copy of the motion whose velocities are multiplied by `speed_factor`, 0 to 1."""
         pieces = [_SlowPiece(piece, speed_factor) for piece in self._pieces]
         return Trajectory(pieces, self.guarded_start_time / speed_factor)
@@ -159,12 +159,12 @@ def sample_pieces(pieces: Sequence[MotionPiece], times: Array) -> JointState:
     return JointState(*map(np.concatenate, zip(*states, strict=True)))
 
 
-def _require_equal(state: JointState, next_state: JointState, description: str) -> None:
-    """Raise Fault if two states differ by more than the rounding error."""
-    for name, values, next_values in zip(JointState._fields, state, next_state, strict=True):
-        difference = float(np.max(np.abs(values - next_values)))
+def _require_equal(state: JointState, next_state: JointState, problem: str) -> None:
+    """Raise Fault with `problem` if two states differ by more than the rounding error."""
+    for name, left, right in zip(("position", "velocity", "acceleration"), state, next_state, strict=True):
+        difference = float(np.max(np.abs(left - right)))
         if difference > _ROUNDING_ERROR:
-            raise Fault(f"{description} do not fit together: their {name} differ by {difference:.2g}")
+            raise Fault(f"invalid trajectory: {problem}; the joint {name} differs by {difference:.2g}")
 
 
 def _require_in_range(qs: Array, limits: JointLimits) -> None:

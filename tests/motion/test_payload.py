@@ -73,11 +73,11 @@ def test_flown_at_the_root_of_the_share_a_motion_is_just_affordable(sway, kinema
     bears = SAFETY_FACTOR * KIND.mass * math.hypot(GRAVITY, share * strongest(sway, kinematics))
     load = Load(KIND, bears)
     payload = PayloadLimit(load, kinematics)
-    gentle = payload.slow_down(sway)
+    gentle = payload.make_safe_motion(sway)
     rate = sway.duration / gentle.duration
     assert rate == pytest.approx(math.sqrt(share), rel=0.01)
     assert payload.find_acceleration_fraction(gentle) == pytest.approx(1.0, abs=0.01)
-    assert payload.find_acceleration_fraction(sway.slow_down(1.1 * rate)) < 0.9
+    assert payload.find_acceleration_fraction(sway.make_slower_copy(1.1 * rate)) < 0.9
 
 
 def test_a_motion_too_short_to_pull_at_anything_is_affordable(kinematics, connector, home) -> None:
