@@ -81,8 +81,8 @@ def compute_calibration(config: CameraConfig) -> tuple[Array, Pose]:
         return matrix, compute_look_at_pose(config.position, config.look_at, config.up)
     transform = calibration.mount_to_camera or calibration.camera_to_mount
     assert transform is not None, "checked by CalibrationConfig"
-    matrix, X_MC = convert_from_opencv(calibration.matrix, transform.rotation, transform.translation)
-    return matrix, X_MC if calibration.mount_to_camera else X_MC.inverse()
+    matrix, pose = convert_from_opencv(calibration.matrix, transform.rotation, transform.translation)
+    return matrix, pose if calibration.mount_to_camera else pose.inverse()
 
 
 def project(matrix: Array, X_WC: Pose, points: ArrayLike) -> Array:

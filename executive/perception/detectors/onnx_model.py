@@ -93,7 +93,7 @@ class OnnxModel:
         if list(inputs) != ["input"] or not {"dets", "labels"} <= set(outputs):
             raise InputError(
                 f"{path} is not an exported RF-DETR model: it has the inputs {', '.join(inputs)} and the "
-                f"outputs {', '.join(outputs)}; it needs the input input and the outputs dets and labels"
+                f'outputs {", ".join(outputs)}, but needs the input "input" and the outputs "dets", "labels"'
             )
         size, class_count = inputs["input"][-1], outputs["labels"][-1] - 1
         if not isinstance(size, int):

@@ -33,8 +33,8 @@ def test_boxes_by_centre_and_size_become_boxes_by_corners_cut_off_where_they_sti
 @pytest.mark.parametrize(
     ("spoilt", "text"),
     [
-        (None, "of type NoneType, not an object with predictions"),
-        ([1, 2], "of type list, not an object with predictions"),
+        (None, "of type NoneType, not an object with the key"),
+        ([1, 2], "of type list, not an object with the key"),
         ({"foo": 1}, "predictions: field required"),
         ({"predictions": None}, "predictions: input should be a valid list"),
         (answer(7), r"predictions\[0\]: input should be a valid dictionary$"),
@@ -56,7 +56,7 @@ def test_boxes_by_centre_and_size_become_boxes_by_corners_cut_off_where_they_sti
         (answer({**CUBE, "y": 76.0, "height": 26.0}), r"box from \(40, 63\) to \(60, 89\)"),
         (answer({**CUBE, "x": -5.0, "width": 8.0}), r"box from \(-9, 35\) to \(-1, 45\)"),
         (answer(*[CUBE] * 301), "predictions: list should have at most 300 items"),
-        (answer(CUBE, image={"width": 1, "height": 1}), "an image of 1 x 1 pixels, and 100 x 80 were sent"),
+        (answer(CUBE, image={"width": 1, "height": 1}), "1 x 1 pixels, but the sent image has 100 x 80"),
         (answer(CUBE, image={"width": None, "height": 1}), "image.width: input should be a valid number"),
     ],
 )
@@ -88,14 +88,14 @@ def test_an_output_without_predictions_has_an_image_without_a_size():
 @pytest.mark.parametrize(
     ("output", "text"),
     [
-        ("ball", "of type str, not an object with predictions"),
-        (None, "of type NoneType, not an object with predictions"),
+        ("ball", "of type str, not an object with the key"),
+        (None, "of type NoneType, not an object with the key"),
         ({"top": "ball"}, "predictions: field required"),
         ([answer(CUBE), answer()], r"predictions\[0\].x: field required"),
         ([[CUBE]], r"predictions\[0\]: input should be a valid dictionary"),
         (answer(answer(CUBE)), r"predictions\[0\].x: field required"),
         ({"predictions": answer({**CUBE, "x": -30.0})}, r"box from \(-40, 35\) to \(-20, 45\)"),
-        (answer(CUBE, image={"width": 50, "height": 40}), "image of 50 x 40 pixels, and 100 x 80 were sent"),
+        (answer(CUBE, image={"width": 50, "height": 40}), "50 x 40 pixels, but the sent image has 100 x 80"),
     ],
 )
 def test_an_output_that_holds_no_boxes_in_the_image_that_was_sent_is_refused(output, text):

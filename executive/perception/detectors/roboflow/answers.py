@@ -40,7 +40,7 @@ class _ImageSize(BaseModel):
 
 
 class _Answer(BaseModel):
-    """Answer of a server, with the size of the searched image [pixel]."""
+    """Answer of a server, with the size of the image that the server processed [pixel]."""
 
     predictions: list[_Prediction] = Field(max_length=MAX_PREDICTIONS)
     image: _ImageSize | None = None
@@ -57,7 +57,7 @@ def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
         ValueError: The answer is invalid; the message states position and problem.
     """
     if not isinstance(answer, dict):
-        raise ValueError(f"it is of type {type(answer).__name__}, not an object with predictions")
+        raise ValueError(f'it is of type {type(answer).__name__}, not an object with the key "predictions"')
     try:
         validated = _Answer.model_validate(answer)
     except ValidationError as error:
@@ -65,7 +65,7 @@ def read_answer(answer: Any, size: tuple[int, int]) -> list[Detection]:
     image, sent_size = validated.image, f"{size[0]} x {size[1]}"
     if image is not None and (image.width, image.height) != size:
         image_size = f"{image.width:g} x {image.height:g} pixels"
-        raise ValueError(f"it belongs to an image of {image_size}, and {sent_size} were sent")
+        raise ValueError(f"it is for an image of {image_size}, but the sent image has {sent_size}")
     return list(_convert_predictions(validated.predictions, size))
 
 
