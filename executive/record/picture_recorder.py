@@ -32,9 +32,9 @@ _LISTED_STATES = ("held", "dropped", "rejected", "skipped", "lost")
 class PictureRecorder:
     """Observer that saves a picture of each selected target and of each failed attempt.
 
-    `<tick>_<item>.jpg` shows the image in which an item was selected. `<tick>_<item>_<reason>.jpg` shows the
-    image of the last selection after a failed attempt to pick the item. `<tick>_<reason>.jpg` shows the last
-    image after the failure of a skill without an item; if another picture shows that image, it is omitted.
+    `<tick>_<item>.jpg` shows the image in which an item was selected. After a failed attempt to pick an item,
+    `<tick>_<item>_<reason>.jpg` shows the image in which the item was selected last. After the failure of a
+    skill without an item, `<tick>_<reason>.jpg` shows the last image, unless another picture shows it.
 
     Args:
         folder: Folder of the pictures.
@@ -97,7 +97,7 @@ class PictureRecorder:
             self._undrawn_frame_id = None
         look = self._look_by_frame_id.get(frame_id)
         if look is None:
-            self._missing_picture_counts[f"of looks before the last {MAX_STORED_LOOKS}"] += 1
+            self._missing_picture_counts[f"because only the last {MAX_STORED_LOOKS} images are kept"] += 1
         elif self._picture_count == MAX_PICTURES:
             self._missing_picture_counts[f"after the first {MAX_PICTURES}"] += 1
         elif not self._drawer.queue(

@@ -149,7 +149,7 @@ def test_an_earlier_look_is_found_again_and_old_ones_are_forgotten(tmp_path, dra
     looks = [look(number, CUBE) for number in range(MAX_STORED_LOOKS + 1)]
     frames = shown(tmp_path, *looks, decision(frame=1), decision(frame=0, tick=13))
     assert list(drawn) == ["000012_cube-1.jpg"]
-    assert frames.problem == f"missing pictures: 1 of looks before the last {MAX_STORED_LOOKS}"
+    assert frames.problem == f"missing pictures: 1 because only the last {MAX_STORED_LOOKS} images are kept"
 
 
 def test_what_the_last_decision_rests_on_is_kept(tmp_path, drawn):
