@@ -12,7 +12,7 @@ from pydantic_core import from_json
 
 from executive.errors import Fault, InputError
 from executive.events import JOURNAL_FORMAT, Event, InputRead, RunStarted, TimedEvent
-from executive.replay.recorded_cell import check_input
+from executive.replay.recording_cell import check_input
 
 MAX_TICK = 10**9
 """Maximum number of control steps of a run; 48 days at 240 control steps per second."""

@@ -17,7 +17,7 @@ from executive.cell.workcell import Workcell
 from executive.events import InputRead
 from executive.replay.codecs import IDENTITY, Codec
 from executive.replay.input_log import Halt, InputLog, Interruption
-from executive.replay.recorded_cell import RECORDED_ROLES, find_input_format
+from executive.replay.recording_cell import RECORDED_ROLES, find_input_format
 
 
 class InputNotRecorded(errors.Fault):

@@ -9,7 +9,7 @@ from executive.cell.protocols import Cell
 from executive.cell.workcell import Workcell
 from executive.errors import Fault
 from executive.events import Event, Observer, TimedEvent
-from executive.replay.recorded_cell import InputRecorder, make_recorded_cell
+from executive.replay.recording_cell import InputRecorder, make_recording_cell
 from executive.run.lookahead_planner import LookaheadPlanner
 
 MAX_BRAKING_TIME = 2.0
@@ -55,7 +55,7 @@ class RunContext:
             self.add_observer(planner.on_event)
         self._control_period = workcell.cell.clock.step
         clock = StepClock(lambda: self.now, self._control_period)
-        self.cell = make_recorded_cell(workcell.cell, self._recorder, clock, self.emit)
+        self.cell = make_recording_cell(workcell.cell, self._recorder, clock, self.emit)
 
     def add_observer(self, observer: Observer, *, is_first: bool = False) -> None:
         """Call `observer` with every later event; if `is_first` is True, before all other observers."""

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from executive.errors import Fault, Unreachable
 from executive.events import Event, TimedEvent
 from executive.replay.input_log import InputLog
-from executive.replay.recorded_cell import InputRecorder
+from executive.replay.recording_cell import InputRecorder
 from executive.replay.replayed_cell import InputNotRecorded, InputReplayer
 
 

@@ -7,17 +7,17 @@ from executive.cell.protocols import Cell
 from executive.cell.proxy import IS_METHOD
 from executive.cells.fake.cell import FakeCell
 from executive.events import Emit, Event, ToolCommanded, discard_event
-from executive.replay.recorded_cell import (
+from executive.replay.recording_cell import (
     COMMANDS,
     INPUT_FORMATS,
     RECORDED_ROLES,
     InputRecorder,
-    make_recorded_cell,
+    make_recording_cell,
 )
 
 
 def recorded(fake: FakeCell, emit: Emit = discard_event) -> Cell:
-    return make_recorded_cell(fake.cell, InputRecorder(emit), StepClock(lambda: 0.0), emit)
+    return make_recording_cell(fake.cell, InputRecorder(emit), StepClock(lambda: 0.0), emit)
 
 
 def test_every_member_of_a_part_is_a_question_or_a_command() -> None:

@@ -1,4 +1,4 @@
-"""Recorder of the inputs of a run (values that the run reads from its cell), and a cell with a recorder."""
+"""Recorder of the inputs of a run (values that the run reads from its cell), and a cell that records them."""
 
 from __future__ import annotations
 
@@ -140,8 +140,8 @@ class InputRecorder:
         return value
 
 
-def make_recorded_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
-    """Return a copy of the cell with recorded inputs, events of the actions of the tool, and `clock`."""
+def make_recording_cell(cell: Cell, recorder: InputRecorder, clock: StepClock, emit: Emit) -> Cell:
+    """Return a copy of the cell with `clock` that records its inputs and emits an event per tool command."""
 
     def read_and_record(access: Access) -> Any:
         if access.role == "tool" and access.name in COMMANDS:
