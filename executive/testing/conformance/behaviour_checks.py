@@ -35,7 +35,7 @@ def can_succeed(runs: SkillRuns) -> Iterator[str]:
         return
     if not any(test_run.status == "SUCCESS" for test_run in runs.unhalted_runs):
         yield (
-            f"{runs.name} never succeeded; {runs.unhalted_runs[0].ending}. "
+            f"{runs.name} never succeeded; {runs.unhalted_runs[0].result_description}. "
             "Set up a scene in which it succeeds: "
             f"list_conformance_checks({runs.skill.__name__}, lambda scene: ...); "
             "skills/README.md has an example."
@@ -177,7 +177,7 @@ def _describe_arm_problem(test_run: SkillTestRun) -> str:
     advice = "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
     has_started_arm = any(call.name == "arm.start" for call in test_run.calls)
     is_moving = has_started_arm and not test_run.is_at_rest
-    return f"{test_run.ending}, and the arm still moves. {advice}" if is_moving else ""
+    return f"{test_run.result_description}, and the arm still moves. {advice}" if is_moving else ""
 
 
 def _describe_tool_problem(skill: type[Skill], test_run: SkillTestRun) -> str:
@@ -187,12 +187,12 @@ def _describe_tool_problem(skill: type[Skill], test_run: SkillTestRun) -> str:
         actual = "holds something" if test_run.holds_after else "is empty"
         expected = "hold something" if required is HOLDING else "be empty"
         return (
-            f"{test_run.ending}, and the tool {actual}. It should {expected}, {requirement}. "
+            f"{test_run.result_description}, and the tool {actual}. It should {expected}, {requirement}. "
             "Leave the tool in this state, or change the declaration."
         )
     if test_run.holds_after and not test_run.is_item_held:
         return (
-            f"{test_run.ending}, and the tool holds an object that is not in the ledger. "
+            f"{test_run.result_description}, and the tool holds an object that is not in the ledger. "
             "Call cell.ledger.record_grasp, or open the tool in finally."
         )
     return ""

@@ -31,7 +31,7 @@ MAX_RUN_TIME = 60.0
 STUCK_TIMEOUT = 10.0
 """Wall time without a new tick after which a tick counts as stuck [s]."""
 PROGRESS_CHECKS = 2
-"""Number of checks for a new tick within `STUCK_TIMEOUT`; a suspended machine delays only one check."""
+"""Number of checks in `STUCK_TIMEOUT`; more than one, because a check after a suspension comes too early."""
 _OBSERVED_ROLES = ("arm", "tool", "camera", "detector", "ledger", "localizer", "operator")
 """Parts of the cell whose calls are recorded."""
 
@@ -76,7 +76,7 @@ class SkillTestRun:
     Args:
         skill: Class of the skill.
         situation: Situation in which the run begins.
-        arrange: Function of the author of the skill that changes the scene and returns values.
+        arrange: Function of the skill's author that changes the scene and returns params and inputs.
         fault: Injected fault; None: no fault.
         halt_at: Control step before which the skill is halted; None: no halt.
 
@@ -122,7 +122,7 @@ class SkillTestRun:
         self.is_at_rest = fake.arm.at_rest
 
     @property
-    def ending(self) -> str:
+    def result_description(self) -> str:
         """Situation, fault and result of the run, as a part of a sentence."""
         result_texts = {
             "SUCCESS": "it succeeded",
@@ -130,7 +130,7 @@ class SkillTestRun:
             "HALTED": f"it was halted at tick {self.ticks}",
             "RUNNING": "it was still running",
         }
-        return f"{self.description} {result_texts.get(self.status, f'it ended as a fault: {self.message}')}"
+        return f"{self.description} {result_texts.get(self.status, f'it raised a fault: {self.message}')}"
 
     def _record_call(self, access: Access) -> Any:
         if access.is_call and access.role in _OBSERVED_ROLES:
@@ -145,7 +145,7 @@ class SkillTestRun:
         cell = FaultyCell(fake, [during("*", fault.effect)] if fault else [])
         try:
             run = SkillRun(self._skill(**values), intercept(cell.cell, self._record_call, _OBSERVED_ROLES))
-            with detect_stuck_ticks(self._skill, lambda: self.ticks):
+            with interrupt_stuck_ticks(self._skill, lambda: self.ticks):
                 while self.ticks < MAX_RUN_TIME / STEP:
                     if self.ticks == self._halt_at:
                         run.halt()
@@ -183,10 +183,10 @@ class TickStuck(BaseException):
 
 
 @contextmanager
-def detect_stuck_ticks(skill: type[Skill], count_ticks: Callable[[], int]) -> Iterator[None]:
+def interrupt_stuck_ticks(skill: type[Skill], count_ticks: Callable[[], int]) -> Iterator[None]:
     """Interrupt the body of the `with` if `count_ticks` returns the same number during `STUCK_TIMEOUT`.
 
-    Bodies in other threads than the main thread are not interrupted: Python handles signals only there.
+    Outside the main thread, bodies are not interrupted: Python handles signals only in the main thread.
 
     Raises:
         TickStuck: The body was interrupted.
