@@ -51,7 +51,7 @@ class Key:
         doc: Meaning of the key, one sentence.
         default: Value if the key is missing; `...` for a required key.
         ge, gt: Inclusive and exclusive lower bound of a number, or None.
-        max_key: For a number: key of a list of nodes; its length is the maximum of the number. Otherwise "".
+        max_key: For a number: key of the list of nodes whose length is the maximum of the number, or "".
         max_count: For a list of nodes: maximum number of nodes, or None.
         is_shorthand: True if the key may be omitted and its value written directly under the keyword.
         is_sibling: True if the key is a sibling of the keyword in the mission file: `catch` next to `try`.
@@ -191,7 +191,7 @@ def _complete_declaration(declaration: Key, attribute: str, annotation: object) 
 def _make_validator(
     value_type: object, ge: float | None, gt: float | None, le: float | None
 ) -> TypeAdapter[object]:
-    """Return the validator of a type with the bounds `>= ge`, `> gt` and `<= le` for numbers, or None."""
+    """Return the validator of a type; numbers must be `>= ge`, `> gt` and `<= le`, where None is no bound."""
     is_union = get_origin(value_type) in (Union, types.UnionType)
     bounds = Field(ge=ge, gt=gt, le=le)
     member_types = tuple(

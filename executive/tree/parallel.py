@@ -128,21 +128,21 @@ class Parallel(ControlNode):
             self.report_choice(choice, failure)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: combinations of the ends of all children, each started in `state`."""
+        """Return the possible ends: combinations of the ends of the children, which all start in `state`."""
         flows = [get_flow(child, state) for child in self.do]
         halted_ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         halted = join_states(flow.halted for flow in flows)
         halted = halted and halted.with_tool_states(combine_tool_states(state.tool_states, halted_ends))
         if self._has_lead:
             lead, siblings = flows[0], halted_ends[1:]
-            failures = {cause: _add_siblings(state, end, siblings) for cause, end in lead.failures.items()}
-            return Flow(lead.success and _add_siblings(state, lead.success, siblings), failures, halted)
+            failures = {cause: _with_siblings(state, end, siblings) for cause, end in lead.failures.items()}
+            return Flow(lead.success and _with_siblings(state, lead.success, siblings), failures, halted)
         failures, can_be_halted = {}, self.halt or self._required_count < len(flows)
         ends = [find_end_tool_states(flow, state, can_be_halted) for flow in flows]
         can_fail = len([flow for flow in flows if flow.failures]) > len(flows) - self._required_count
         for index, flow in enumerate(flows if can_fail else ()):
             siblings = [*ends[:index], *ends[index + 1 :]]
-            failures |= {cause: _add_siblings(state, end, siblings) for cause, end in flow.failures.items()}
+            failures |= {cause: _with_siblings(state, end, siblings) for cause, end in flow.failures.items()}
         return Flow(self._compute_success_state(flows, state), failures, halted)
 
     def _compute_success_state(self, flows: Sequence[Flow], state: FlowState) -> FlowState | None:
@@ -188,6 +188,6 @@ class Parallel(ControlNode):
         return f"needs {count} branches" + (f"; also failed: {other_names}" if other_names else "")
 
 
-def _add_siblings(entry: FlowState, end: FlowState, siblings: Iterable[ToolStates]) -> FlowState:
+def _with_siblings(entry: FlowState, end: FlowState, siblings: Iterable[ToolStates]) -> FlowState:
     """Return the state `end` after one child, with the effects of all siblings on the tool."""
     return end.with_tool_states(combine_tool_states(entry.tool_states, [end.tool_states, *siblings]))
