@@ -101,7 +101,7 @@ class LivePage:
         self._run = run
         with self._catch_errors():
             self._visuals = run.workcell.visuals()
-        # The page writes the counts of a node into the empty line of the node.
+        # In the empty line of each node, the page writes how often the node succeeded, failed and was halted.
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(messages.SceneChange(shapes=shapes))
@@ -130,13 +130,13 @@ class LivePage:
         """Show a message about the record of the run."""
         self._enqueue(messages.PageChange(note=message))
 
-    def finish(self, result: Result | None = None, report: str = "") -> None:
+    def finish(self, result: Result | None = None, report_path: str = "") -> None:
         """Show the result of the run, and end the server; a second call does nothing."""
         if not self._threads:
             return
         if result is not None:
             message = result.message if result.diagnosis is None else result.diagnosis.verdict
-            outcome = messages.RunOutcome(result.status, message, result.run, report)
+            outcome = messages.RunOutcome(result.status, message, result.run, report_path)
             self._enqueue(messages.PageChange(result=outcome))
         self._queue.put(None)
         try:
