@@ -54,15 +54,15 @@ class SceneSettings:
     Attributes:
         image_count: Number of images per cell.
         seed: Random seed.
-        is_varied: True for scenes that vary as in training; False for the initial scenes of runs.
-        view: Image region of detection in initial scenes of runs: `table`, or `full` for the whole image.
+        is_randomized: True for scenes with domain randomization; False for the initial scenes of runs.
+        view: Region of interest in images of initial scenes of runs: `table`, or `full` for the whole image.
         workers: Number of rendering processes.
         scene: Scene file that changes the initial scenes of runs; None: no change.
     """
 
     image_count: int
     seed: int
-    is_varied: bool
+    is_randomized: bool
     view: str
     workers: int
     scene: Path | None = None
@@ -76,13 +76,13 @@ class DetectorUnderTest:
         cell: Cell of the detector; None: a detector without a cell.
         configs: Configurations of the detector and of the detectors that it may use, by name.
         name: Name of the detector, a key of `configs`.
-        base: Folder to which paths in the options of the detector are relative.
+        base_folder: Folder to which paths in the options of the detector are relative.
     """
 
     cell: CellConfig | None
     configs: dict[str, DetectorConfig]
     name: str
-    base: Path
+    base_folder: Path
 
     def make_measurement_name(self, dataset: Path | None) -> str:
         """Return the name of a measurement on a dataset, or on scenes of the cell if `dataset` is None."""
@@ -106,15 +106,15 @@ def list_detectors(
     Raises:
         InputError: A cell has no detector of this name.
     """
-    model_configs: dict[str, DetectorConfig] = {}
+    fixed_configs: dict[str, DetectorConfig] = {}
     if model_file is not None:
-        model_configs = {MODEL_NAME: make_model_config(model_file, label_file or find_label_file(model_file))}
+        fixed_configs = {MODEL_NAME: make_model_config(model_file, label_file or find_label_file(model_file))}
     elif not cells:
-        model_configs = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
+        fixed_configs = {"embedded": DetectorConfig(kind="embedded", floor=MIN_CONFIDENCE)}
     if not cells:
-        yield DetectorUnderTest(None, model_configs, next(iter(model_configs)), Path())
+        yield DetectorUnderTest(None, fixed_configs, next(iter(fixed_configs)), Path())
     for cell_file, cell in cells.items():
-        configs = model_configs or dict(cell.detectors)
+        configs = fixed_configs or dict(cell.detectors)
         if name and name not in configs:
             hint = suggest_choice(name, configs, "Its detectors")
             raise InputError(f'the cell {cell.cell} has no detector "{name}". {hint}')
@@ -135,7 +135,7 @@ def check_detector(detector: DetectorUnderTest, *, renders_scenes: bool, scene: 
                 "measure its detector on your own images with --dataset"
             )
         load_scene(scene, cell)
-    for key_path, problem in find_detector_errors(detector.configs, detector.base):
+    for key_path, problem in find_detector_errors(detector.configs, detector.base_folder):
         raise InputError(f"detector {key_path[1]}: {problem}")
 
 
@@ -152,22 +152,22 @@ def measure_detector(
 
     `threshold` is the minimum confidence; None: the threshold of the detector. `worst_mistakes` is updated.
     """
-    # Only images of scenes of runs have the camera, the table and the localization of the cell.
-    run_cell = None if dataset is not None or scenes.is_varied else detector.cell
+    # Images of a dataset and of randomized scenes do not use the camera, table and localizer of the cell.
+    cell_of_images = None if dataset is not None or scenes.is_randomized else detector.cell
     with _open_images(detector.cell, dataset, scenes, progress) as samples:
         cell_detector = CellDetector(
             detector.configs,
             detector.name,
-            base=detector.base,
-            camera=next(iter(run_cell.cameras.values())) if run_cell else None,
+            base=detector.base_folder,
+            camera=next(iter(cell_of_images.cameras.values())) if cell_of_images else None,
             view=scenes.view,
             classes=tuple(detector.cell.objects) if detector.cell else None,
         )
         with contextlib.closing(cell_detector), progress(f"running {detector.name}") as update:
             return evaluate(
-                cell_detector, _show_progress(samples, update), threshold=threshold, mistakes=worst_mistakes,
-                localizer=_build_localizer(run_cell) if run_cell else None,
-                table=run_cell.table if run_cell else None,
+                cell_detector, _iterate_with_progress(samples, update), mistakes=worst_mistakes,
+                localizer=_build_localizer(cell_of_images) if cell_of_images else None,
+                table=cell_of_images.table if cell_of_images else None, threshold=threshold,
             )  # fmt: skip
 
 
@@ -183,7 +183,7 @@ def _open_images(
     with tempfile.TemporaryDirectory() as folder:
         images: Samples | list[LabelledImage]
         with progress(f"rendering {cell.cell}") as update:
-            if scenes.is_varied:
+            if scenes.is_randomized:
                 generate_dataset(
                     {cell.cell: cell}, Path(folder), image_count=scenes.image_count, seed=scenes.seed,
                     layout="coco", worker_count=scenes.workers, valid_fraction=1.0, progress=update,
@@ -200,7 +200,7 @@ def _open_images(
         yield images
 
 
-def _show_progress(
+def _iterate_with_progress(
     images: Samples | list[LabelledImage], update_progress: Callable[[int, int], None]
 ) -> Iterator[LabelledImage]:
     """Yield the images; update the progress bar after each image."""
@@ -233,13 +233,13 @@ def store_evaluation(
         InputError: The detector gave no usable answer to any image, or the file cannot be read or written.
     """
     assert detector.cell is not None
-    path = out or detector.base / f"{detector.cell.cell}{MEASUREMENT_SUFFIX}"
+    path = out or detector.base_folder / f"{detector.cell.cell}{MEASUREMENT_SUFFIX}"
     if evaluation.reliability is None:
         problem = f"detector {detector.name} gave no usable answer: {evaluation.why}"
         raise InputError(f"{problem}; nothing was measured")
     measurement = Measurement(
         detector=detector.name,
-        fingerprint=dict(compute_fingerprint(detector.cell, detector.name, detector.base)),
+        fingerprint=dict(compute_fingerprint(detector.cell, detector.name, detector.base_folder)),
         command=command,
         seconds=round(duration, 1),
         images=evaluation.images,

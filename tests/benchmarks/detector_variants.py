@@ -110,7 +110,7 @@ def evaluate_scene(
     """Return the figures of the first detector of a cell in a scene, as `executive evaluate` does."""
     (detector,) = list_detectors({file: cell}, None, None, None)
     check_detector(detector, renders_scenes=True, scene=scene)
-    scenes = SceneSettings(images, seed, is_varied=False, view="table", workers=workers, scene=scene)
+    scenes = SceneSettings(images, seed, is_randomized=False, view="table", workers=workers, scene=scene)
     return measure_detector(
         detector, None, scenes, threshold=THRESHOLD, worst_mistakes=WorstMistakes(), progress=show_progress
     )
