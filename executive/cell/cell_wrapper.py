@@ -25,12 +25,12 @@ class CellWrapper:
 
     @property
     def cell(self) -> Cell:
-        """The cell that skills use."""
+        """Interface of the work cell for skills."""
         return self.inner.cell
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger, which is closed at the end of the run."""
+        """The ledger; the run closes it at its end, so that each item has a final state."""
         return self.inner.accounts
 
     @property
@@ -39,9 +39,9 @@ class CellWrapper:
         return self.inner.steps
 
     @property
-    def last_command(self) -> int:
+    def last_command_step(self) -> int:
         """Control step of the last command to the arm or the tool."""
-        return self.inner.last_command
+        return self.inner.last_command_step
 
     def log_to(self, path: Path) -> None:
         """Start a log file from which the simulated world can be reconstructed."""

@@ -45,18 +45,18 @@ class Workcell(Protocol):
 
     @property
     def cell(self) -> Cell:
-        """The cell that skills use."""
+        """Interface of the work cell for skills."""
 
     @property
     def accounts(self) -> Accounts:
-        """The ledger, which is closed at the end of the run."""
+        """The ledger; the run closes it at its end, so that each item has a final state."""
 
     @property
     def steps(self) -> int:
         """Number of control steps since the start of the run, including those before a resumption."""
 
     @property
-    def last_command(self) -> int:
+    def last_command_step(self) -> int:
         """Control step at which the cell last started a motion or received a command to the tool.
 
         The step is 0 before the first command, and after an interruption that makes the step unknown.

@@ -39,7 +39,7 @@ class CellWithoutHardware:
         accounts: The ledger of the run.
         cell: The interface of the cell for skills.
         steps: Number of control steps since the start of the run.
-        last_command: Control step of the last logged command to arm or tool; 0 if there is none.
+        last_command_step: Control step of the last logged command to arm or tool; 0 if there is none.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class CellWithoutHardware:
     ) -> None:
         del seed
         self.config, self.routes = config, dict(routes)
-        self.steps = self.last_command = 0
+        self.steps = self.last_command_step = 0
         bins, distinct_classes = build_bins(config), find_classes_distinct_by_touch(config)
         self.accounts = Tracker(config.ledger, config.table, bins, self.routes, emit, distinct_classes)
         no_device: Any = None

@@ -117,7 +117,7 @@ class FakeCell(CellWithoutHardware):
         self.detector = next(iter(self.detectors.values()))
         self._log: FakeStateLog | None = None
         if options.resume is not None:
-            self.steps, self.last_command = restore_world(options.resume.log_path, self.world, self.arm)
+            self.steps, self.last_command_step = restore_world(options.resume.log_path, self.world, self.arm)
             self.camera.set_counts(options.resume.frame_count, options.resume.pose_count)
             self.log_to(options.resume.log_path)
         self.cell = replace(
@@ -161,12 +161,12 @@ class FakeCell(CellWithoutHardware):
     def log_state(self) -> None:
         """Write the current state of the world to the log."""
         if self._log is not None:
-            self._log.write_state(self.steps, self.last_command, self.world, self.arm)
+            self._log.write_state(self.steps, self.last_command_step, self.world, self.arm)
 
     def advance(self) -> None:
         """Advance arm and ledger by one control step, and log the state."""
         if self.world.is_commanded:
-            self.last_command, self.world.is_commanded = self.steps, False
+            self.last_command_step, self.world.is_commanded = self.steps, False
         self.arm.advance()
         super().advance()
         self.log_state()

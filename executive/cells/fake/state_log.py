@@ -23,7 +23,7 @@ class FakeStateLog(LogFile):
         super().__init__(path, "the state of the world")
         self._length = 0
 
-    def write_state(self, steps: int, last_command: int, world: FakeWorld, arm: FakeArm) -> None:
+    def write_state(self, steps: int, last_command_step: int, world: FakeWorld, arm: FakeArm) -> None:
         """Replace the content of the file by the state after `steps` control steps.
 
         Raises:
@@ -31,7 +31,7 @@ class FakeStateLog(LogFile):
         """
         state = {
             "steps": steps,
-            "last_command": last_command,
+            "last_command": last_command_step,
             "objects": list(map(vars, world.objects)),
             "removed": list(map(vars, world.removed_objects)),
             "held": None if world.held_object is None else world.objects.index(world.held_object),

@@ -177,7 +177,7 @@ class SimCell(CellWithoutHardware):
     def _rebuild_world(self, log: Path) -> InterruptedState:
         """Execute the commands of a log, continue the log, and return the state of the interrupted run."""
         state = rebuild_world(self._world, self._tool, read_commands(log))
-        self.steps, self.last_command = state.step_count, state.last_command_step
+        self.steps, self.last_command_step = state.step_count, state.last_command_step
         self._world.log = CommandLog(log, self._world.robot.joint_count, resume=True)
         return state
 

@@ -38,7 +38,7 @@ class SimVisuals:
     def __init__(self, world: World) -> None:
         self._world = world
         self._link_indices = range(world.client.getNumJoints(world.arm))
-        # For a body without links, PyBullet returns the pose X_WI of the centre of mass.
+        # Frame I: centre of mass, frame L: link. For a body without links, PyBullet returns the pose X_WI.
         self._X_IL = {body: get_inertial_pose(world.client, body).inverse() for body in world.labels}
         self.shapes: Sequence[Shape] = tuple(_make_shapes(world))
 
