@@ -46,7 +46,7 @@ DETECTOR_OPTIONS = {
     "embedded": None, "noisy": NoisyOptions, "rfdetr": RfdetrOptions, "roboflow": RoboflowOptions,
 }  # fmt: skip
 KINDS = {
-    "node": "node", "number": "number", "text": "text", "word": "name", "words": "name, or list of names",
+    "node": "node", "number": "number", "text": "text", "name": "name", "names": "name, or list of names",
     "list": "list", "value": "any value", "values": "names with values", "variables": "names with `$name`",
     "paths": "file, or list of files", "params": "names with params", "routes": "classes with bins",
     "trees": "names with subtrees", "args": "list of names, or names with values", "label": "name",

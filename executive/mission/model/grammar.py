@@ -11,9 +11,9 @@ class GrammarKey:
     """A key of a mapping.
 
     Attributes:
-        kind: Kind of the value: `node`, `number`, `text`, `word` (an identifier), `label`, `list`, `value`
-            (any plain value), or a list or mapping of such values: `words`, `values`, `variables`, `paths`,
-            `params`, `routes`, `trees`, `args`.
+        kind: Kind of the value: `node`, `number`, `text`, `name`, `label`, `list`, `value` (any YAML value),
+            or a list or mapping of such values: `names`, `values`, `variables`, `paths`, `params`, `routes`,
+            `trees`, `args`.
         doc: Meaning of the key, one sentence.
         is_required: True if the key is mandatory.
     """
@@ -30,33 +30,33 @@ LABEL_PATTERN = "[a-z_][a-z0-9_]*"
 """Regular expression that every label matches."""
 
 LABEL_KEY = GrammarKey("label", "Label of the node, for references in `on`, `until` and `catch`.")
-"""The key `as`, which any node may have at the level of its keyword."""
+"""The key `as`, an optional sibling of the keyword of a node."""
 
 SEQUENCE_KEYWORD = "sequence"
-"""Keyword of the control node for a list without a keyword."""
+"""Keyword that is assumed if a node is written as a plain list."""
 
 USE_KEYWORD = "use"
 """Keyword of a node that uses a subtree."""
 
 USE_SIBLINGS: GrammarKeys = {
     "with": GrammarKey("values", "Values of the subtree's arguments."),
-    "returns": GrammarKey("variables", "Variables of the caller for the returned values: `returned: $mine`."),
+    "returns": GrammarKey("variables", "Variable of the caller for each returned one: `pose: $grasp_pose`."),
 }
 """Keys at the level of `use`."""
 
 KEYWORD_HINTS: Mapping[str, str] = {
     "then": "Write nodes that run in sequence as a list.",
-    "do": "Only control nodes have the key do; write the node directly.",
-    "with": "Write with at the level of use, not below use.",
-    "returns": "Write returns at the level of use, not below use.",
+    "do": 'Only control nodes have the key "do"; write the node without "do".',
+    "with": 'Write "with" next to "use", with the same indentation.',
+    "returns": 'Write "returns" next to "use", with the same indentation.',
 }
 """Hints for words that authors write as keywords by mistake; control nodes declare more hints."""
 
 MISSION_KEYS: GrammarKeys = {
-    "mission": GrammarKey("word", "Name of the mission.", is_required=True),
+    "mission": GrammarKey("name", "Name of the mission.", is_required=True),
     "description": GrammarKey("text", "Purpose of the mission, one sentence."),
-    "cell": GrammarKey("text", "Path of the cell file, below this folder or shipped.", is_required=True),
-    "library": GrammarKey("paths", "Paths of library files, below this folder or shipped."),
+    "cell": GrammarKey("text", "Cell file: a path relative to this or the shipped folder.", is_required=True),
+    "library": GrammarKey("paths", "Library files: paths relative to this or the shipped folder."),
     "params": GrammarKey("params", "Constants, read as `$name`; `--set name=value` replaces a value."),
     "routes": GrammarKey("routes", "Bin, or list of permitted bins, for each class of objects."),
     "tree": GrammarKey("node", "Root node of the tree.", is_required=True),
@@ -65,7 +65,7 @@ MISSION_KEYS: GrammarKeys = {
 """The keys of a mission file."""
 
 LIBRARY_KEYS: GrammarKeys = {
-    "library": GrammarKey("word", "Name of the library.", is_required=True),
+    "library": GrammarKey("name", "Name of the library.", is_required=True),
     "description": GrammarKey("text", "Content of the library, one sentence."),
     "trees": GrammarKey("trees", "Subtrees by name.", is_required=True),
 }
@@ -74,14 +74,14 @@ LIBRARY_KEYS: GrammarKeys = {
 SUBTREE_KEYS: GrammarKeys = {
     "doc": GrammarKey("text", "Purpose of the subtree, one sentence."),
     "args": GrammarKey("args", "Arguments of the subtree: a list of names, or names with defaults."),
-    "returns": GrammarKey("words", "Variables that the caller gets; all other variables are then local."),
+    "returns": GrammarKey("names", "Variables that the caller gets; all other variables are then local."),
     "do": GrammarKey("node", "Root node of the subtree.", is_required=True),
 }
 """The keys of a subtree."""
 
 PARAM_KEYS: GrammarKeys = {
     "default": GrammarKey("value", "Default value; a param without a default must be set with `--set`."),
-    "type": GrammarKey("word", "text, integer, number, boolean or list; by default the type of `default`."),
+    "type": GrammarKey("name", "text, integer, number, boolean or list; by default the type of `default`."),
     "min": GrammarKey("number", "Minimum value."),
     "max": GrammarKey("number", "Maximum value."),
     "choices": GrammarKey("list", "Allowed values."),

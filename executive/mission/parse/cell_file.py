@@ -54,9 +54,9 @@ class CellFile:
     root: YamlNode | None = None
     findings: tuple[Finding, ...] = ()
 
-    def make_error(self, path: KeyPath, code: str, message: str) -> Finding:
-        """Return an error about the value at `path`."""
-        span = find_span(self.root, path) if self.root else self.source.make_span()
+    def make_error(self, key_path: KeyPath, code: str, message: str) -> Finding:
+        """Return an error about the value at `key_path`."""
+        span = find_span(self.root, key_path) if self.root else self.source.make_span()
         return make_error(span, code, message)
 
 
@@ -94,7 +94,7 @@ def read_cell(path: Path, overrides: Mapping[str, str]) -> CellFile:
     overlap_errors = (file.make_error(keys, "layout", message) for keys, message in find_overlaps(config))
     resolved_config, outside_errors = _resolve_model_files(file, config, reader.folders)
     findings = (*findings, *_find_unknown_poses(file, config), *outside_errors, *overlap_errors)
-    # After an error, the file has no `config`, so that no caller opens a model file outside the folder.
+    # If a model file lies outside the folder, `config` is None, so that no caller opens that file.
     return replace(file, config=None if outside_errors else resolved_config, findings=findings)
 
 
@@ -214,14 +214,14 @@ def _resolve_model_files(
     objects, errors = dict(config.objects), []
     for label, model in config.objects.items():
         for key, path in (("urdf", model.urdf), ("mesh", model.mesh)):
-            keys = ("objects", label, key)
-            folder = folders.get(find_span(file.root, keys).source, folders[file.source])
+            key_path = ("objects", label, key)
+            folder = folders.get(find_span(file.root, key_path).source, folders[file.source])
             if path and is_outside_path(path):
                 message = f'"{path}" must be a relative path without ".."'
-                errors.append(file.make_error(keys, "outside", message))
+                errors.append(file.make_error(key_path, "outside", message))
             elif path and os.path.isfile(folder / path):
                 objects[label] = objects[label].model_copy(update={key: str((folder / path).resolve())})
                 if has_outside_link(folder, path):
                     message = f'"{path}" is a link to a file outside {folder}'
-                    errors.append(file.make_error(keys, "outside", message))
+                    errors.append(file.make_error(key_path, "outside", message))
     return config.model_copy(update={"objects": objects}), errors

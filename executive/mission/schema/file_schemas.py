@@ -40,7 +40,7 @@ def make_library_schema(skills: Skills, node_classes: ControlNodes) -> Schema:
 
 def _make_file_schema(title: str, keys: GrammarKeys, skills: Skills, node_classes: ControlNodes) -> Schema:
     control_nodes = {word: _make_control_node_schema(node_class) for word, node_class in node_classes.items()}
-    use = {"title": grammar.USE_KEYWORD, "description": "A subtree by its name.", **_SCHEMAS_BY_KIND["word"]}
+    use = {"title": grammar.USE_KEYWORD, "description": "A subtree by its name.", **_SCHEMAS_BY_KIND["name"]}
     subtree = {"title": "A subtree", **_make_mapping_schema(grammar.SUBTREE_KEYS)}
     return {
         "$schema": DIALECT,
@@ -137,7 +137,7 @@ def _make_value_schema(key: Key | GrammarKey) -> Schema:
         case KeyKind.REASONS:
             return _make_reference("reasons")
         case KeyKind.VARIABLE:
-            return _SCHEMAS_BY_KIND["word"]
+            return _SCHEMAS_BY_KIND["name"]
         case KeyKind.ELEMENTS:
             return _SCHEMAS_BY_KIND["list"]
         case KeyKind.SECTIONS:
@@ -208,7 +208,7 @@ def _allow_list(text_schema: Schema) -> Schema:
     return {**text_schema, "type": ["string", "array"], "items": items, "minItems": 1}
 
 
-_WORD: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
+_ANY_NAME: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
 """Schema of a name that may contain hyphens."""
 
 _SCHEMAS_BY_KIND: Mapping[str, Schema] = {
@@ -216,8 +216,8 @@ _SCHEMAS_BY_KIND: Mapping[str, Schema] = {
     "nodes": {"type": "array", "items": _make_reference("node"), "minItems": 1},
     "number": {"type": "number"},
     "text": {"type": ["string", "number", "boolean"]},
-    "word": {"type": "string", **_WORD},
-    "words": {**_allow_list({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
+    "name": {"type": "string", **_ANY_NAME},
+    "names": {**_allow_list({"pattern": rf"^\$?{_NAME}$"}), "minItems": 0},
     "list": make_value_or_reference_schema({"type": "array"}),
     "value": {},
     "values": _map_names({}),
@@ -226,6 +226,6 @@ _SCHEMAS_BY_KIND: Mapping[str, Schema] = {
     "params": _map_names(_make_reference("param")),
     "routes": {"type": ["object", "null"], "additionalProperties": _allow_list({})},
     "trees": _map_names(_make_reference("tree")),
-    "args": {**_map_names({}), "type": ["object", "array", "null"], "items": {"type": "string", **_WORD}},
+    "args": {**_map_names({}), "type": ["object", "array", "null"], "items": {"type": "string", **_ANY_NAME}},
 }
 """Schema of the value of a key, by `GrammarKey.kind`."""
