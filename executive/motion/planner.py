@@ -72,13 +72,13 @@ class Planner:
         Raises:
             Unreachable: The arm cannot reach both; the message states the joint limit or the distance.
         """
-        length = max(0.0, compute_travel_height(self._config) - goal.position[2])
-        find_configuration_pairs(self.kinematics, goal, length, np.zeros(self.limits.joint_count))
+        approach_height = max(0.0, compute_travel_height(self._config) - goal.position[2])
+        find_configuration_pairs(self.kinematics, goal, approach_height, np.zeros(self.limits.joint_count))
 
     def _find_motion(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
         """Return the first motion of the search that passes all checks."""
-        free_task = _make_free_part_task(task)
-        search = MotionSearch(self._config, self.kinematics, self.limits, start, end, free_task)
+        task_before_contact = _treat_target_as_obstacle(task)
+        search = MotionSearch(self._config, self.kinematics, self.limits, start, end, task_before_contact)
         errors: list[str] = []
         for motion in search.list_motions():
             try:
@@ -99,18 +99,18 @@ class Planner:
             Blocked: The motion comes too near to an obstacle.
             Unreachable, JointLimitError: The motion exceeds the range or another limit of a joint.
         """
-        qs = motion.check_limits(self.limits).q
+        qs = motion.sample_within_limits(self.limits).q
         has_guarded_part = motion.guarded_start_time < math.inf
         free_qs = qs[: math.ceil(motion.guarded_start_time / STEP)] if has_guarded_part else qs
         search.require_clearance(free_qs)
         if self._check_collision is not None:
             free_path = downsample_path(free_qs, MAX_CHECK_SPACING)
-            self._check_collision(free_path, _make_free_part_task(task))
+            self._check_collision(free_path, _treat_target_as_obstacle(task))
             if has_guarded_part:
                 self._check_collision(downsample_path(qs[len(free_qs) - 1 :], MAX_CHECK_SPACING), task)
 
 
-def _make_free_part_task(task: Task) -> Task:
-    """Return the task of a motion before its guarded part: the target of the motion counts as an obstacle."""
+def _treat_target_as_obstacle(task: Task) -> Task:
+    """Return the task before the guarded part, the end of a motion: the target counts as an obstacle."""
     targets = () if task.target is None else (task.target,)
     return replace(task, obstacles=(*task.obstacles, *targets), target=None)

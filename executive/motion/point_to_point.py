@@ -14,7 +14,7 @@ from executive.errors import Fault
 from executive.geometry import Array
 from executive.motion.joints import JointLimits, JointState
 
-_ROUNDING_ERROR = 1e-9  # fraction of a limit
+_RELATIVE_TOLERANCE = 1e-9  # fraction of a limit
 
 
 class JointLimitError(ValueError):
@@ -74,7 +74,7 @@ class Connector:
         else:
             if result not in (Result.Working, Result.Finished):
                 cause = str(result)
-            elif np.any(_find_max_speeds(profile) > (1 + _ROUNDING_ERROR) * self.limits.velocity):
+            elif np.any(_find_max_speeds(profile) > (1 + _RELATIVE_TOLERANCE) * self.limits.velocity):
                 cause = "its profile exceeds a velocity limit"
         if cause is not None:
             states = f"from {start.q.round(4)} to {end.q.round(4)} rad"

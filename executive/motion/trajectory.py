@@ -86,7 +86,7 @@ class Trajectory:
         states = sample_pieces(self._pieces, np.arange(0.0, self.duration, STEP, dtype=np.float64))
         return JointState(*map(np.vstack, zip(states, self._end_state, strict=True)))
 
-    def check_limits(self, limits: JointLimits) -> JointState:
+    def sample_within_limits(self, limits: JointLimits) -> JointState:
         """Check the limits of every joint, and return the checked states (`samples`).
 
         Raises:
