@@ -89,10 +89,10 @@ class CellLocalizer:
         """Return a text with evidence against the detected class; "" if none, or for an object in a bin."""
         if any(bin.contains(position, BIN_THICKNESS) for bin in self.bins):
             return ""
-        frame, area, object_class = detections.frame, detections.area, self.classes[detection.label]
+        frame, image_region, object_class = detections.frame, detections.area, self.classes[detection.label]
         return describe_size_contradiction(
-            detection, position, frame, area, object_class
-        ) or describe_top_contradiction(detection, position, frame, area, self.classes)
+            detection, position, frame, image_region, object_class
+        ) or describe_top_contradiction(detection, position, frame, image_region, self.classes)
 
 
 def build_localizer(

@@ -60,13 +60,13 @@ class NoisyDetector:
         return cls(config, NoisyOptions.read(config), context)
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
+    def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
         del base
         invalid_options = list(NoisyOptions.find_errors(config))
         yield from invalid_options
-        if not invalid_options and config.options["of"] not in others:
-            yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(others)}'
+        if not invalid_options and config.options["of"] not in all_configs:
+            yield "of", f'the cell has no detector "{config.options["of"]}"; it has: {", ".join(all_configs)}'
 
     def request(self, frame: Frame, view: str) -> ChangedRequest:
         """Return the request to the base detector, with errors added to the answer."""

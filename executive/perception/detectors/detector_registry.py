@@ -69,8 +69,8 @@ def build_detectors(
 def find_detector_errors(configs: Mapping[str, DetectorConfig], base: Path) -> Iterator[tuple[KeyPath, str]]:
     """Yield the key and the message of each error in the sections of the detectors, without loading a model.
 
-    A kind may check its options in a static method `check(config, base, others)`: `base` is the folder of
-    the cell file, and `others` are the sections of all detectors of the cell.
+    A kind may check its options in a static method `check(config, base, all_configs)`: `base` is the folder
+    of the cell file, and `all_configs` are the sections of all detectors of the cell.
     """
     kinds = find_detector_kinds()
     for name, config in configs.items():

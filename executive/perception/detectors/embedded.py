@@ -30,9 +30,9 @@ class EmbeddedDetector(RfdetrDetector):
         return cls(OnnxModel(MODEL_PATH, read_labels(LABELS_PATH)), config, context)
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
+    def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each option in the cell file with an error message: this kind of detector has no options."""
-        del base, others
+        del base, all_configs
         yield from DetectorOptions.find_errors(config)
 
     @staticmethod

@@ -77,9 +77,9 @@ class RfdetrDetector(ThreadedDetector):
         return cls(model, config, context, options.class_map)
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
+    def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each missing, unknown or invalid option, with an error message; load no model."""
-        del others
+        del all_configs
         errors = list(RfdetrOptions.find_errors(config))
         yield from errors
         if errors:

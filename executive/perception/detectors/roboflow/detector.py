@@ -52,9 +52,9 @@ class RoboflowDetector(ThreadedDetector):
         return cls(config, RoboflowOptions.read(config), context, ApiKey())
 
     @staticmethod
-    def check(config: DetectorConfig, base: Path, others: Mapping[str, DetectorConfig]) -> OptionErrors:
+    def check(config: DetectorConfig, base: Path, all_configs: Mapping[str, DetectorConfig]) -> OptionErrors:
         """Yield each invalid option, with a message."""
-        del base, others
+        del base, all_configs
         yield from RoboflowOptions.find_errors(config)
 
     @staticmethod
