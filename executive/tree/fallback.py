@@ -43,7 +43,7 @@ class Fallback(ControlNode):
             self.report_choice(f"choice {self._child_index + 1} of {len(self.do)}", failure)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; each child starts in the states after failures of the previous child."""
+        """Return the outcomes; each child starts in the states after failures of the previous child."""
         success = halted = None
         failures: Mapping[PossibleFailure, FlowState] = {}
         entry: FlowState | None = state

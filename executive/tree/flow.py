@@ -1,4 +1,4 @@
-"""Abstract interpretation of a tree: entry states and possible ends of its nodes."""
+"""Abstract interpretation of a tree: entry states and possible outcomes of its nodes."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ class PossibleFailure(Reason):
 
 @dataclass(frozen=True)
 class Flow:
-    """Possible ends of a node that starts in one entry state, with the state after each end.
+    """Possible outcomes of a node that starts in one entry state, with the state after each outcome.
 
     Attributes:
         success: State after success; None if the node cannot succeed.
@@ -185,21 +185,21 @@ class Flow:
 
 
 def make_unknown_flow(source: str, path: str) -> Flow:
-    """Return the possible ends of the node `source` at `path`, whose effects are unknown."""
+    """Return the possible outcomes of the node `source` at `path`, whose effects are unknown."""
     failure = PossibleFailure(source, UNKNOWN_NAME, path)
     return Flow(UNKNOWN_STATE, {failure: UNKNOWN_STATE}, UNKNOWN_STATE)
 
 
 FlowFunction: TypeAlias = Callable[[Child, FlowState], Flow]
-"""Function that returns the possible ends of a child from a state."""
+"""Function that returns the possible outcomes of a child from a state."""
 
 
 def find_fixed_point(
     get_flow: FlowFunction, child: Child, entry: FlowState, get_next_entry: Callable[[Flow], FlowState | None]
 ) -> tuple[Flow, FlowState]:
-    """Return the possible ends of a child that runs repeatedly, and the joined state of all entries.
+    """Return the possible outcomes of a child that runs repeatedly, and the joined state of all entries.
 
-    `entry` is the state before the first run of the child. `get_next_entry` maps the possible ends of
+    `entry` is the state before the first run of the child. `get_next_entry` maps the possible outcomes of
     the child to the state before the next run; None if there is no next run.
     """
     while True:

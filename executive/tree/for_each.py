@@ -87,7 +87,7 @@ class ForEach(Loop):
         raise Fault(f"{self.name}: {problem}", self.path)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; each further iteration starts in the state after success of the body."""
+        """Return the outcomes; each further iteration starts in the state after success of the body."""
         if self.in_ == ():
             return Flow(state, {}, None)
         entry = state.with_variables([self.each])

@@ -42,7 +42,7 @@ class NodeAnalysis(Protocol):
         """True if the node is halted when a concurrent node ends."""
 
     def get_flow(self, child: Child) -> Flow | None:
-        """Return the possible ends of a child; None if the child never runs."""
+        """Return the possible outcomes of a child; None if the child never runs."""
 
     def get_name(self, child: Child) -> str:
         """Return the name of a child in paths."""

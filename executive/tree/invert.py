@@ -26,7 +26,7 @@ class Invert(ControlNode):
         return Status.SUCCESS if status is Status.FAILURE else status
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends of the body, with success and failure exchanged."""
+        """Return the possible outcomes of the body, with success and failure exchanged."""
         flow = get_flow(self.do, state)
         inverted = PossibleFailure(self.keyword, "inverted", self.path)
         failures = {} if flow.success is None else {inverted: flow.success}

@@ -136,7 +136,7 @@ class ControlNode(KeyOwner, TreeNode):
     # Methods for the checker.
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends of the node from a state; `get_flow` returns those of a child."""
+        """Return the possible outcomes of the node from a state; `get_flow` returns those of a child."""
         raise NotImplementedError
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:

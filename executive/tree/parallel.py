@@ -128,7 +128,7 @@ class Parallel(ControlNode):
             self.report_choice(choice, failure)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: combinations of the ends of the children, which all start in `state`."""
+        """Return the possible outcomes: combinations of those of the children, which all start in `state`."""
         flows = [get_flow(child, state) for child in self.do]
         halted_ends = [find_end_tool_states(flow, state, can_be_halted=True) for flow in flows]
         halted = join_states(flow.halted for flow in flows)

@@ -116,7 +116,7 @@ class Retry(Loop):
         return status
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends, by fixed-point iteration over body and recovery."""
+        """Return the possible outcomes, by fixed-point iteration over body and recovery."""
 
         def can_retry(failure: PossibleFailure) -> bool:
             return not self.on or failure.may_match(self.on)

@@ -35,7 +35,7 @@ class Sequence(ControlNode):
         return Status.SUCCESS
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends; each child starts in the state after success of the previous child."""
+        """Return the outcomes; each child starts in the state after success of the previous child."""
         failures: dict[PossibleFailure, FlowState] = {}
         halted = None
         entry: FlowState | None = state

@@ -27,7 +27,7 @@ class Succeed(ControlNode):
         return Status.RUNNING if status is Status.RUNNING else Status.SUCCESS
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends: success after success and failure of the body, or a halt."""
+        """Return the possible outcomes: success after success and failure of the body, or a halt."""
         if self.do is None:
             return Flow(state, {}, None)
         flow = get_flow(self.do, state)

@@ -50,7 +50,7 @@ class Timeout(ControlNode):
         return status
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends of the body, and the timeout if the body can take more than one tick."""
+        """Return the outcomes of the body, and the timeout if the body can take more than one tick."""
         flow = get_flow(self.do, state)
         failures = dict(flow.failures)
         if flow.halted is not None:

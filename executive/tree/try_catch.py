@@ -39,7 +39,7 @@ class TryCatch(ControlNode):
     keyword_hints: ClassVar = dict.fromkeys(("if", "else"), "To handle a failure, write try and catch.")
     symbol = "↯"
     any_of = ("catch", "finally")
-    remedy = "add a try with a catch for this failure around"
+    remedy = "catch this failure in a new try around"
 
     do: Child = key(shorthand=True, in_path=False, doc="Body.")
     catch: tuple[Catch, ...] = key(
@@ -79,7 +79,7 @@ class TryCatch(ControlNode):
         return next((handler.do for handler in self.catch if failure.matches(handler.on)), None)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends.
+        """Return the possible outcomes.
 
         Each handler starts after the failures that it catches; `finally` starts after body and handlers.
         """
@@ -111,7 +111,7 @@ class TryCatch(ControlNode):
         return body_time + (get_min_time(self.finally_) if self.finally_ else 0.0)
 
     def check(self, analysis: NodeAnalysis) -> Iterator[NodeFinding]:
-        """Yield a warning for every reason in a handler that has no effect because of earlier reasons."""
+        """Yield a warning for each reason whose failures are all caught by earlier reasons."""
         body = analysis.get_flow(self.do)
         failures = () if body is None else body.failures
         earlier_reasons: list[Reason] = []
@@ -132,7 +132,7 @@ class TryCatch(ControlNode):
     def explain(self, failure: PropagatedFailure) -> str:
         """Return the cause: no matching handler, or a failure of the handler or of `finally`."""
         if failure.child is self.finally_:
-            return "its finally failed"
+            return "finally failed"
         if failure.child is not self.do:
             name = failure.last_handled_name
             return f"caught {name} ({failure.last_messages.get(name, '')}), but the handler failed"
@@ -153,7 +153,7 @@ class TryCatch(ControlNode):
 
 
 def _append_finally(finally_child: Child, flow: Flow, get_flow: FlowFunction) -> Flow:
-    """Return the possible ends of `finally_child`, which runs after each end in `flow`."""
+    """Return the possible outcomes of a node whose `finally_child` runs after each outcome in `flow`."""
     after_success = get_flow(finally_child, flow.success) if flow.success else Flow(None, {}, None)
     failures, halted = dict(after_success.failures), join_states((flow.halted, after_success.halted))
     for failure, entry in flow.failures.items():

@@ -50,7 +50,7 @@ class While(Loop):
                     return Status.RUNNING
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the possible ends, by fixed-point iteration over condition and body."""
+        """Return the possible outcomes, by fixed-point iteration over condition and body."""
 
         def compute_body_flow(condition: Flow) -> Flow:
             return get_flow(self.do, condition.success) if condition.success else Flow(None, {}, None)

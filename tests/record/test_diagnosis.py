@@ -43,7 +43,7 @@ def test_a_success_has_no_story() -> None:
          "retry: gave up after attempt 1 of 4: its recovery failed with invert.inverted: succeed succeeded"),
         ("  try: IsHolding\n  finally: {Wait: {seconds: 0.1}}\n", "try: has no catch"),
         ("  try: {timeout: {seconds: 0.2, do: {Wait: {seconds: 0.1}}}}\n  finally: IsHolding\n",
-         "try: its finally failed"),
+         "try: finally failed"),
         ("  - MoveToScan\n  - try: [Detect, IsHolding]\n    catch: [{on: [Detect.hidden], do: succeed}]\n",
          "try: catches only Detect.hidden"),
         ("  try: IsHolding\n  catch: [{on: [IsHolding.empty], do: {invert: succeed}}]\n",

@@ -30,9 +30,9 @@ _NO_BREAK_SPACE = "\N{NO-BREAK SPACE}"
 """Space at which `textwrap` does not break a line."""
 
 
-def make_resume_command(run: str) -> str:
-    """Return the command that resumes the run in the directory `run`."""
-    return shlex.join(["executive", "run", "--resume", run])
+def make_resume_command(folder: str) -> str:
+    """Return the command that resumes the run in the directory `folder`."""
+    return shlex.join(["executive", "run", "--resume", folder])
 
 
 def format_diagnosis(diagnosis: Diagnosis, folder: str, repeat_command: str, report: str = "") -> list[str]:
@@ -60,7 +60,7 @@ def list_labelled_sentences(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "raised at", diagnosis.raised_at + note
     if diagnosis.readings:
         readings = diagnosis.readings[:_MAX_READINGS]
-        yield "the cell", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in readings)
+        yield "readings", ", ".join(_format_reading(reading, diagnosis.verdict) for reading in readings)
     for item in diagnosis.lost_items[:_MAX_LOST_ITEMS]:
         yield "lost", _format_lost_item(item)
     # The text of a lost item already contains its last look.
@@ -86,7 +86,7 @@ def _format_failure_path(diagnosis: Diagnosis) -> list[str]:
     omitted = f", {len(rows) - MAX_SHOWN_NODES} nodes omitted" if len(rows) > MAX_SHOWN_NODES else ""
     rows = [*rows[-MAX_SHOWN_NODES:], (node.name, node.path, node.place)]
     width = max(len(name) for name, _, _ in rows)
-    lines = [f"why no node in {diagnosis.mission} handled it, from the root down{omitted}:"]
+    lines = [f"why no node in {diagnosis.mission} handled the failure, from the root down{omitted}:"]
     for name, explanation, place in rows:
         location = f"line {place.removeprefix(mission_prefix)}" if place.startswith(mission_prefix) else place
         lines += wrap_lines(f"{explanation} ({location})", f"  {name:{width}}  ", " " * (width + 4))
@@ -129,8 +129,8 @@ def _format_lost_item(item: LostItem) -> str:
     look, failure, drop_time = item.look, item.last_failure, item.dropped_at
     clauses = [item.item]
     if look is not None:
-        clauses[0] += f" seen last{_format_position(look.position)} at {look.clock:.2f} s"
-        clauses[0] += f", not in the {_format_count(item.later_looks, 'look')} since"
+        clauses[0] += f" last detected{_format_position(look.position)} at {look.clock:.2f} s"
+        clauses[0] += f", not detected in the {_format_count(item.later_looks, 'later look')}"
     if drop_time is not None and (failure is None or failure.clock != drop_time):
         clauses.append(f"dropped at {drop_time:.2f} s")
     if failure is not None:

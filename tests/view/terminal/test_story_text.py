@@ -54,16 +54,16 @@ def test_an_object_that_slips_out_of_the_cup_every_time(abroad) -> None:
         == """\
 FAILURE after 1.92 s: Transit of cube-1 failed (dropped) on the last of 3 attempts: the seal on cube-1 broke
   on the way to red_bin, near (0.50, 0.10, 0.12) m
-why no node in trial.yaml handled it, from the root down:
+why no node in trial.yaml handled the failure, from the root down:
   retry              all 3 attempts failed: 1 x Grasp.missed, 2 x Transit.dropped (line 11)
   Transit of cube-1  tree/5:retry/do/Transit (line 15)
-the cell    tool.holding = False (1.92 s), tool.touching = True (1.75 s), tool.bears = 7.9 (1.28 s)
+readings    tool.holding = False (1.92 s), tool.touching = True (1.75 s), tool.bears = 7.9 (1.28 s)
 last look   cube-1 as cube 0.90 at (0.498, 0.102, 0.025) m: frame 3, camera overhead, by embedded, at 1.41 s;
             3 looks, 3 failed attempts in all
 now         the arm is at rest, the tool is empty
 left to do  1: cube-1
-next        to let the mission continue after Transit.dropped: add a try with a catch for this failure around
-            line 15, or allow more than 3 attempts with --set attempts=...
+next        to let the mission continue after Transit.dropped: catch this failure in a new try around line 15,
+            or allow more than 3 attempts with --set attempts=...
 """
     )
 
@@ -76,7 +76,7 @@ def test_a_time_that_is_over(abroad) -> None:
     assert (story.node.path, story.node.place) == ("tree/timeout", "trial.yaml:7")
     assert story.advice == [
         "take cube-1 out of the tool before a new run",
-        "to let the mission continue after timeout.timeout: add a try with a catch for this failure "
+        "to let the mission continue after timeout.timeout: catch this failure in a new try "
         "around line 7, or allow more than 1 s with --set patience=...",
     ]
 
@@ -95,7 +95,7 @@ FAULT after 0.62 s: Grasp: ZeroDivisionError: vacuum gauge
 where       tree/5:retry/do/Grasp (trial.yaml:15)
 raised at   terminal/test_story_text.py:N, in broken; the whole traceback is in the journal, event
             "FaultRaised"
-the cell    command raised ZeroDivisionError (0.62 s)
+readings    command raised ZeroDivisionError (0.62 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all
 now         the arm is at rest, the tool is empty
@@ -146,8 +146,9 @@ def test_an_object_that_is_lost(at_home) -> None:
         text(run, numbered=False)
         == """\
 FAILURE after 1.53 s: 1 object was lost: cube-1
-lost        cube-1 seen last at (0.500, 0.100, 0.025) m at 0.05 s, not in the 3 looks since; Transit.dropped
-            at 0.80 s: the seal on cube-1 broke on the way to red_bin, near (0.50, 0.10, 0.12) m
+lost        cube-1 last detected at (0.500, 0.100, 0.025) m at 0.05 s, not detected in the 3 later looks;
+            Transit.dropped at 0.80 s: the seal on cube-1 broke on the way to red_bin, near (0.50, 0.10,
+            0.12) m
 now         the arm is at rest, the tool is empty
 next        look for cube-1 by hand, below the place where it was dropped
 """
@@ -165,14 +166,14 @@ def test_an_arm_whose_way_is_barred_whenever_it_carries(at_home) -> None:
         text(run, numbered=False)
         == """\
 FAILURE after 2.11 s: PutDown of cube-1 failed (blocked): link 5 met a wrench
-why no node in missions/sort_overhead.yaml handled it, from the root down:
+why no node in missions/sort_overhead.yaml handled the failure, from the root down:
   repeat                succeeds only with choice.no_candidate (line N)
   carry_and_watch: try  caught Transit.blocked (link 5 met a wrench), but the handler failed
                         (missions/library/sorting.yaml:N)
   put_aside: try        catches only PutDown.dropped (missions/library/sorting.yaml:N)
   PutDown of cube-1     tree/2:repeat/do/carry_and_watch/try/catch/4/put_aside/try/do/PutDown
                         (missions/library/sorting.yaml:N)
-the cell    arm.met = link 5 met a wrench (1.20 s), tool.bears = 7.9 (0.72 s), tool.holding = True (0.72 s)
+readings    arm.met = link 5 met a wrench (1.20 s), tool.bears = 7.9 (0.72 s), tool.holding = True (0.72 s)
 last look   cube-1 as cube 0.90 at (0.500, 0.100, 0.025) m: frame 1, camera overhead, by embedded, at 0.05 s;
             1 look, 0 failed attempts in all
 now         the arm is at rest, the tool holds cube-1
@@ -211,7 +212,7 @@ def test_long_texts_are_wrapped_and_cut_but_a_command_is_neither() -> None:
     assert lines[-2] == "report      report.html"
     assert lines[-1] == f"repeat      {repeat}"
     assert max(map(len, lines[:-1])) <= MAX_LINE_WIDTH
-    assert lines[3] == "why no node in trial.yaml handled it, from the root down, 4 nodes omitted:"
+    assert lines[3] == "why no node in trial.yaml handled the failure, from the root down, 4 nodes omitted:"
     assert lines[4].startswith("  some_subtree_4: retry  w why")
     assert "picture     frames/000001_cube-1_missed.jpg" in lines
 
