@@ -57,7 +57,7 @@ def test_without_a_name_all_skills_are_checked_and_mistakes_have_exit_code_1() -
     lines = [line for line in result.stdout.splitlines() if not line.startswith("ok")]
     assert lines[:3] == [
         "failed   Nap.has_allowed_defaults: the default of Nap.gap must be at most 0.2 m, not 0.3. "
-        "Correct default or bounds. (and 1 more)",
+        "Correct the default or the bounds. (and 1 more)",
         "failed   Dream.can_succeed: Dream cannot be tested: "
         'no value can be generated for "story" (a text). '
         'Return it from a function in a test: list_conformance_checks(Dream, lambda scene: {"story": ...}); '

@@ -98,7 +98,7 @@ def leaves_inputs_unchanged(runs: SkillRuns) -> Iterator[str]:
 def uses_only_declared_parts(runs: SkillRuns) -> Iterator[str]:
     """The skill commands only parts in `uses`, moves only with `moves`, and senses only with `senses`."""
     skill = runs.skill
-    for name in dict.fromkeys(call.name for test_run in runs.unhalted_runs for call in test_run.calls):
+    for name in dict.fromkeys(call.name for test_run in runs.unhalted_runs for call in test_run.cell_calls):
         part = name.partition(".")[0]
         if name in _ACTIONS and part not in skill.uses:
             yield f'{runs.name} calls cell.{name} and does not declare the {part}. Add "{part}" to uses.'
@@ -147,7 +147,7 @@ def has_short_ticks(runs: SkillRuns) -> Iterator[str]:
 
 def _describe_difference(run: SkillTestRun, rerun: SkillTestRun) -> str:
     """Return a description of the first difference between two runs, or ""."""
-    for call, other in zip(run.calls, rerun.calls, strict=False):
+    for call, other in zip(run.cell_calls, rerun.cell_calls, strict=False):
         if (call.tick, call.name) != (other.tick, other.name):
             return f"it called {call.name} at tick {call.tick} and then {other.name} at tick {other.tick}"
         if not has_equal_pickle(call.arguments, other.arguments):
@@ -175,7 +175,7 @@ def _describe_halt_fault(test_run: SkillTestRun) -> str:
 
 def _describe_arm_problem(test_run: SkillTestRun) -> str:
     advice = "Call cell.arm.stop() in finally, or use follow of executive.manipulation.motions."
-    has_started_arm = any(call.name == "arm.start" for call in test_run.calls)
+    has_started_arm = any(call.name == "arm.start" for call in test_run.cell_calls)
     is_moving = has_started_arm and not test_run.is_at_rest
     return f"{test_run.result_description}, and the arm still moves. {advice}" if is_moving else ""
 
@@ -183,14 +183,14 @@ def _describe_arm_problem(test_run: SkillTestRun) -> str:
 def _describe_tool_problem(skill: type[Skill], test_run: SkillTestRun) -> str:
     """Return the violation of the declared tool state at the end of a run, or ""."""
     required, requirement = _find_required_tool_state(skill, test_run)
-    if required is not ANY and (required is HOLDING) != test_run.holds_after:
-        actual = "holds something" if test_run.holds_after else "is empty"
+    if required is not ANY and (required is HOLDING) != test_run.holds_object_at_end:
+        actual = "holds something" if test_run.holds_object_at_end else "is empty"
         expected = "hold something" if required is HOLDING else "be empty"
         return (
             f"{test_run.result_description}, and the tool {actual}. It should {expected}, {requirement}. "
             "Leave the tool in this state, or change the declaration."
         )
-    if test_run.holds_after and not test_run.is_item_held:
+    if test_run.holds_object_at_end and not test_run.is_item_held:
         return (
             f"{test_run.result_description}, and the tool holds an object that is not in the ledger. "
             "Call cell.ledger.record_grasp, or open the tool in finally."
@@ -200,7 +200,7 @@ def _describe_tool_problem(skill: type[Skill], test_run: SkillTestRun) -> str:
 
 def _find_required_tool_state(skill: type[Skill], test_run: SkillTestRun) -> tuple[ToolState, str]:
     """Return the required state of the tool at the end of a run, and the declaration that requires it."""
-    initial_state = HOLDING if test_run.holds_before else EMPTY
+    initial_state = HOLDING if test_run.holds_object_at_start else EMPTY
     if test_run.status == "SUCCESS":
         state_after = skill.tool_state[1]
         return (initial_state, "as before") if state_after is ANY else (state_after, "by tool_state")

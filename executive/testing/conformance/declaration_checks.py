@@ -46,7 +46,7 @@ def has_allowed_defaults(runs: SkillRuns) -> Iterator[str]:
     """Each default is a valid value of its param: of the type, within the bounds, among the choices."""
     for param in runs.skill.params.values():
         if not param.is_required and (problem := _describe_default_problem(param)):
-            yield f"the default of {runs.name}.{param.name} {problem}. Correct default or bounds."
+            yield f"the default of {runs.name}.{param.name} {problem}. Correct the default or the bounds."
 
 
 def declares_reasons(runs: SkillRuns) -> Iterator[str]:
@@ -65,7 +65,7 @@ def declares_reasons(runs: SkillRuns) -> Iterator[str]:
 
 
 def declares_resources(runs: SkillRuns) -> Iterator[str]:
-    """`uses` has only arm, tool, camera; `moves` needs arm; `tool_state_after_failure` only reasons."""
+    """`uses` has only arm, tool, camera; `moves` needs arm; `tool_state_after_failure`: reasons or `halt`."""
     skill, name = runs.skill, runs.name
     unknown_uses = [repr(skill.uses)] if isinstance(skill.uses, str) else sorted({*skill.uses} - {*RESOURCES})
     if unknown_uses:

@@ -102,14 +102,14 @@ class SkillRuns:
 def _choose_halt_ticks(test_run: SkillTestRun) -> list[int]:
     """Return the halt ticks of a run: evenly spaced, at each call, and one tick after each call."""
     evenly_spaced = np.linspace(1, test_run.ticks, min(test_run.ticks, MAX_HALTS), dtype=int).tolist()
-    call_ticks = sorted({call.tick + offset for call in test_run.calls for offset in (0, 1)})
+    call_ticks = sorted({call.tick + offset for call in test_run.cell_calls for offset in (0, 1)})
     return sorted(tick for tick in {*evenly_spaced, *call_ticks[:MAX_HALTS]} if 1 <= tick <= test_run.ticks)
 
 
 def _list_faults(skill: type[Skill], run: SkillTestRun) -> Iterator[NamedFault]:
     """Yield the faults that can affect a skill, given a run of the skill without a fault."""
     for fault in _FAULTS:
-        can_occur = run.holds_before or not fault.requires_holding
+        can_occur = run.holds_object_at_start or not fault.requires_holding
         if can_occur and (not fault.resource or fault.resource in skill.uses):
             yield fault
     if "tool" in skill.uses:
@@ -125,7 +125,7 @@ def _move_arm(occurrence: Occurrence) -> bool:
 
 
 def _empty_table(occurrence: Occurrence) -> bool:
-    """Remove all objects from the table; return False, so that also later objects are removed."""
+    """Remove all objects from the table; return False (not finished), to remove later objects too."""
     context = occurrence.context
     while (true_object := context.find_object("nearest", "")) is not None:
         context.world.remove(true_object)

@@ -89,11 +89,11 @@ class SkillTestRun:
         message: Message of a failure or fault, or duration and place of a stuck tick.
         ticks: Number of complete control steps.
         outputs: Values of the output ports by name, after success.
-        calls: All calls of parts of the cell, in order.
+        cell_calls: All calls of parts of the cell, in order.
         tick_durations: Computing time of each tick [s].
         changed_names: Names of the params and inputs whose values the skill changed.
-        holds_before: True if the tool held an object at the start.
-        holds_after: True if the tool holds an object at the end.
+        holds_object_at_start: True if the tool held an object at the start.
+        holds_object_at_end: True if the tool holds an object at the end.
         is_item_held: True if the tool holds an item at the end according to the ledger.
         is_at_rest: True if the arm is at rest at the end.
     """
@@ -114,12 +114,12 @@ class SkillTestRun:
         self.reason = self.message = ""
         self.ticks = 0
         self.outputs: Mapping[str, Any] = {}
-        self.calls, self.tick_durations = list[Call](), list[float]()
-        self.holds_before = fake.tool.holding
+        self.cell_calls, self.tick_durations = list[Call](), list[float]()
+        self.holds_object_at_start = fake.tool.holding
         self.status = self._run_skill(values, fake)
         self.changed_names = [name for name in values if not has_equal_pickle(values[name], originals[name])]
-        self.holds_after, self.is_item_held = fake.tool.holding, fake.ledger.find_held_item() is not None
-        self.is_at_rest = fake.arm.at_rest
+        self.holds_object_at_end = fake.tool.holding
+        self.is_item_held, self.is_at_rest = fake.ledger.find_held_item() is not None, fake.arm.at_rest
 
     @property
     def result_description(self) -> str:
@@ -136,7 +136,7 @@ class SkillTestRun:
         if access.is_call and access.role in _OBSERVED_ROLES:
             # Only runs without fault and halt are compared; the arguments may be large, for instance frames.
             arguments = access.all_arguments if self._fault is None and self._halt_at is None else ()
-            self.calls.append(Call(self.ticks, access.name, arguments))
+            self.cell_calls.append(Call(self.ticks, access.name, arguments))
         return access.proceed()
 
     def _run_skill(self, values: Mapping[str, Any], fake: FakeCell) -> str:

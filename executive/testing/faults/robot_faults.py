@@ -1,6 +1,6 @@
 """Faults of arm, tool, camera, localizer, table and operator.
 
-An effect whose docstring does not say "once" lasts until the end of its fault.
+An effect lasts until its fault ends, or happens once if its docstring says so.
 """
 
 from __future__ import annotations
@@ -159,7 +159,7 @@ class FailingPlanning:
     """A planning that ends without a motion; implements `Planning`.
 
     Attributes:
-        planning: The planning without the fault, which determines the time of the end.
+        planning: The original planning; the failure is reported when this planning ends.
         is_blocked: True if the planning fails with Blocked; False if it fails with Unreachable.
     """
 

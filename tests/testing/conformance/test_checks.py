@@ -43,7 +43,7 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         'Undocumented.target has no doc. Write port(..., doc="its meaning").',
     ]),
     ("has_allowed_defaults", faulty.BadDefaults, [
-        f"the default of BadDefaults.{problem}. Correct default or bounds." for problem in (
+        f"the default of BadDefaults.{problem}. Correct the default or the bounds." for problem in (
             "near must be at least 0.2 m, not 0.1",
             "far must be at most 0.2 m, not 0.3",
             'order must be "columns" or "none", not the text "rows"',
