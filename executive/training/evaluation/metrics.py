@@ -60,21 +60,21 @@ class Evaluation:
         threshold: Minimum confidence of a detection.
         images: Number of images, including images without an answer.
         objects: Number of objects in the images with an answer.
-        precision: Fraction of the detections with the correct class and an IoU of at least 0.5.
+        precision: Fraction of the detections that have the correct class and an IoU of at least 0.5.
         recall: Fraction of the objects that are detected with their class.
         map50: Mean average precision at IoU 0.5 over detections with any confidence.
         map50_95: Mean average precision over IoUs from 0.5 to 0.95.
-        centre: Distance between the centres of detected and true box [pixel].
-        position: Distance between detected and true centre in the world at the object's height [mm].
-        localized: Distance between the localizer's position and the true centre of the object [mm].
+        centre: Distance between the centres of the detected and the true box [pixel].
+        position: Distance from the true centre to the detected one, projected to the true height [mm].
+        localized: Distance from the true centre to the position that the localizer computes [mm].
         latency: Wall time from a frame to its detections [ms], without the first image.
         by_class: Metrics of each class.
         confusion: Number of objects by true class, then by detected class; either can be `nothing`.
         unavailable: Number of images without a usable answer of the detector.
         why: Message of the last unusable answer, or "".
         answered_by: Number of answers by name of the answering detector.
-        by_count: Numbers of fully visible `objects`, `missed` and `confused` objects, and
-            `false_detections`, by the number of objects in the image.
+        by_count: Error counts by number of objects in the image. The keys of each row are `objects` (fully
+            visible), `missed`, `confused` and `false_detections`.
         reliability: Error rates for the ledger; None if there was no answer.
         frames: Brightness, contrast and colours of the workspace; None if no image shows all of it.
     """
