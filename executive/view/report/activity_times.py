@@ -14,7 +14,7 @@ from executive.record.timeline.timeline import Timeline
 
 LOOK = "look"
 """Activity: detection of the next item while the tool is empty."""
-RETRY = "retry"
+FAILED_ATTEMPTS = "failed attempts"
 """Activity: failed attempts to pick or place an item, and the looks before the next attempt."""
 WAITING = "waiting"
 """Activity: no skill works on an item, moves the arm or senses the scene."""
@@ -31,7 +31,7 @@ class ActivityTimes:
     """Time of a run by item and activity [s].
 
     Attributes:
-        activities: Activities that took time: look, skills in the order of their first use, retry, waiting.
+        activities: Activities that took time: look, skills by their first use, failed attempts, waiting.
         times_by_item: Time by item and activity; `NO_ITEM` is the last key. The sum of all times is the
             duration of the run.
     """
@@ -44,7 +44,7 @@ def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> 
     """Return the time by item and activity, from the start of a run to the last event of its timeline.
 
     If several skills run, the time belongs to the first started skill that works on an item. Time without
-    such a skill belongs to the item that is selected next. `timeline` must have a history.
+    such a skill belongs to the item that is selected next. `timeline.has_history` must be true.
     """
     skills = {node.path: node for node in nodes if node.kind == "skill"}
     activations = [activation for activation in timeline.activations if activation.node in skills]
@@ -52,7 +52,7 @@ def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> 
     times: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     # The dictionary without values is used as an ordered set.
     skill_activities: dict[str, None] = {}
-    retries = _find_retries(activations, skills, timeline)
+    failed_attempts = _find_failed_attempts(activations, skills, timeline)
     for start, end, running in _split_time(activations, timeline.clock):
         item_activation = next((activation for activation in running if activation.item), None)
         if item_activation is not None:
@@ -61,14 +61,14 @@ def compute_activity_times(timeline: Timeline, nodes: Sequence[OutlineNode]) -> 
             nodes_without_item = [skills[activation.node] for activation in running]
             is_look = any(node.senses or "arm" in node.uses for node in nodes_without_item)
             item, activity = _find_next_item(selections, end), LOOK if is_look else WAITING
-        retry_start, retry_end = retries.get(item, (0.0, 0.0))
-        if retry_start <= start and end <= retry_end:
-            activity = RETRY
+        failed_start, failed_end = failed_attempts.get(item, (0.0, 0.0))
+        if failed_start <= start and end <= failed_end:
+            activity = FAILED_ATTEMPTS
         elif item_activation is not None:
             skill_activities[activity] = None
         times[item][activity] += end - start
     # A skill may have the name of another activity, so duplicates are removed.
-    all_activities = dict.fromkeys([LOOK, *skill_activities, RETRY, WAITING])
+    all_activities = dict.fromkeys([LOOK, *skill_activities, FAILED_ATTEMPTS, WAITING])
     activities = tuple(name for name in all_activities if any(name in row for row in times.values()))
     items = sorted(times, key=lambda item: item == NO_ITEM)
     return ActivityTimes(activities, {item: dict(times[item]) for item in items})
@@ -93,11 +93,11 @@ def _find_next_item(selections: Sequence[tuple[float, str]], time: float) -> str
     return selections[index][1] if index < len(selections) else NO_ITEM
 
 
-def _find_retries(
+def _find_failed_attempts(
     activations: Sequence[Activation], skills: Mapping[str, OutlineNode], timeline: Timeline
 ) -> dict[str, tuple[float, float]]:
     """Return, for each item with a failed attempt, the start and the end of its failed attempts [s]."""
-    retries = {}
+    failed_attempts = {}
     for activation in activations:
         skill, item = skills[activation.node], activation.item
         # An attempt fails if a skill that acts on the item fails, not if a look fails.
@@ -106,5 +106,5 @@ def _find_retries(
             first_start = min(other.start for other in activations if other.item == item)
             # Looks before the next attempt count as part of the failed attempt.
             end = next((time for time in selection_times if time > activation.end), activation.end)
-            retries[item] = min(selection_times, default=first_start), end
-    return retries
+            failed_attempts[item] = min(selection_times, default=first_start), end
+    return failed_attempts

@@ -17,14 +17,14 @@ from executive.record.diagnosis.diagnosis_text import list_labelled_sentences
 from executive.record.pictures.palette import PALETTE
 from executive.record.run_directory import RunDirectory, convert_os_errors
 from executive.record.timeline.activation import find_last_failure, format_counts, group_by_node
-from executive.view.report.activity_times import LOOK, RETRY, WAITING
+from executive.view.report.activity_times import FAILED_ATTEMPTS, LOOK, WAITING
 from executive.view.report.lanes import draw_lanes
 from executive.view.report.report_data import ReportData
 from executive.view.terminal.summary import describe_place_on_table
 from executive.view.text import render_template
 from executive.view.tree.svg import NodeResult, draw_svg
 
-ACTIVITY_COLOURS = {LOOK: "#56B4E9", RETRY: "#D55E00", WAITING: "#9aa5b4"}
+ACTIVITY_COLOURS = {LOOK: "#56B4E9", FAILED_ATTEMPTS: "#D55E00", WAITING: "#9aa5b4"}
 """Colours of the activities that are not skills; the colour of a skill is another colour of the palette."""
 
 

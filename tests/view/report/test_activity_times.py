@@ -13,9 +13,9 @@ from executive.mission.outline import OutlineNode
 from executive.record.timeline.activation import Activation
 from executive.record.timeline.timeline import Timeline
 from executive.view.report.activity_times import (
+    FAILED_ATTEMPTS,
     LOOK,
     NO_ITEM,
-    RETRY,
     WAITING,
     ActivityTimes,
     compute_activity_times,
@@ -49,13 +49,13 @@ def test_a_failed_attempt_a_look_ahead_and_a_wait_are_distinguished():
     times = times_of(course, TREE, [(1.1, "cube-1"), (2.3, "cube-1"), (4.1, "duck-1")], 8.5)
     assert list(times.times_by_item) == ["cube-1", "duck-1", NO_ITEM]
     assert times.times_by_item["cube-1"] == near(
-        {LOOK: 1.1, RETRY: 1.2, "approach": 0.7, "grasp": 0.1, "transit": 1.9, "release": 0.1}
+        {LOOK: 1.1, FAILED_ATTEMPTS: 1.2, "approach": 0.7, "grasp": 0.1, "transit": 1.9, "release": 0.1}
     )
     assert times.times_by_item["duck-1"] == near(
         {"approach": 0.9, "grasp": 0.1, "transit": 0.9, "release": 0.1}
     )
     assert times.times_by_item[NO_ITEM] == near({WAITING: 1.3, LOOK: 0.1})
-    assert times.activities == (LOOK, "approach", "grasp", "transit", "release", RETRY, WAITING)
+    assert times.activities == (LOOK, "approach", "grasp", "transit", "release", FAILED_ATTEMPTS, WAITING)
 
 
 def test_what_runs_at_the_same_time_is_the_time_of_what_began_first_and_is_about_an_object():
@@ -73,7 +73,9 @@ def test_an_attempt_that_was_the_last_was_in_vain_up_to_its_end():
         ran("Detect", 1.2, 1.3),
     ]  # fmt: skip
     times = times_of(course, TREE, [(0.5, "cube-1")], 1.3)
-    assert times.times_by_item == {"cube-1": near({WAITING: 0.5, RETRY: 0.7}), NO_ITEM: near({LOOK: 0.1})}
+    assert times.times_by_item == {
+        "cube-1": near({WAITING: 0.5, FAILED_ATTEMPTS: 0.7}), NO_ITEM: near({LOOK: 0.1}),
+    }  # fmt: skip
 
 
 def test_the_time_before_the_first_skill_and_after_the_last_belongs_to_the_run():
@@ -120,4 +122,5 @@ def test_every_instant_belongs_to_one_object_and_one_activity(course, decisions,
     for item, row in times.times_by_item.items():
         # Nobody's time is spent on an object that was never decided for nor handled.
         assert item == NO_ITEM or item in {span.item for span in course} | {name for _, name in decisions}
-        assert RETRY not in row or any(span.item == item and span.status == "FAILURE" for span in course)
+        has_failure = any(span.item == item and span.status == "FAILURE" for span in course)
+        assert FAILED_ATTEMPTS not in row or has_failure
