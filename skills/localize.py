@@ -16,12 +16,12 @@ class Localize(Skill):
 
     The skill uses the camera pose stored with the frame, because the camera may have moved since the capture.
     The ledger assigns each detection to an item. A detection is doubtful if the size of its box does not fit
-    its class, or if the depth image shows the top of the object at a height that its class can reach neither
-    on the table nor on another object.
+    its class, or if the height of its top in the depth image is impossible for its class, both on the table
+    and on another object.
     """
 
     detections: In[Detections] = port(doc="the detections and their frame")
-    targets: Out[list[Target]] = port(doc="one target per open item with a valid position, from any frame")
+    targets: Out[list[Target]] = port(doc="a target per unsorted item with a known position, from any frame")
     reasons: ClassVar = ("stale", "no_depth")
 
     def run(self, cell: Cell) -> None:
