@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,7 @@ class FinalObject:
     is_removed: bool = False
 
 
-def audit_objects(
+def count_outcomes(
     objects: Iterable[FinalObject],
     records: Sequence[ItemRecord],
     bins: Mapping[str, Bin],
@@ -47,44 +48,44 @@ def audit_objects(
 ) -> dict[str, int]:
     """Return the number of objects by outcome.
 
-    `right` and `wrong_bin` count objects in permitted and in other bins. `left` counts objects on the table
-    and the held object. `elsewhere` counts objects below the table, and objects that fell into a wrong bin,
-    which `fell_in_wrong_bin` counts too. `unseen` counts objects near which no ledger item was first seen.
-    A removed object counts only if it was seen: as `elsewhere`, unless the tool placed the object in a bin.
-    An unseen object without a class counts only if it is in a wrong bin, and never as `unseen`.
+    * `right`: objects in a permitted bin
+    * `wrong_bin`: objects in another bin, except objects that fell into it
+    * `left`: objects on the table, and the held object
+    * `elsewhere`: objects below the table, and objects that fell into a wrong bin
+    * `fell_in_wrong_bin`: only the objects that fell into a wrong bin
+    * `unseen`: objects that were never seen: the ledger contains no item, except phantoms, whose first
+      position has a horizontal distance of at most `max_distance` [m] from a rest position of the object
 
-    Args:
-        objects: The objects of the world, including removed objects.
-        records: The items of the ledger.
-        bins: The bins of the cell.
-        routes: Names of the permitted bins of each class.
-        max_distance: Maximum horizontal distance between the first position of an item and its object [m].
+    A removed object counts only if it was seen: by its bin if the tool placed it there, else as `elsewhere`.
+    An object with `UNKNOWN_LABEL` that was never seen counts only if it is in a wrong bin, not as `unseen`.
     """
     counts = dict.fromkeys(AUDIT_KEYS, 0)
     first_positions = [record.first_position for record in records if record.state is not State.PHANTOM]
     for final_object in objects:
         # For an item in a bin, a resumed run records the centre of the bin as first position.
         bin_centre = [bins[final_object.bin].position] if final_object.bin else []
-        is_seen = any(
-            np.linalg.norm((first_position - position)[:2]) <= max_distance
-            for first_position in first_positions
-            for position in (*final_object.rest_positions, *bin_centre)
-        )
-        outcome = _find_outcome(final_object, routes)
-        if final_object.is_removed:
-            was_placed = outcome in ("right", "wrong_bin") and not final_object.is_dropped
-            counts[outcome if was_placed else "elsewhere"] += is_seen
-            continue
-        fell_in_wrong_bin = outcome == "wrong_bin" and final_object.is_dropped
-        is_ignored = final_object.label == UNKNOWN_LABEL and not is_seen
-        if not is_ignored or outcome == "wrong_bin":
-            counts["elsewhere" if fell_in_wrong_bin else outcome] += 1
-        counts["fell_in_wrong_bin"] += fell_in_wrong_bin
-        counts["unseen"] += not is_seen and not is_ignored
+        pairs = itertools.product(first_positions, (*final_object.rest_positions, *bin_centre))
+        is_seen = any(np.linalg.norm((first - position)[:2]) <= max_distance for first, position in pairs)
+        for key in _find_outcomes(final_object, _find_place(final_object, routes), is_seen):
+            counts[key] += 1
     return counts
 
 
-def _find_outcome(final_object: FinalObject, routes: Routes) -> str:
+def _find_outcomes(final_object: FinalObject, place: str, is_seen: bool) -> Iterator[str]:
+    """Yield the keys of the counts that include an object with a final `place`."""
+    if final_object.is_removed:
+        if is_seen:
+            was_placed = place in ("right", "wrong_bin") and not final_object.is_dropped
+            yield place if was_placed else "elsewhere"
+    elif place == "wrong_bin" and final_object.is_dropped:
+        yield from ("elsewhere", "fell_in_wrong_bin")
+    elif place == "wrong_bin" or is_seen or final_object.label != UNKNOWN_LABEL:
+        yield place
+    if not (is_seen or final_object.is_removed or final_object.label == UNKNOWN_LABEL):
+        yield "unseen"
+
+
+def _find_place(final_object: FinalObject, routes: Routes) -> str:
     """Return `right`, `wrong_bin`, `left` or `elsewhere` for the final position, without regard to drops."""
     if final_object.is_held:
         return "left"

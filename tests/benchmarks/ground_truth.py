@@ -13,7 +13,7 @@ from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
-from executive.cells.audit import UNKNOWN_LABEL, audit_objects
+from executive.cells.audit import UNKNOWN_LABEL, count_outcomes
 from executive.cells.sim.cell import SimCell, list_final_objects
 from executive.events import Emit, ItemChanged
 from executive.ledger.item import State
@@ -199,7 +199,7 @@ class AuditedCell(SimCell):
         gate = self.config.ledger.gate
         bins, tool = self.cell.bins, self._tool
         objects = list_final_objects(self._world, {body: places}, bins, tool.held_body, tool.dropped_bodies)
-        counts = audit_objects(objects, self.accounts.records, bins, self.routes, gate)
+        counts = count_outcomes(objects, self.accounts.records, bins, self.routes, gate)
         seen_there = tuple(
             record.item
             for record in self.accounts.records

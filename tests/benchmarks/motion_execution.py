@@ -84,7 +84,7 @@ class ClearanceMonitor:
         load = "" if held is None else name_load(world.labels[held])
         for body in things:
             for point in near(world.arm, body, MAX_MEASURED_DISTANCE):
-                if point[3] >= world.robot.first_moving_link:
+                if point[3] >= world.robot.first_collision_link:
                     yield point[8], f"{world.name_link(point[3])} - {world.name_body(body)}"
             for point in near(held, body, MAX_MEASURED_DISTANCE) if load else ():
                 yield point[8], f"{load} - {world.name_body(body)}"
@@ -92,7 +92,7 @@ class ClearanceMonitor:
             for point in near(world.arm, world.arm, MAX_MEASURED_DISTANCE, linkIndexA=one, linkIndexB=other):
                 yield point[8], f"{world.name_link(one)} - {world.name_link(other)}"
         for point in near(held, world.arm, MAX_MEASURED_DISTANCE) if load else ():
-            if world.robot.first_moving_link <= point[4] < world.robot.wrist_link:
+            if world.robot.first_collision_link <= point[4] < world.robot.wrist_link:
                 yield point[8], f"{load} - {world.name_link(point[4])}"
 
 

@@ -15,7 +15,7 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import build_bin, compute_travel_height
 from executive.cell.protocols import MinTimes, Routes
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.audit import FinalObject, audit_objects
+from executive.cells.audit import FinalObject, count_outcomes
 from executive.cells.fake.arm import MAX_TOOL_SPEED, FakeArm, FakeTool, find_places_out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
 from executive.cells.fake.state_log import FakeStateLog, restore_world
@@ -183,7 +183,7 @@ class FakeCell(CellWithoutHardware):
             for o in (*self.world.objects, *removed)
         ]
         max_distance = self.config.ledger.gate
-        return audit_objects(final_objects, self.ledger.records, self.cell.bins, self.routes, max_distance)
+        return count_outcomes(final_objects, self.ledger.records, self.cell.bins, self.routes, max_distance)
 
     def _find_bin(self, fake_object: FakeObject) -> str:
         """Return the name of the bin that contains an object, or ""."""

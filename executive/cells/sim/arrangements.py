@@ -75,7 +75,7 @@ def move_arm_randomly(world: World, camera: CameraConfig, rng: Generator) -> boo
     # The inverse kinematics starts from a pose that is closer to all targets than the scan poses.
     position = rng.uniform((0.25, -0.50, 0.05), (0.72, 0.50, 0.40))
     azimuth = math.atan2(position[1], position[0])
-    world.set_joint_positions([azimuth, *map(math.radians, world.robot.ik_start_deg)])
+    world.set_joint_positions([azimuth, *map(math.radians, world.robot.ik_seed_deg)])
     _move_tool(world, make_tool_down_pose(position, azimuth + rng.uniform(-1.2, 1.2)))
     return bool(rng.random() < 0.3)
 

@@ -10,7 +10,7 @@ from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.audit import FinalObject, audit_objects
+from executive.cells.audit import FinalObject, count_outcomes
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.arm_occlusion import ArmOcclusion
 from executive.cells.sim.camera import SimCamera
@@ -165,7 +165,7 @@ class SimCell(CellWithoutHardware):
         world, tool, bins, moves = self._world, self._tool, self.cell.bins, self._world.rest_positions
         rest_positions = {body: [p, *moves.get(body, ())] for body, p in self._initial_positions.items()}
         objects = list_final_objects(world, rest_positions, bins, tool.held_body, tool.dropped_bodies)
-        return audit_objects(objects, self.accounts.records, bins, self.routes, self.config.ledger.gate)
+        return count_outcomes(objects, self.accounts.records, bins, self.routes, self.config.ledger.gate)
 
     def close(self) -> None:
         """Close the detectors and the physics servers."""

@@ -128,7 +128,7 @@ class ClearanceChecker:
         bodies += [(name, body) for name, cylinders in self._obstacles.items() for body in cylinders]
         for name, body in bodies:
             for point in get_points(arm, body, self._margin):
-                if point[LINK_A] >= self.world.robot.first_moving_link:
+                if point[LINK_A] >= self.world.robot.first_collision_link:
                     yield ClosestApproach(name_link(point[LINK_A]), name, point[DISTANCE], self._margin)
         for link_a, link_b in self.world.robot.self_collision_pairs:
             for point in get_points(arm, arm, self._margin, linkIndexA=link_a, linkIndexB=link_b):
@@ -151,7 +151,7 @@ class ClearanceChecker:
                 is_support = point[POSITION_B][2] <= max_support_height and name not in self._obstacles
                 yield ClosestApproach(part, name, point[DISTANCE], 0.0 if is_support else self._margin)
         for point in get_points(load_body, self.world.arm, self._margin):
-            if self.world.robot.first_moving_link <= point[LINK_B] < self.world.robot.wrist_link:
+            if self.world.robot.first_collision_link <= point[LINK_B] < self.world.robot.wrist_link:
                 link_name = self.world.name_link(point[LINK_B])
                 yield ClosestApproach(part, link_name, point[DISTANCE], self._margin)
         self.world.client.resetBasePositionAndOrientation(load_body, PARKING_POSITION, [0, 0, 0, 1])

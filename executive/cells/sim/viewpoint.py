@@ -1,4 +1,4 @@
-"""Viewpoint of displayed pictures in which arm, workspace and bins of a cell fill the image."""
+"""Virtual camera of rendered images in which arm, workspace and bins of a cell fill a region."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ARM_HEIGHT = 0.8
 
 @dataclass(frozen=True, eq=False)
 class Viewpoint:
-    """Camera of a displayed picture.
+    """Virtual camera of a rendered image.
 
     Attributes:
         matrix: Camera matrix `(3, 3)` [pixel].

@@ -11,7 +11,7 @@ import pytest
 
 from executive.cell.bins import Bin
 from executive.cell.workcell import AUDIT_KEYS
-from executive.cells.audit import UNKNOWN_LABEL, audit_objects
+from executive.cells.audit import UNKNOWN_LABEL, count_outcomes
 from executive.cells.sim.cell import list_final_objects
 from executive.geometry import Pose
 
@@ -35,7 +35,7 @@ def counted(bins_of_cube: tuple[str, ...], world: OneBody | None = None, **more:
     stood = {7: [np.array([0.5, 0.0, 0.025])]}
     records = more.pop("records", [])
     objects = list_final_objects(world or OneBody(), stood, bins, **more)  # type: ignore[arg-type]
-    return audit_objects(objects, records, bins, {"cube": bins_of_cube}, max_distance=0.025)
+    return count_outcomes(objects, records, bins, {"cube": bins_of_cube}, max_distance=0.025)
 
 
 @pytest.mark.parametrize(
