@@ -1,4 +1,4 @@
-"""Replay of recorded inputs, and a work cell that replays and then may continue on the real cell."""
+"""Replay of recorded inputs, and a work cell that replays and then may continue on its inner cell."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class InputReplayer:
 
         Raises:
             InputNotRecorded: The recorded run had not read this input up to this control step.
-            Exception: The recorded cell raised an exception with this class name and message.
+            Exception: The recorded read raised an exception with the same class name and message.
         """
         self._read_counts[name] += 1
         inputs = self._inputs.get(name, deque())
@@ -68,7 +68,7 @@ class InputReplayer:
                 raise _make_exception(reading)
             self._last_values[name] = reading.value
         if name not in self._last_values:
-            message = f"the journal contains no earlier value of the input {name}, which is read here"
+            message = f"the replay reads {name} in step {self._tick}, but the journal has no earlier value"
             self.missing_input_message = self.missing_input_message or message
             raise InputNotRecorded(message)
         return codec.decode(self._last_values[name])
@@ -120,11 +120,11 @@ class ReplayedCell(CellWrapper):
 
     @property
     def has_run_ended(self) -> bool:
-        """True if the run is only replayed and ended before its tree was ticked in this control step."""
+        """True if the run is only replayed and was recorded to end before the tick of this control step."""
         return self.last_interruption is None and self.log.has_ended_before_tick(self._steps)
 
     @property
-    def is_tree_restarted(self) -> bool:
+    def is_resumed_from_incomplete(self) -> bool:
         """True if the recorded run ended as INCOMPLETE in this control step, and was then resumed."""
         interruption = None if self.is_live else self._find_interruption(self._steps + 1)
         return interruption is not None and interruption.restarts_tree

@@ -34,8 +34,7 @@ class ScriptedOperator:
         for text in requests:
             if parse_request(text, choices) == "":
                 raise InputError(f'cannot pick "{text}"; ask for one of: {", ".join(choices)}')
-        self._requests = list(requests)[index:]
-        self._emit = emit
+        self._requests, self._emit = list(requests)[index:], emit
 
     def ask(self, choices: Sequence[str]) -> str | None:
         """Return the next request, or None at the end of the list."""

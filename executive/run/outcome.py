@@ -36,9 +36,7 @@ HALTED = LoopEnd("HALTED", "halted", "halted by the user")
 
 def make_loop_end(failure: Failure | None) -> LoopEnd:
     """Return the end of the tick loop; `failure` is the failure of the tree, or None after its success."""
-    if failure is None:
-        return LoopEnd("SUCCESS")
-    return LoopEnd("FAILURE", str(failure), failure.message, failure.path)
+    return LoopEnd("FAILURE", str(failure), failure.message, failure.path) if failure else LoopEnd("SUCCESS")
 
 
 def catch_problems(action: Callable[[], None]) -> list[str]:

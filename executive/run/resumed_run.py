@@ -1,4 +1,4 @@
-"""Resumption of an interrupted run: replay of its recorded inputs, then execution on the real cell."""
+"""Resumption of an interrupted run: replay of its recorded inputs, then execution on its inner cell."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from executive.tree.skill_leaf import SkillLeaf
 
 
 class ResumedRun(Run):
-    """Run that replays an interrupted run, and then may continue on the real cell.
+    """Run that replays an interrupted run, and then may continue on the inner cell.
 
     The replay includes earlier resumptions of the run. Observers receive all events; recorders receive only
     the events after the replay.
 
     Args:
-        is_realtime: True to execute the run on the real cell at the speed of the wall clock.
+        is_realtime: True to execute the run on the inner cell at the speed of the wall clock.
 
     Attributes:
         replayed_cell: Work cell of `context`, which replays the recorded run.
@@ -49,22 +49,22 @@ class ResumedRun(Run):
     ) -> None:
         super().__init__(context, root, control, mission)
         self.replayed_cell = replayed_cell
-        self._is_realtime_on_cell = is_realtime
+        self._is_realtime_after_replay = is_realtime
         self._recorders: list[Observer] = []
         self._is_scene_known = True
-        """False from an interruption with unknown commands until the scene has been observed."""
+        """False from an interruption with unrecorded commands until the scene has been observed again."""
         self._planner = LookaheadPlanner(replayed_cell.inner.cell)
         context.add_observer(self._planner.on_event)
         control.call_between_ticks(self._stop_or_resume)
 
     def add_recorder(self, recorder: Observer) -> None:
-        """Call `recorder` with every event after the replay, before the observers."""
+        """Register a recorder, which receives each event after the replay, before the observers."""
         self._recorders.append(recorder)
 
     def _execute_tree(self) -> RunEnded:
-        """Execute the tree, also after each recorded resumption of an INCOMPLETE run; return the last end."""
+        """Execute the tree, again after each recorded resumption of INCOMPLETE runs; return the last end."""
         run_end = super()._execute_tree()
-        while run_end.status == "INCOMPLETE" and self.replayed_cell.is_tree_restarted:
+        while run_end.status == "INCOMPLETE" and self.replayed_cell.is_resumed_from_incomplete:
             self._context.advance()
             run_end = super()._execute_tree()
         return run_end
@@ -78,7 +78,7 @@ class ResumedRun(Run):
             self.control.stop()
 
     def _resume(self, interruption: Interruption) -> None:
-        """Continue after an interruption: restart the skills, brake the arm, and update the ledger.
+        """Continue after an interruption: halt the skills, brake the arm, and update the ledger.
 
         Raises:
             Fault: The arm did not come to rest.
@@ -86,23 +86,16 @@ class ResumedRun(Run):
         context, replayed_cell = self._context, self.replayed_cell
         replayed_cell.resume()
         if replayed_cell.is_live:
-            # The arm brakes before the first recorded event, so that a killed run can be resumed again.
-            brake_arm(replayed_cell.inner.cell, replayed_cell.inner.advance)
-            for recorder in self._recorders:
-                context.add_observer(recorder, is_first=True)
-            context.planner, self._is_realtime = self._planner, self._is_realtime_on_cell
-        context.begin_step(replayed_cell.steps)
-        if replayed_cell.is_live:
-            self._wall_start = time.monotonic() - context.now
-            step_count, versions = interruption.kept_step_count, dict(list_versions())
-            context.emit(RunResumed(step_count, interruption.last_action, versions))
+            self._begin_on_inner_cell(interruption)
+        else:
+            context.begin_step(replayed_cell.steps)
         self._is_scene_known &= interruption.last_action != UNKNOWN_ACTION
         if self._is_scene_known:
-            restart_skills(self.root)
+            halt_running_skills(self.root)
         else:
             # A halted skill must not open the tool, because the journal may lack the last motions of the arm.
             with replayed_cell.suppress_commands(), contextlib.suppress(Fault):
-                restart_skills(self.root)
+                halt_running_skills(self.root)
         brake_arm(context.cell, context.advance)
         if interruption.restarts_tree:
             replayed_cell.accounts.reopen()
@@ -110,6 +103,18 @@ class ResumedRun(Run):
             reconcile_ledger(context.cell, interruption.last_action)
         else:
             self._recover_scene()
+
+    def _begin_on_inner_cell(self, interruption: Interruption) -> None:
+        """Brake the arm, then emit `RunResumed`; until then, a killed process does not change the journal."""
+        context, inner = self._context, self.replayed_cell.inner
+        brake_arm(inner.cell, inner.advance)
+        for recorder in self._recorders:
+            context.add_observer(recorder, is_first=True)
+        context.planner, self._is_realtime = self._planner, self._is_realtime_after_replay
+        context.begin_step(inner.steps)
+        self._wall_start = time.monotonic() - context.now
+        versions = dict(list_versions())
+        context.emit(RunResumed(interruption.kept_step_count, interruption.last_action, versions))
 
     def _recover_scene(self) -> None:
         """Observe the scene; an interruption or a stop ends the recovery, and the scene stays unknown."""
@@ -122,15 +127,14 @@ class ResumedRun(Run):
         self._is_scene_known = True
 
 
-def restart_skills(root: Behaviour) -> None:
+def halt_running_skills(root: Behaviour) -> None:
     """Halt every running skill, so that the next tick starts the skill again; control nodes keep their state.
 
     Raises:
         Fault: The clean-up of a skill failed; nevertheless all running skills are halted.
     """
-    leaves = [node for node in root.iterate() if isinstance(node, SkillLeaf)]
-    running_skills = [leaf for leaf in leaves if leaf.status is Status.RUNNING]
-    if problems := [problem for skill in running_skills for problem in halt(skill)]:
+    nodes = [node for node in root.iterate() if isinstance(node, SkillLeaf) and node.status is Status.RUNNING]
+    if problems := [problem for node in nodes for problem in halt(node)]:
         raise Fault("; ".join(problems))
 
 

@@ -71,7 +71,7 @@ def test_an_exception_of_the_cell_is_raised_again() -> None:
 def test_a_question_that_was_never_asked_has_no_answer() -> None:
     replayer, message = (
         Recording().replayer(),
-        "the journal contains no earlier value of the input arm.q, which is read here",
+        "the replay reads arm.q in step 0, but the journal has no earlier value",
     )
     with pytest.raises(InputNotRecorded, match=message):
         replayer.read("arm.q")
