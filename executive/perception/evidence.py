@@ -24,7 +24,7 @@ MAX_TOUCH_HEIGHT_ERROR = 0.003
 """Maximum difference between the height of a touch and the height of a class [m]; 52 touches of the mission
 `sort_overhead` had errors of at most 0.4 mm."""
 OTHER_CLASS_TOLERANCE = 0.0025
-"""Maximum difference between the height of a touch and the height of a class that was not assumed [m]."""
+"""Maximum difference between the height of a touch and of a class other than the assumed class [m]."""
 TOP_TOLERANCE = 0.012
 """Maximum difference between the height of an object's top in the depth image and an expected height [m].
 
@@ -63,7 +63,7 @@ def describe_touch_contradiction(label: str, height: float, classes: Mapping[str
 
 
 def find_classes_distinct_by_touch(config: CellConfig) -> frozenset[str]:
-    """Return the classes whose height differs from every other by more than `MAX_TOUCH_HEIGHT_ERROR`."""
+    """Return the classes whose height differs from each other class by more than `MAX_TOUCH_HEIGHT_ERROR`."""
     heights = {label: section.height for label, section in config.objects.items()}
     return frozenset(
         label
@@ -87,21 +87,21 @@ def _compute_height_error(label: str, height: float, classes: Mapping[str, Objec
 
 
 def describe_top_contradiction(
-    detection: Detection, position: Array, frame: Frame, area: Box, classes: Mapping[str, ObjectClass]
+    detection: Detection, position: Array, frame: Frame, region: Box, classes: Mapping[str, ObjectClass]
 ) -> str:
     """Return a sentence on the contradiction between the depth image and the detected class; "" if none.
 
     The result is also "" for a truncated or occluded box, or too few depth values. In a stack of two objects,
-    both boxes show the upper object; the height of the stack is a possible height for both classes.
+    both boxes contain the top of the upper object; the height of the stack is permitted for both classes.
 
     Args:
         detection: Box and detected class.
         position: Centre of the object `(3,)` [m].
         frame: The searched frame.
-        area: Searched region of the image [pixel].
+        region: Searched region of the image [pixel].
         classes: Classes of the cell by label.
     """
-    if not _is_completely_visible(detection, frame, area):
+    if not _is_completely_visible(detection, frame, region):
         return ""
     try:
         top = measure_top_height(detection, frame)
@@ -125,7 +125,7 @@ def _list_top_heights(label: str, classes: Mapping[str, ObjectClass]) -> list[fl
 
 
 def describe_size_contradiction(
-    detection: Detection, position: Array, frame: Frame, area: Box, object_class: ObjectClass
+    detection: Detection, position: Array, frame: Frame, region: Box, object_class: ObjectClass
 ) -> str:
     """Return a sentence on the contradiction between the size of a box and its class; "" if none.
 
@@ -137,10 +137,10 @@ def describe_size_contradiction(
         detection: Box and detected class.
         position: Centre of the object `(3,)` [m].
         frame: The searched frame.
-        area: Searched region of the image [pixel].
+        region: Searched region of the image [pixel].
         object_class: The detected class.
     """
-    if not _is_completely_visible(detection, frame, area):
+    if not _is_completely_visible(detection, frame, region):
         return ""
     left, top, right, bottom = detection.box
     cylinder_length = _compute_cylinder_length(position, frame, object_class)
@@ -156,10 +156,10 @@ def describe_size_contradiction(
     )
 
 
-def _is_completely_visible(detection: Detection, frame: Frame, area: Box) -> bool:
+def _is_completely_visible(detection: Detection, frame: Frame, region: Box) -> bool:
     """Return True if a box is inside the searched region and the arm does not occlude it."""
     left, top, right, bottom = detection.box
-    border_distance = min(left - area[0], top - area[1], area[2] - right, area[3] - bottom)
+    border_distance = min(left - region[0], top - region[1], region[2] - right, region[3] - bottom)
     return border_distance >= MIN_BORDER_DISTANCE and frame.compute_visible_fraction(detection.box) >= 1.0
 
 

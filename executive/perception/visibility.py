@@ -24,7 +24,7 @@ ArmPart = tuple[Sequence[Array], float]
 def compute_occlusion_mask(
     parts: Sequence[ArmPart], matrix: Array, X_WC: Pose, size: tuple[int, int]
 ) -> NDArray[np.bool_]:
-    """Return the mask `(H, W)` of the pixels that the arm may occlude: the images of all its spheres.
+    """Return the mask `(H, W)` of the pixels that the arm may occlude: projections of its enclosing spheres.
 
     `parts` are the links, the tool and the held object. `matrix` is the camera matrix `(3, 3)` [pixel], and
     `size` is the width and height of the image [pixel].

@@ -50,7 +50,7 @@ def describe_failure(failure: Mapping[str, Any], options: RoboflowOptions) -> st
     else:
         problem, advice = _fill_in(_TEMPLATE_BY_STATUS.get(status, _UNKNOWN_STATUS), options)
         detail = f"{status}: {detail}" if detail else str(status)
-    return f"{options.host} {problem}{f' ({detail})' if detail else ''}; {advice}"
+    return f"{options.server_origin} {problem}{f' ({detail})' if detail else ''}; {advice}"
 
 
 def describe_missed_deadline(retry_causes: Sequence[int | None], options: RoboflowOptions) -> str:
@@ -58,7 +58,7 @@ def describe_missed_deadline(retry_causes: Sequence[int | None], options: Robofl
 
     `retry_causes` are the HTTP statuses that caused retries before the deadline; None for no connection.
     """
-    message = f"no answer within {options.deadline} s from {options.host}"
+    message = f"no answer within {options.deadline} s from {options.server_origin}"
     if not retry_causes:
         return f"{message}; check its log and the network, or increase deadline"
     # inference-sdk retries requests; the status that caused the last retry explains the delay.
@@ -74,7 +74,7 @@ def describe_invalid_answer(problem: str, options: RoboflowOptions) -> str:
     question = f"is {options.model_id} a model that detects objects?"
     if options.api == "workflow":
         question = f'is "{options.workflow_output}" the predictions of a model that detects objects?'
-    return f"{options.host} sent an invalid answer: {shorten_to_line(problem)}; {question}"
+    return f"{options.server_origin} sent an invalid answer: {shorten_to_line(problem)}; {question}"
 
 
 def _fill_in(template: tuple[str, str], options: RoboflowOptions) -> tuple[str, str]:

@@ -30,8 +30,8 @@ class RoboflowOptions(DetectorOptions):
     url: str = HOSTED_URL
     """Address of the inference server."""
     api: Literal["auto", "v0", "v1", "workflow"] = "auto"
-    """API of the server: `v0`, one request to `/project/version`; `v1`, the API of self-hosted servers;
-    `auto`, `v0` or `v1` as inference-sdk chooses; `workflow`, a workflow of a workspace."""
+    """API of the server. `v0`: one request to `/project/version`. `v1`: API of self-hosted servers. `auto`:
+    inference-sdk chooses `v0` or `v1`. `workflow`: a workflow of a workspace."""
     workspace: str = ""
     """Name of the workflow's workspace, as in the URL of the workflow."""
     workflow_id: str = ""
@@ -48,13 +48,13 @@ class RoboflowOptions(DetectorOptions):
     """Maximum time for all answers about one frame, on the wall clock and on the clock of the run [s],
     including the retries of inference-sdk after the HTTP statuses 429, 503 and 504."""
     full: Literal["whole", "tiles"] = "whole"
-    """Images that are sent for the view `full`: `whole`, the frame; `tiles`, tiles of the size of the table
+    """Images that are sent for the view `full`. `whole`: the frame. `tiles`: tiles of the size of the table
     view that overlap by at least a quarter (9 tiles for 640 x 480 pixels and a table view of 256 x 256). For
-    the view `table`, one image is sent. An image needs one request with `v0` and `workflow`, and two requests
-    with `v1` (list of loaded models; image). Until `v1` has loaded the model, an image needs three."""
+    the view `table`, one image is sent. Requests per image: one with `v0` and `workflow`; two with `v1`, the
+    first for the list of loaded models; three with `v1` if the server has not loaded the model."""
 
     @property
-    def host(self) -> str:
+    def server_origin(self) -> str:
         """Scheme, host and port of the server's address."""
         parts = urlsplit(self.url)
         return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"
@@ -115,7 +115,7 @@ def _check_workflow(options: RoboflowOptions) -> OptionErrors:
 
 
 def _check_url(url: str) -> OptionErrors:
-    """Yield the option `url`, with a message, unless its value is only the address of a server."""
+    """Yield an error for the option `url` if its value is not a plain server address."""
     try:
         parts = urlsplit(url)
         is_server_address = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
