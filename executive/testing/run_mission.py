@@ -24,7 +24,7 @@ from executive.testing.faults.script import ScheduledFault
 from executive.tree.skill_leaf import SkillLeaf
 
 MISSION_TIMEOUT = 600.0
-"""Default time on the run's clock after which a mission ends as a fault [s]."""
+"""Default timeout of a run, on the run's clock [s]; after the timeout the run ends as a fault."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class MissionResult(RunEnded):
 
 def run_mission(
     mission: str | Path,
-    kind: Callable[..., Workcell] = FakeCell,
+    make_cell: Callable[..., Workcell] = FakeCell,
     *,
     seed: int = 0,
     set: Mapping[str, str] | None = None,
@@ -83,15 +83,15 @@ def run_mission(
 
     Args:
         mission: Mission file, or name of a shipped mission.
-        kind: Function that makes the work cell, instead of the kind in the cell file.
+        make_cell: Function that makes the work cell, instead of the kind in the cell file.
         seed: Random seed.
         set: Values of params by name, and of keys of the cell file by `cell.<key>.<key>`.
         requests: Requests of the operator, in order.
-        substitutes: Skills that replace the skills of nodes, by a pattern that the paths of the nodes match.
+        substitutes: Replacement skills, by glob pattern of the node path.
         faults: Fault script of the cell.
         arrange: Function that changes the cell before the run, for instance puts objects on the table.
         observers: Functions that are called with each event.
-        timeout: Time on the run's clock after which the run ends as a fault [s].
+        timeout: Timeout on the run's clock, after which the run ends as a fault [s].
 
     Raises:
         MissionError: The mission has errors.
@@ -103,7 +103,7 @@ def run_mission(
     events: list[TimedEvent] = []
 
     def make_arranged_cell(*args: Any, **options: Any) -> Workcell:
-        workcell = kind(*args, **options)
+        workcell = make_cell(*args, **options)
         try:
             if arrange is not None:
                 arrange(workcell)
@@ -112,8 +112,8 @@ def run_mission(
             raise
         return workcell
 
-    make_cell = with_faults(make_arranged_cell, faults, timeout=timeout)
-    options = RunOptions(seed, requests, make_cell=make_cell, substitutes=substitutes or {})
+    make_faulty_cell = with_faults(make_arranged_cell, faults, timeout=timeout)
+    options = RunOptions(seed, requests, make_cell=make_faulty_cell, substitutes=substitutes or {})
     run = assemble(loaded, skills, options, [events.append, *observers])
     workcell = run.workcell
     assert isinstance(workcell, FaultyCell)

@@ -106,7 +106,7 @@ class Campaign:
         """Return the results of the campaign."""
         mission, branches = self.mission, find_branches(self.mission.loaded.tree, trials)
         return FaultCampaignResults(
-            mission.name, mission.cell_description, mission.seed, self.nominal_run.robot_time,
+            mission.name, mission.cell_description, mission.seed, self.nominal_run.duration,
             len(self.faults), tuple(trials), branches, is_complete, has_pairs,
         )  # fmt: skip
 

@@ -61,7 +61,7 @@ def list_causes(table: TableConfig) -> Mapping[str, Cause]:
         "no_contact": Cause(bumped, "the object is bumped aside", "moves"),
         "blocked": Cause(effects.arm_collides(), "the arm collides", "moves"),
         "unreachable": Cause(effects.no_path(), "the planner finds no path", "moves"),
-        "stuck": Cause(effects.tool_sticks(), "the object sticks to the tool", "tool"),
+        "stuck": Cause(effects.tool_does_not_release(), "the object sticks to the tool", "tool"),
         "unavailable": Cause(effects.detector_dead(), "the detector is dead", "camera"),
         "unsure": Cause(effects.detector_unsure(), "all confidences are low", "camera"),
         "hidden": Cause(effects.workspace_occluded(), "the arm occludes the workspace", "camera"),
@@ -139,7 +139,7 @@ class _FaultLister:
 
     def list_detector_faults(self) -> Iterator[PlannedFault]:
         """Yield slow, hanging, unsure and dead detectors, from the start and from the middle of the run."""
-        starts: dict[Occasion, float] = {"first": 0.0, "middle": self._nominal_run.robot_time / 2}
+        starts: dict[Occasion, float] = {"first": 0.0, "middle": self._nominal_run.duration / 2}
         dead, unsure = effects.detector_dead(), effects.detector_unsure()
         endless_hang = effects.detector_times_out(FAULT_DURATIONS[-1])
         for occasion, start in starts.items():
@@ -158,7 +158,7 @@ class _FaultLister:
         """Yield removed and bumped objects: the object nearest to the tool, and the target of an approach."""
         x, y = self._table.x, self._table.y
         for occasion, fraction in QUARTER_FRACTIONS:
-            start = fraction * self._nominal_run.robot_time
+            start = fraction * self._nominal_run.duration
             removed, bumped = effects.object_removed("nearest"), effects.object_bumped(x, y, "nearest")
             yield _make_part_fault("object", "removed", occasion, after(start, removed))
             yield _make_part_fault("object", "bumped", occasion, after(start, bumped))
@@ -189,7 +189,7 @@ class _FaultLister:
             kind, effect = "seal breaks over a wrong bin", effects.seal_breaks_over_wrong_bin()
             cell_fault = during(node.path, effect)
             yield self._make_node_fault(node, kind, "lasting", "in every motion", cell_fault)
-        middle_time = self._nominal_run.robot_time / 2
+        middle_time = self._nominal_run.duration / 2
         for duration in FAULT_DURATIONS:
             cell_fault = between(middle_time, middle_time + duration, effects.seal_fails())
             yield _make_part_fault("tool", f"no seal for {duration:g} s", "middle", cell_fault)

@@ -1,4 +1,4 @@
-"""Nominal run of a campaign: a run without a fault, which determines the times of faults."""
+"""Nominal run of a campaign: a run without faults, from which the times of faults are computed."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from executive.record.audit_comparison import is_confirmed_by_audit
 from executive.run.assembly import RunOptions, assemble
 
 MIN_TIMEOUT = 60.0
-"""Minimum time on the run's clock after which a run with faults ends as a fault [s]."""
-MAX_DELAY_FACTOR = 10.0
-"""Additional time for a run with faults, as a multiple of the duration of the nominal run."""
+"""Minimum timeout of a run with faults, on the run's clock [s]."""
+TIMEOUT_FACTOR = 10.0
+"""Additional timeout of a run with faults, as a multiple of the duration of the nominal run."""
 
 
 @dataclass(frozen=True)
 class NominalRun:
-    """Results of a run without a fault.
+    """Results of a run without faults.
 
     Attributes:
-        robot_time: Duration on the run's clock [s].
+        duration: Duration on the run's clock [s].
         placed_count: Number of objects in bins at the end.
         steps_by_path: Number of control steps of each activation of a node, by path of the node.
     """
 
-    robot_time: float
+    duration: float
     placed_count: int
     steps_by_path: Mapping[str, tuple[int, ...]]
 
     @property
     def timeout(self) -> float:
-        """Time on the run's clock after which a run with faults ends as a fault [s]."""
-        return MIN_TIMEOUT + MAX_DELAY_FACTOR * self.robot_time
+        """Timeout of a run with faults, on the run's clock [s]."""
+        return MIN_TIMEOUT + TIMEOUT_FACTOR * self.duration
 
 
 class ActivationRecorder:
@@ -65,7 +65,7 @@ class ActivationRecorder:
 
 
 def execute_nominal_run(mission: MissionUnderTest) -> NominalRun:
-    """Execute a mission without a fault and return the results.
+    """Execute a mission without faults and return the results.
 
     Raises:
         InputError: The mission does not succeed, or ledger and ground truth disagree.

@@ -134,7 +134,7 @@ def _empty_table(occurrence: Occurrence) -> bool:
 
 _FAULTS = (
     NamedFault("while the suction cup cannot seal", faults.seal_fails(), "tool"),
-    NamedFault("while the tool sticks", faults.tool_sticks(), "tool", requires_holding=True),
+    NamedFault("while the tool sticks", faults.tool_does_not_release(), "tool", requires_holding=True),
     NamedFault("while the table is empty", Effect("table_empty", _empty_table)),
     NamedFault("while the table has changed since the last image", faults.table_bumped()),
     NamedFault("while the arm collides", faults.arm_collides(), "arm"),
@@ -144,7 +144,7 @@ _FAULTS = (
     NamedFault("while the arm occludes the table", faults.workspace_occluded()),
     NamedFault("while no depth is measured", faults.no_depth()),
     NamedFault("while no detector answers", faults.detector_dead()),
-    NamedFault("while the detectors detect nothing", faults.detector_blind()),
+    NamedFault("while the detectors detect nothing", faults.detector_finds_nothing()),
     NamedFault("while all confidences are low", faults.detector_unsure()),
     NamedFault("while the operator quits", faults.operator_quits()),
     NamedFault("while the operator requests a new scan", faults.operator_asks_rescan()),

@@ -1,4 +1,4 @@
-"""Fault scripts: lists of faults of a cell, with their times, which tests inject into runs.
+"""Fault scripts: lists of scheduled faults of a cell, which tests inject into runs.
 
 Examples of faults in a script for `run_mission(faults=[...])`:
 
@@ -10,8 +10,8 @@ Examples of faults in a script for `run_mission(faults=[...])`:
 """
 
 from executive.testing.faults.detector_faults import (
-    detector_blind,
     detector_dead,
+    detector_finds_nothing,
     detector_hangs,
     detector_slow,
     detector_times_out,
@@ -34,15 +34,15 @@ from executive.testing.faults.robot_faults import (
     seal_breaks_over_wrong_bin,
     seal_fails,
     table_bumped,
-    tool_sticks,
+    tool_does_not_release,
     workspace_occluded,
 )
 from executive.testing.faults.script import ScheduledFault, after, between, during, with_probability
 
 __all__ = [
-    "FaultyCell", "ScheduledFault", "after", "arm_collides", "between", "detector_blind", "detector_dead",
-    "detector_hangs", "detector_slow", "detector_times_out", "detector_unsure", "during", "no_depth",
-    "no_path", "object_bumped", "object_moved", "object_removed", "object_unsealable", "operator_asks_rescan",
-    "operator_quits", "seal_breaks", "seal_breaks_over_wrong_bin", "seal_fails", "table_bumped",
-    "tool_sticks", "with_faults", "with_probability", "workspace_occluded",
+    "FaultyCell", "ScheduledFault", "after", "arm_collides", "between", "detector_dead",
+    "detector_finds_nothing", "detector_hangs", "detector_slow", "detector_times_out", "detector_unsure",
+    "during", "no_depth", "no_path", "object_bumped", "object_moved", "object_removed", "object_unsealable",
+    "operator_asks_rescan", "operator_quits", "seal_breaks", "seal_breaks_over_wrong_bin", "seal_fails",
+    "table_bumped", "tool_does_not_release", "with_faults", "with_probability", "workspace_occluded",
 ]  # fmt: skip

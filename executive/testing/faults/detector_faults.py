@@ -89,9 +89,9 @@ def detector_unsure() -> Effect:
     return make_detector_effect("detector_unsure", _reduce_confidence)
 
 
-def detector_blind() -> Effect:
+def detector_finds_nothing() -> Effect:
     """Return an effect: nothing is detected, and `Detect` succeeds with an empty list."""
-    return make_detector_effect("detector_blind", _remove_detections)
+    return make_detector_effect("detector_finds_nothing", _remove_detections)
 
 
 @dataclass

@@ -39,9 +39,9 @@ def seal_breaks_over_wrong_bin() -> Effect:
     return Effect("seal_breaks", _break_seal_over_wrong_bin)
 
 
-def tool_sticks() -> Effect:
+def tool_does_not_release() -> Effect:
     """Return an effect: the object sticks to the opened tool, and `Release` fails with `stuck`."""
-    return Effect("tool_sticks", interceptors={"open": _prevent_opening})
+    return Effect("tool_does_not_release", interceptors={"open": _prevent_opening})
 
 
 def arm_collides(obstacle: str = "something", fraction: float = 0.5) -> Effect:

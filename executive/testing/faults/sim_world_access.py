@@ -29,13 +29,13 @@ class SimWorldAccess(WorldAccess):
     @property
     def objects(self) -> Sequence[TrueObject]:
         """All loose objects, in the order of their creation."""
-        return [self._describe(body) for body in self._world.labels]
+        return [self._make_true_object(body) for body in self._world.labels]
 
     @property
     def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
         body = self._tool.held_body
-        return None if body is None else self._describe(body)
+        return None if body is None else self._make_true_object(body)
 
     def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world."""
@@ -64,5 +64,5 @@ class SimWorldAccess(WorldAccess):
             self._workcell.advance()
         self._world.is_idle = False
 
-    def _describe(self, body: int) -> TrueObject:
+    def _make_true_object(self, body: int) -> TrueObject:
         return TrueObject(body, self._world.labels[body], self._world.get_object_pose(body).position)

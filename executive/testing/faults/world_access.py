@@ -72,13 +72,13 @@ class FakeWorldAccess(WorldAccess):
     @property
     def objects(self) -> Sequence[TrueObject]:
         """All loose objects, in the order of their creation."""
-        return [_describe(fake_object) for fake_object in self._fake.world.objects]
+        return [_make_true_object(fake_object) for fake_object in self._fake.world.objects]
 
     @property
     def held_object(self) -> TrueObject | None:
         """The object at the tool, or None."""
         held_object = self._fake.world.held_object
-        return None if held_object is None else _describe(held_object)
+        return None if held_object is None else _make_true_object(held_object)
 
     def remove(self, true_object: TrueObject) -> None:
         """Remove an object from the world."""
@@ -125,5 +125,5 @@ def open_world(workcell: Workcell) -> WorldAccess:
     )
 
 
-def _describe(fake_object: FakeObject) -> TrueObject:
+def _make_true_object(fake_object: FakeObject) -> TrueObject:
     return TrueObject(fake_object, fake_object.label, fake_object.position.copy())

@@ -64,7 +64,7 @@ MISSIONS: list[tuple[ScheduledFault, str, list[str], str, int]] = [
     (during("*/Grasp", effects.seal_fails(), activations=2), "*/Grasp", ["missed"], "SUCCESS", 0),
     (during("*/Transit", effects.seal_breaks(), activations=1), "*/Transit", ["dropped"], "SUCCESS", 0),
     (
-        during("*/Release", effects.tool_sticks(), activations=(2, 3, 4)),
+        during("*/Release", effects.tool_does_not_release(), activations=(2, 3, 4)),
         "*/Release",
         ["stuck"] * 3,
         "FAILURE",
@@ -177,7 +177,7 @@ def answered(cell: FaultyCell, request: Request) -> float:
         ([effects.detector_hangs(hang_end=2.0)], 1.0, 2.0, 3),
         ([effects.detector_slow(0.7)], 1.0, 1.7 + LATENCY, 3),
         ([effects.detector_slow(0.2), effects.detector_slow(0.3)], 1.0, 1.5 + LATENCY, 3),
-        ([effects.detector_blind()], 1.0, 1.0 + LATENCY, 0),
+        ([effects.detector_finds_nothing()], 1.0, 1.0 + LATENCY, 0),
     ],
 )
 def test_a_detector_answers_late_or_not_or_sees_nothing(
@@ -250,7 +250,7 @@ def test_a_seal_breaks_over_a_wrong_bin() -> None:
 
 
 def test_a_tool_that_sticks_lets_go_when_it_is_opened_once_more() -> None:
-    cell: Any = cell_with(effects.tool_sticks(), end=0.1)
+    cell: Any = cell_with(effects.tool_does_not_release(), end=0.1)
     cell.cell.tool.open()
     assert cell.events == []
     hold(cell)
