@@ -46,13 +46,13 @@ def command(
     with keep_stdout_clean():
         from executive.record.recorded_mission import format_tree
         from executive.view.tree.dot import format_dot
-        from executive.view.tree.svg import draw_svg
+        from executive.view.tree.svg import make_svg
         from executive.view.tree.tree_text import draw_text, fold_subtrees
 
         name, nodes = _load_outline(mission, overrides)
         nodes = fold_subtrees(nodes) if fold else nodes
         if as_svg:
-            output = draw_svg(nodes, name)
+            output = make_svg(nodes, name)
         elif as_dot:
             output = format_dot(nodes, name)
         elif as_json:

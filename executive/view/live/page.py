@@ -25,7 +25,7 @@ from executive.processes import build_command
 from executive.record.result import Result
 from executive.run.run import Run
 from executive.view.live import messages
-from executive.view.tree.svg import NodeResult, draw_svg
+from executive.view.tree.svg import NodeResult, make_svg
 
 LOOPBACK = "127.0.0.1"
 """Network address at which the page is served."""
@@ -105,7 +105,7 @@ class LivePage:
         empty_results = {node.path: NodeResult("", ("",)) for node in nodes}
         shapes = tuple(self._visuals.shapes) if self._visuals is not None else ()
         self._enqueue(messages.SceneChange(shapes=shapes))
-        self._enqueue(messages.PageChange(tree=draw_svg(nodes, run.mission, empty_results)))
+        self._enqueue(messages.PageChange(tree=make_svg(nodes, run.mission, empty_results)))
         run.control.call_between_ticks(self._send_state)
         self._send_state()
 

@@ -22,7 +22,7 @@ from executive.view.report.lanes import draw_lanes
 from executive.view.report.report_data import ReportData
 from executive.view.terminal.summary import describe_place_on_table
 from executive.view.text import render_template
-from executive.view.tree.svg import NodeResult, draw_svg
+from executive.view.tree.svg import NodeResult, make_svg
 
 ACTIVITY_COLOURS = {LOOK: "#56B4E9", FAILED_ATTEMPTS: "#D55E00", WAITING: "#9aa5b4"}
 """Colours of the activities that are not skills; the colour of a skill is another colour of the palette."""
@@ -80,7 +80,7 @@ def render_report(data: ReportData) -> str:
         describe_place_on_table=describe_place_on_table,
         colours=_choose_colours(data.activity_times.activities),
         total_times={item: sum(row.values()) for item, row in data.activity_times.times_by_item.items()},
-        tree=Markup(draw_svg(data.nodes, data.start.mission, _make_node_results(data))),
+        tree=Markup(make_svg(data.nodes, data.start.mission, _make_node_results(data))),
         timeline=Markup(draw_lanes(data.timeline, data.nodes)),
         params=yaml.safe_dump(dict(params), sort_keys=False, allow_unicode=True) if params else "",
         scan_pictures=[each for each in data.pictures if each.reason and each.item not in item_names],

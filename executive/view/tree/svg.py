@@ -47,7 +47,7 @@ NO_RESULTS: Mapping[str, NodeResult] = MappingProxyType({})
 """Results of the nodes of a mission that did not run."""
 
 
-def draw_svg(nodes: Sequence[OutlineNode], name: str, results: Mapping[str, NodeResult] = NO_RESULTS) -> str:
+def make_svg(nodes: Sequence[OutlineNode], name: str, results: Mapping[str, NodeResult] = NO_RESULTS) -> str:
     """Return the drawing of a tree as an SVG document.
 
     `name` is the name of the mission, for the title; `results` contains results of nodes, by path.
@@ -59,14 +59,14 @@ def draw_svg(nodes: Sequence[OutlineNode], name: str, results: Mapping[str, Node
     lines = list(map(_list_lines, texts, node_results))
     sizes = list(map(_compute_size, nodes, texts, lines))
     layout = compute_layout([node.depth for node in nodes], child_indices, sizes)
-    edges = [_draw_edge(layout, parents.get(index), index, node.depth) for index, node in enumerate(nodes)]
+    edges = [_make_edge(layout, parents.get(index), index, node.depth) for index, node in enumerate(nodes)]
     ids, indents = [make_group_id(node.path) for node in nodes], map(_compute_text_indent, texts)
     drawings = list(zip(nodes, texts, node_results, lines, layout.boxes, edges, ids, indents, strict=True))
     return render_template("tree/tree.svg", name=name, layout=layout, nodes=nodes, drawings=drawings)
 
 
 def make_group_id(path: str) -> str:
-    """Return the id of the group of a node: its path with `-` for `/` and `--hex-` for other characters."""
+    """Return the id of a node's group: its path with `-` for `/`, and `--<hex>-` for invalid characters."""
     return "node-" + _INVALID_IN_ID.sub(lambda match: f"--{ord(match[0]):x}-", path).replace("/", "-")
 
 
@@ -93,7 +93,7 @@ def _compute_text_indent(texts: NodeTexts) -> float:
     return _SYMBOL_WIDTH if texts.symbol else _BOX_PADDING
 
 
-def _draw_edge(layout: Layout, parent: int | None, child: int, depth: int) -> str:
+def _make_edge(layout: Layout, parent: int | None, child: int, depth: int) -> str:
     """Return the SVG path of the line between the nodes `parent` and `child`; "" for no parent.
 
     The line runs to the right (command H), around a corner (q) down (V), and around a corner to the right.

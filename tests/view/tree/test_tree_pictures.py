@@ -13,7 +13,7 @@ from executive.tree.node_registry import load_control_nodes
 from executive.view.text import replace_invalid_xml_characters
 from executive.view.tree.dot import format_dot
 from executive.view.tree.node_texts import make_node_texts
-from executive.view.tree.svg import NodeResult, draw_svg, make_group_id
+from executive.view.tree.svg import NodeResult, make_group_id, make_svg
 
 NASTY = """<b onload="x">&amp; 'quoted' "twice" \\ ]]> --> größer ≥ 日本 \x00\x1b \ud800"""
 RETRY = "up to 3 attempts, on Grasp.missed, Grasp.blocked"
@@ -49,7 +49,7 @@ NODES = [
 
 def parsed(nodes: list[OutlineNode], name: str = "sort", **notes: NodeResult) -> Element:
     return ElementTree.fromstring(
-        draw_svg(nodes, name, {node.path: notes.get(node.title, NodeResult()) for node in nodes})
+        make_svg(nodes, name, {node.path: notes.get(node.title, NodeResult()) for node in nodes})
     )
 
 
@@ -119,7 +119,7 @@ def test_a_word_that_nobody_knows_is_drawn_like_any_other():
 
 
 def test_the_picture_needs_nothing_else_and_its_colours_come_from_the_style_sheet_alone():
-    picture, text = parsed(NODES), draw_svg(NODES, "sort")
+    picture, text = parsed(NODES), make_svg(NODES, "sort")
     elements = {element.tag.removeprefix(SVG) for element in picture.iter()}
     assert elements == {"svg", "title", "style", "g", "rect", "text", "path"}
     assert not re.search(r"href|url\(|@import|http(?!://www\.w3\.org/2000/svg)", text)
@@ -136,7 +136,7 @@ def test_text_from_a_mission_cannot_leave_its_place_in_the_svg():
     assert picture.findtext(f"{SVG}title") == replace_invalid_xml_characters(NASTY)
     assert texts(group, "edge-label") == [replace_invalid_xml_characters(NASTY)]
     assert NASTY[:24] in tooltip(group)
-    draw_svg([node], NASTY).encode()
+    make_svg([node], NASTY).encode()
 
 
 def test_text_from_a_mission_cannot_leave_its_place_in_the_dot():
