@@ -1,4 +1,4 @@
-"""Bins, object classes, heights and boxes of bin walls, computed from a cell file."""
+"""Bins, object classes, travel and pile heights, bin boxes and unreachable places of a cell file."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def list_bin_boxes(size: Vector3) -> Sequence[tuple[Vector3, Vector3]]:
 def find_unreachable_places(
     config: CellConfig, require_reachable: Callable[[Array, float], None]
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key in the cell file and message for each place (bin or safe place) that the arm cannot reach.
+    """Yield key in the cell file and error message of each bin or safe place that the arm cannot reach.
 
     `require_reachable` is a function of a position `(2,)` [m] and of the height of the surface below the
     position [m]. The function raises `Unreachable` if the arm cannot reach the position.

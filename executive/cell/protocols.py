@@ -19,7 +19,7 @@ from executive.cell.objects import ObjectClass, Target
 from executive.geometry import Array
 
 Steps = Iterator[None]
-"""Iterator that yields None once per control step, until a call is finished."""
+"""Iterator of an operation, which yields None once per control step until the operation ends."""
 
 Routes = Mapping[str, tuple[str, ...]]
 """Names of the permitted bins of each class, by class label, in the order of the mission file."""

@@ -193,7 +193,7 @@ class _Expander:
         if subtree.returns is None:
             return replace(use, body=body)
         body = self._rename_variables(use, body, returns)
-        return replace(use, body=body, returned_variables=tuple(returns.values()))
+        return replace(use, body=body, written_variables=tuple(returns.values()))
 
     def _rename_variables(self, use: SubtreeNode, body: Node, returns: Mapping[str, str]) -> Node:
         """Return the body; local variables get unique names, returned variables get the caller's names."""
@@ -213,7 +213,7 @@ class _Expander:
                 return replace(part, name=rename(part.name))
             part = _map_parts(part, rename_part)
             if isinstance(part, SubtreeNode):
-                return replace(part, returned_variables=tuple(map(rename, part.returned_variables)))
+                return replace(part, written_variables=tuple(map(rename, part.written_variables)))
             if isinstance(part, SkillNode) and part.skill in self.skills:
                 ports = self.skills[part.skill].ports
                 variables = {port: rename(part.variables_by_port.get(port, port)) for port in ports}

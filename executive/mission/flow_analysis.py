@@ -104,7 +104,7 @@ class FlowAnalysis:
         # In a loop, one use may start in several states.
         self.body_end_states[node.path] = join_states((self.body_end_states.get(node.path), flow.success))
         # `find_unwritten_returns` reports unwritten returned variables, so they count as written here.
-        return replace(flow, success=flow.success and flow.success.with_variables(node.returned_variables))
+        return replace(flow, success=flow.success and flow.success.with_variables(node.written_variables))
 
 
 @dataclass(frozen=True)

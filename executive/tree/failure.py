@@ -12,7 +12,7 @@ class Reason:
 
     Attributes:
         source: Name of a skill, keyword of a control node, or label of a node.
-        reason: Declared reason of the source, without the source: `missed`.
+        reason: Reason as the source declares it, for instance `missed`.
     """
 
     source: str

@@ -50,7 +50,7 @@ class SkillLeaf(TreeNode):
         self.skill_name, self.skill_type, self.wiring, self._cell = name, skill, wiring, cell
         self._run: SkillRun | None = None
         self._item = ""
-        # A required port holds the item on which the skill acts; an optional port only limits a choice.
+        # A required port names the item on which the skill acts; an optional port limits the selection.
         self._item_ports = tuple(
             name for name, port in skill.ports.items() if port.refers_to == "item" and port.default is ...
         )

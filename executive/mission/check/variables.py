@@ -73,7 +73,7 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
             continue
         for setting in node.returns.values():
             name = setting.value.name if isinstance(setting.value, Reference) else ""
-            if name in node.returned_variables and name not in read_variables:
+            if name in node.written_variables and name not in read_variables:
                 message = f"the subtree returns ${name}, which no node reads"
                 yield make_warning(setting.value.span, "unread", message)
 
@@ -109,7 +109,7 @@ def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
             continue
         written = find_written_variables(use.body, context.skills)
         returns = (subtree.returns or {}).items()
-        for (name, span), variable in zip(returns, use.returned_variables, strict=True):
+        for (name, span), variable in zip(returns, use.written_variables, strict=True):
             if variable not in written:
                 problem = "no node in it writes"
                 names = sorted(full_name.rpartition(".")[2] for full_name in written)

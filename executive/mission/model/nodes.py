@@ -18,9 +18,9 @@ class Node:
     """Base class of the nodes.
 
     Attributes:
-        span: Position of the skill, keyword, or name of the subtree; or position of a list without keyword.
+        span: Position of the skill, keyword or subtree name in the file; or of a list without keyword.
         label: Value of `as:`, or "".
-        label_span: Position of the label, or None.
+        label_span: Position of the label in the file, or None.
         path: Unique path from the root of the expanded tree; "" before expansion.
     """
 
@@ -111,14 +111,14 @@ class SubtreeNode(Node):
         name: Name of the subtree.
         arguments: Values of the arguments, by name.
         returns: Variables of the caller, by the name of the returned variable in the subtree.
-        returned_variables: Variables of the caller that the subtree writes; () before expansion.
+        written_variables: Variables of the caller that the subtree writes; () before expansion.
         body: Expanded subtree; None before expansion.
     """
 
     name: str
     arguments: Mapping[str, Setting]
     returns: Mapping[str, Setting] = field(default_factory=dict)
-    returned_variables: tuple[str, ...] = ()
+    written_variables: tuple[str, ...] = ()
     body: Node | None = None
 
     @property
