@@ -39,7 +39,11 @@ def test_a_sort_outlasts_the_restart_of_a_server(start: float, duration: float) 
     assert result.robot_time > start + duration
 
 
-def test_after_a_collision_look_aside_looks_from_the_same_pose(tmp_path: Path) -> None:
+@pytest.mark.parametrize("pose", ["next", "aside"])
+@pytest.mark.parametrize("collision_count", [1, 2])
+def test_after_collisions_look_aside_looks_from_the_same_pose(
+    tmp_path: Path, pose: str, collision_count: int
+) -> None:
     mission = tmp_path / "look_twice.yaml"
     mission.write_text(
         "mission: look_twice\n"
@@ -47,8 +51,12 @@ def test_after_a_collision_look_aside_looks_from_the_same_pose(tmp_path: Path) -
         "library: library/sorting.yaml\n"
         "tree:\n"
         "  - {use: look_aside, as: first, with: {pose: next}}\n"
-        "  - {use: look_aside, as: second, with: {pose: next}}\n"
+        f"  - {{use: look_aside, as: second, with: {{pose: {pose}}}}}\n"
     )
-    collision = during("*second*/do/MoveToScan", arm_collides(), activations=1)
-    undisturbed, disturbed = run_mission(mission), run_mission(mission, faults=[collision])
+    collisions = [
+        during("*second*/1:retry/do/MoveToScan", arm_collides(), activations=1),
+        *[during("*second*/recover/*/MoveToScan", arm_collides(), activations=1)] * (collision_count - 1),
+    ]
+    undisturbed, disturbed = run_mission(mission), run_mission(mission, faults=collisions)
+    assert len(disturbed.list_activated_nodes("*second*/Localize")) == 1
     assert disturbed.cell.cell.arm.q == pytest.approx(undisturbed.cell.cell.arm.q)
