@@ -166,6 +166,8 @@ class Skill:
         """Convert the annotated attributes of the class body to `params` and `ports`."""
         super().__init_subclass__(**kwargs)
         _require_annotations(cls)
+        if "tool_left" in vars(cls):
+            raise TypeError(f"{cls.__qualname__}.tool_left: the attribute is now tool_state_after_failure")
         params, ports = dict(cls.params), dict(cls.ports)
         for name, hint in list(cls.__annotations__.items()):
             if hint is ClassVar or str(hint).endswith("ClassVar"):

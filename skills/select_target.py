@@ -25,7 +25,7 @@ class SelectTarget(Skill):
     wanted: In[str | None] = port(default=None, refers_to="class", doc="only this class")
     target: Out[Target] = port(doc="the chosen target")
     item: Out[Item] = port(refers_to="item", doc="the item of the target")
-    bin: Out[str] = port(refers_to="bin", doc="the bin of the class with the fewest used slots")
+    bin: Out[str] = port(refers_to="bin", doc="the bin with the fewest used slots, of the bins of the class")
     prefer: str = param("nearest", choices=("nearest", "surest"), doc="the `nearest` or the `surest` target")
     reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
 

@@ -29,3 +29,8 @@ def test_a_default_that_is_changed_needs_its_annotation_again() -> None:
 
     with pytest.raises(TypeError, match=r"Louder\.times has no type annotation"):
         type("Louder", (Knock,), {"times": param(3)})
+
+
+def test_the_former_name_of_an_attribute_is_an_error() -> None:
+    with pytest.raises(TypeError, match=r"Old\.tool_left: the attribute is now tool_state_after_failure"):
+        type("Old", (Skill,), {"__annotations__": {}, "tool_left": {}})

@@ -60,8 +60,8 @@ class Answer:
     def describe_doubt(self, detection: Detection) -> str:
         """Return the message for an answer whose best detection, `detection`, is doubtful."""
         confidence, threshold = detection.confidence, self.error_rates.threshold
-        doubt = f"with another class at {detection.second_confidence:.2f}"
-        doubt = f"< {threshold:.2f}" if confidence < threshold else doubt
+        is_low = confidence < threshold
+        doubt = f"< {threshold:.2f}" if is_low else f"with another class at {detection.second_confidence:.2f}"
         best_object = f"a {detection.label} at {confidence:.2f} {doubt}"
         return f"detector {self.detector} found nothing certain: at best {best_object}"
 

@@ -102,7 +102,7 @@ def find_duplicate(record: ItemRecord, records: Iterable[ItemRecord], gate: floa
 def _may_be_same_object(
     old_item: ItemRecord, new_item: ItemRecord, staleness: Staleness, config: LedgerConfig
 ) -> bool:
-    """Return True if a new item may be the object of an old item, which looks miss at its position.
+    """Return True if a new item may be the object of an old item that looks no longer show.
 
     The robot may push an object anywhere, a person by at most `MAX_PUSH_DISTANCE`. An item that became a
     phantom after an attempt to pick it may be an object that the attempt pushed away.

@@ -13,7 +13,7 @@ from executive.motion.joints import JointLimits, JointRange
 from executive.motion.planner import CollisionCheck, Planner
 
 KinematicsFactory = Callable[[float, JointRange, float | None], Kinematics]
-"""Function of tool length [m], joint range, and minimum link distance [m] or None."""
+"""Function that builds kinematics from tool length [m], joint range, and minimum link distance [m]."""
 
 ARMS_BY_URDF: Mapping[str, tuple[int, KinematicsFactory]] = {
     "kuka_iiwa/model.urdf": (IIWA14_JOINT_COUNT, Iiwa14)

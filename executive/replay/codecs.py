@@ -120,8 +120,16 @@ def decode_answer(value: Any) -> Answer:
 
 def encode_observations(observations: Sequence[Observation]) -> list[Any]:
     """Return the attributes of each observation as a list."""
-    rows = (vars(observation).values() for observation in observations)
-    return [[encode_detection(detection), position.tolist(), *rest] for detection, position, *rest in rows]
+    return [
+        [
+            encode_detection(seen.detection),
+            seen.position.tolist(),
+            seen.std,
+            seen.is_confident,
+            seen.contradiction,
+        ]
+        for seen in observations
+    ]
 
 
 def decode_observations(value: Any) -> list[Observation]:

@@ -139,7 +139,11 @@ def test_in_an_empty_working_directory_nothing_needs_to_be_entered(monkeypatch: 
             'the folder "hall" is not empty: it contains .git and 2 more',
         ),
         (["hall"], "hall", '"hall" is a file; name a folder that is empty or does not exist\n'),
-        (["notes"], "notes/hall", "notes/hall cannot be written: not a directory; name a writable folder\n"),
+        (
+            ["notes"],
+            "notes/hall",
+            "notes/hall/.gitignore cannot be written: not a directory; name a writable",
+        ),
         ([], "random", "random.py; give another name with --name"),
     ],
 )

@@ -92,9 +92,11 @@ def test_a_model_restored_from_its_export_gives_the_same_answers(tmp_path):
 
 @pytest.mark.parametrize("element", range(8))
 def test_each_of_eight_symmetries_moves_boxes_with_the_pixels(element):
-    pytest.importorskip("rfdetr")
-    import torch
+    torch = pytest.importorskip("torch")
+    from executive.training.architecture import declare_missing_operators
 
+    declare_missing_operators()
+    pytest.importorskip("rfdetr")
     from executive.training.lightning import SYMMETRY_COUNT, transform_boxes, transform_image
 
     square = torch.arange(16.0).reshape(4, 4)

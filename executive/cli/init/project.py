@@ -41,9 +41,9 @@ def write_project(folder: Path, package: str) -> list[str]:
         _map_path(file, package): templates.from_string(file.read_text(encoding="utf-8")).render(name=package)
         for file in sorted(TEMPLATE.rglob(f"*{SUFFIX}"))
     }
-    with explain_os_errors(InputError, f"{folder} cannot be written", "name a writable folder"):
-        for path_in_project, text in files.items():
-            path = folder / path_in_project
+    for path_in_project, text in files.items():
+        path = folder / path_in_project
+        with explain_os_errors(InputError, f"{path} cannot be written", "name a writable folder"):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
     return list(files)

@@ -95,9 +95,10 @@ class OnnxModel:
                 f"{path} is not an exported RF-DETR model: it has the inputs {', '.join(inputs)} and the "
                 f'outputs {", ".join(outputs)}, but needs the input "input" and the outputs "dets", "labels"'
             )
-        size, class_count = inputs["input"][-1], outputs["labels"][-1] - 1
-        if not isinstance(size, int):
-            raise InputError(f"{path} has an input of variable size; export it with a fixed size")
+        size, output_count = inputs["input"][-1], outputs["labels"][-1]
+        if not isinstance(size, int) or not isinstance(output_count, int):
+            raise InputError(f"{path} has an input or output of variable size; export it with fixed sizes")
+        class_count = output_count - 1
         if class_count != len(self.labels):
             labels = f"{len(self.labels)} labels: {', '.join(self.labels)}"
             advice = "give one label per class, in the order of the model"

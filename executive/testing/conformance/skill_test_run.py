@@ -144,8 +144,9 @@ class SkillTestRun:
         fault = self._fault
         cell = FaultyCell(fake, [during("*", fault.effect)] if fault else [])
         try:
-            run = SkillRun(self._skill(**values), intercept(cell.cell, self._record_call, _OBSERVED_ROLES))
+            recorded_cell = intercept(cell.cell, self._record_call, _OBSERVED_ROLES)
             with interrupt_stuck_ticks(self._skill, lambda: self.ticks):
+                run = SkillRun(self._skill(**values), recorded_cell)
                 while self.ticks < MAX_RUN_TIME / STEP:
                     if self.ticks == self._halt_at:
                         run.halt()

@@ -68,8 +68,10 @@ class Trial:
     @property
     def verdict(self) -> str:
         """Verdict: `!!` (problem), `-` (fault did not occur), `ok`, `ok -N` (N objects fewer), or status."""
-        if self.problems or not self.have_occurred:
-            return "!!" if self.problems else "-"
+        if self.problems:
+            return "!!"
+        if not self.have_occurred:
+            return "-"
         if self.status in ("SUCCESS", "INCOMPLETE"):
             return f"ok -{self.missing_count}" if self.missing_count > 0 else "ok"
         return f"FAILURE {self.reason}" if self.status == "FAILURE" else self.status

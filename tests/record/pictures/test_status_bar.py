@@ -65,6 +65,15 @@ def test_a_text_is_wrapped_between_words_and_cut_where_it_must():
     assert truncate("short", at_most(8)) == "short"
 
 
+def test_each_outcome_has_a_row():
+    outcomes = {"red_bin": ["cube-1", "cube-2"], "rejected": ["duck-1"]}
+    strips = [
+        draw_status_bar(PictureContent(IMAGE, outcomes=dict(list(outcomes.items())[:count])), 640)
+        for count in range(3)
+    ]
+    assert len({strip.tobytes() for strip in strips}) == 3
+
+
 @pytest.mark.parametrize("width", [640, 320])
 def test_whatever_is_said_there_is_room_for_it(width):
     many = {f"bin_{number}_with_a_long_name": [f"cube-{number}"] * 40 for number in range(ROW_COUNT + 3)}
