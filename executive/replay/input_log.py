@@ -50,7 +50,7 @@ class Interruption:
 
 
 class Halt(NamedTuple):
-    """Halt of a run in control step `tick`; `is_tree_ticked` if the tree was already ticked in this step."""
+    """Halt of a run in control step `tick`; `is_tree_ticked` is True if the tree was ticked before the halt."""
 
     tick: int
     is_tree_ticked: bool
@@ -123,8 +123,8 @@ class InputLog:
     ) -> Interruption:
         """Return the interruption at the end of the log.
 
-        The resumed run does not keep control steps in which the arm only braked, after a halt or during an
-        interrupted resumption. If the run ended as INCOMPLETE, the resumed run keeps all steps.
+        The resumed run keeps all steps of a run that ended as INCOMPLETE. Otherwise, the resumed run does not
+        keep the steps in which the arm only braked: after a halt, and in a resumption that was interrupted.
 
         Args:
             step_count: Number of control steps that the cell has executed.
@@ -135,11 +135,13 @@ class InputLog:
         if self.last_tick in incomplete_end_ticks:
             return Interruption(self.last_tick + 1, self.last_action, True, self.last_tick + 1)
         logged_count = self.last_tick + 1 if is_complete else self.last_tick
-        kept_count = min(step_count, logged_count if self.halt is None else self.halt.tick)
+        tree_step_count = logged_count if self.halt is None else self.halt.tick
+        kept_count = min(step_count, tree_step_count)
         is_truncated = step_count > self.last_tick and not is_complete
         may_lack_commands = self._may_lack_command(last_command_tick, is_truncated)
         for interruption in reversed(list(self.interruptions.values())):
-            if interruption.resume_tick >= kept_count:
+            was_resumption_interrupted = interruption.resume_tick >= kept_count
+            if was_resumption_interrupted:
                 kept_count = min(kept_count, interruption.kept_step_count)
                 may_lack_commands |= interruption.last_action == UNKNOWN_ACTION
         action = UNKNOWN_ACTION if may_lack_commands else self.last_action

@@ -20,7 +20,7 @@ from executive.cell.config import CameraConfig, CellConfig, DetectorConfig
 from executive.cell.detection import Detection
 from executive.cell.frame import Frame
 from executive.cell.protocols import Clock
-from executive.cells.audit import UNKNOWN_LABEL
+from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.camera import Image, SimCamera
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh

@@ -13,7 +13,7 @@ from executive.cell.bins import BIN_THICKNESS
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions
-from executive.cells.audit import UNKNOWN_LABEL, count_outcomes
+from executive.cells.ground_truth import UNKNOWN_LABEL, count_outcomes
 from executive.cells.sim.cell import SimCell, list_final_objects
 from executive.events import Emit, ItemChanged
 from executive.ledger.item import State

@@ -18,7 +18,6 @@ GRAMMAR = {("mission/model/grammar.py", SEQUENCE_KEYWORD), ("mission/model/gramm
 
 OTHER_MEANINGS = {
     ("record/diagnosis/diagnosis_text.py", "repeat"),  # label before the command that repeats a run
-    ("view/report/activity_times.py", "retry"),  # activity: time of attempts that failed
 }
 """Strings that equal a word and mean something else."""
 

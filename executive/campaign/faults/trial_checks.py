@@ -49,15 +49,15 @@ def check_end(
     if run_end.status == "FAULT":
         nodes = [fault.location for fault in faults if fault.is_bug]
         if not is_bug_raised or InjectedError.__name__ not in run_end.message:
-            yield f"it ended as FAULT at {run_end.node or 'no node'}: {run_end.message}"
+            yield f"the run ended as FAULT at {run_end.node or 'no node'}: {run_end.message}"
         elif not any(node == run_end.node or run_end.message.startswith(f"{node}: ") for node in nodes):
             yield f"the bug was in {' or '.join(nodes)}, but the run names {run_end.node}: {run_end.message}"
     elif is_bug_raised:
-        yield f"a bug was raised, but the run ended as {run_end.status} {run_end.reason}"
+        yield f"the injected error was raised, but the run ended as {run_end.status} {run_end.reason}"
     if run_end.status == "FAILURE" and run_end.reason != "lost":
         ends = {(failure.node, f"{failure.source}.{failure.reason}") for failure in unhandled_failures}
         if (run_end.node, run_end.reason) not in ends:
-            yield f"it ended with {run_end.reason} at {run_end.node}; according to `check` this cannot occur"
+            yield f"the run ended with {run_end.reason} at {run_end.node}; `check` lists no such end"
 
 
 def check_tree(root: Behaviour) -> Iterator[str]:
@@ -108,17 +108,17 @@ def check_ledger(
         return
     if audit["wrong_bin"]:
         yield f"{audit['wrong_bin']} objects in wrong bins; {ledger_text}; the audit {format_counts(audit)}"
-    unnoticed_count = min(max(audit["elsewhere"] - items["lost"], 0), removed_count)
-    left_count = audit["left"] + unnoticed_count
-    unplaced_count = items["rejected"] + items["skipped"]
+    unnoticed_removal_count = min(max(audit["elsewhere"] - items["lost"], 0), removed_count)
+    unplaced_objects = audit["left"] + unnoticed_removal_count
+    unplaced_items = items["rejected"] + items["skipped"]
     if run_end.status == "FAULT" or run_end.node:
-        is_confirmed = items["placed"] <= audit["right"] and unplaced_count <= left_count
+        is_confirmed = items["placed"] <= audit["right"] and unplaced_items <= unplaced_objects
     else:
         # Any number of the unobserved objects outside of bins, and inside of bins, may count as lost.
         is_confirmed = any(
             items["placed"] == audit["right"] + audit["wrong_bin"] - inside_count
-            and unplaced_count <= left_count - outside_count <= unplaced_count + audit["unseen"]
-            and items["lost"] == audit["elsewhere"] - unnoticed_count + outside_count + inside_count
+            and unplaced_items <= unplaced_objects - outside_count <= unplaced_items + audit["unseen"]
+            and items["lost"] == audit["elsewhere"] - unnoticed_removal_count + outside_count + inside_count
             for outside_count in range(unobserved.outside_bins + 1)
             for inside_count in range(unobserved.inside_bins + 1)
         )
@@ -131,9 +131,9 @@ def check_detection(
 ) -> Iterator[str]:
     """Yield a problem if detectors were used and the run succeeded, but some objects were never detected."""
     has_searched = any(isinstance(timed.event, FrameSearched) for timed in events)
-    is_complete = run_end.status in ("SUCCESS", "INCOMPLETE")
-    if has_searched and is_complete and audit is not None and audit["unseen"]:
-        yield f"it succeeded, but {audit['unseen']} objects were never seen; the audit {format_counts(audit)}"
+    has_tree_succeeded = run_end.status in ("SUCCESS", "INCOMPLETE")
+    if has_searched and has_tree_succeeded and audit is not None and audit["unseen"]:
+        yield f"the run succeeded, but {audit['unseen']} objects were never seen; the audit {format_counts(audit)}"
 
 
 def check_losses(audit: Mapping[str, int] | None, events: Sequence[TimedEvent]) -> Iterator[str]:

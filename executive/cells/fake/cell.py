@@ -15,7 +15,6 @@ from executive.cell.config import CellConfig
 from executive.cell.layout import build_bin, compute_travel_height
 from executive.cell.protocols import MinTimes, Routes
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.audit import FinalObject, count_outcomes
 from executive.cells.fake.arm import MAX_TOOL_SPEED, FakeArm, FakeTool, find_places_out_of_reach
 from executive.cells.fake.camera import FakeCamera, FakeDetector
 from executive.cells.fake.state_log import FakeStateLog, restore_world
@@ -27,6 +26,7 @@ from executive.cells.fake.world import (
     describe_lack_of_room,
     put_random_objects,
 )
+from executive.cells.ground_truth import FinalObject, count_outcomes
 from executive.cells.min_times import CellMinTimes
 from executive.cells.without_hardware import CellWithoutHardware
 from executive.errors import Fault, InputError

@@ -15,7 +15,7 @@ from pybullet_utils.bullet_client import BulletClient
 from executive.cell.bins import BIN_THICKNESS
 from executive.cell.clock import STEP
 from executive.cell.config import BinConfig, CameraConfig, CellConfig, Colour, ObjectConfig
-from executive.cells.audit import UNKNOWN_LABEL
+from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.camera import Region
 from executive.cells.sim.models import add_body, compute_upright_pose, get_inertial_pose, load_mesh
 from executive.cells.sim.variations import draw_object_colour

@@ -10,7 +10,7 @@ from executive.cell.bins import BIN_THICKNESS, Bin
 from executive.cell.config import CellConfig
 from executive.cell.protocols import Routes
 from executive.cell.workcell import CellOptions, KeyPath
-from executive.cells.audit import FinalObject, count_outcomes
+from executive.cells.ground_truth import FinalObject, count_outcomes
 from executive.cells.sim.arm import SimArm
 from executive.cells.sim.arm_occlusion import ArmOcclusion
 from executive.cells.sim.camera import SimCamera

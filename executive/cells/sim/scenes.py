@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.cell.config import CellConfig
-from executive.cells.audit import UNKNOWN_LABEL
+from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim import arrangements, variations
 from executive.cells.sim.arrangements import SceneObject
 from executive.cells.sim.camera import (

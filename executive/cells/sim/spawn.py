@@ -9,7 +9,7 @@ import numpy as np
 
 from executive.cell.config import CellConfig
 from executive.cell.workcell import KeyPath
-from executive.cells.audit import UNKNOWN_LABEL
+from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.models import load_mesh
 from executive.cells.sim.scene_file import DECLARED_SCENE, SceneConfig, UnknownConfig
 from executive.cells.sim.scene_world import apply_scene, draw_unknown_models, paint_table

@@ -106,7 +106,7 @@ def test_a_run_that_never_ends_is_ended_and_found(campaign: Campaign) -> None:
     short = replace(campaign.nominal_run, duration=-5.0)
     trial = run_trial(campaign.mission, short, {number: ever})
     assert trial.problems[0] == (
-        "it ended as FAULT at no node: the mission has not ended after 10 s on its clock"
+        "the run ended as FAULT at no node: the mission has not ended after 10 s on its clock"
     )
 
 

@@ -56,12 +56,14 @@ def test_a_bug_has_to_end_the_run_and_to_be_found_at_its_node() -> None:
     assert end(elsewhere, BUG, raised=True) == [
         "the bug was in tree/Grasp, but the run names tree/Wait: Wait: InjectedError: a bug"
     ]
-    assert end(outcome("SUCCESS"), BUG, raised=True) == ["a bug was raised, but the run ended as SUCCESS "]
+    assert end(outcome("SUCCESS"), BUG, raised=True) == [
+        "the injected error was raised, but the run ended as SUCCESS "
+    ]
 
 
 def test_no_other_fault_may_end_a_run() -> None:
     own = outcome("FAULT", "fault", "Grasp: KeyError: 'cube'", "tree/Grasp")
-    problem = "it ended as FAULT at tree/Grasp: Grasp: KeyError: 'cube'"
+    problem = "the run ended as FAULT at tree/Grasp: Grasp: KeyError: 'cube'"
     assert end(own, MISS) == end(own, BUG, raised=True) == [problem]
 
 
@@ -69,7 +71,7 @@ def test_a_failure_has_to_be_one_that_the_checker_knows_of() -> None:
     assert end(outcome("FAILURE", "Grasp.missed", "", "tree/Grasp"), MISS) == []
     assert end(outcome("FAILURE", "lost"), MISS) == []
     assert end(outcome("FAILURE", "Wait.missed", "", "tree/Wait"), MISS) == [
-        "it ended with Wait.missed at tree/Wait; according to `check` this cannot occur"
+        "the run ended with Wait.missed at tree/Wait; `check` lists no such end"
     ]
 
 
@@ -92,7 +94,7 @@ def test_the_books_have_to_be_what_the_world_is() -> None:
         # One that never looked does not say that nothing is there.
         ("SUCCESS", "", False, []),
         ("SUCCESS", "", True, [
-            "it succeeded, but 1 objects were never seen; "
+            "the run succeeded, but 1 objects were never seen; "
             "the audit right 2, wrong_bin 0, left 2, elsewhere 0, unseen 1",
         ]),
     ],

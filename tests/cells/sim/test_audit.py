@@ -11,7 +11,7 @@ import pytest
 
 from executive.cell.bins import Bin
 from executive.cell.workcell import AUDIT_KEYS
-from executive.cells.audit import UNKNOWN_LABEL, count_outcomes
+from executive.cells.ground_truth import UNKNOWN_LABEL, count_outcomes
 from executive.cells.sim.cell import list_final_objects
 from executive.geometry import Pose
 

@@ -17,8 +17,8 @@ import yaml
 from executive.cell.config import CellConfig, NoiseConfig
 from executive.cell.frame import Frame
 from executive.cell.workcell import CellOptions
-from executive.cells.audit import UNKNOWN_LABEL
 from executive.cells.fake.cell import SHIPPED_ROUTES, SilentOperator
+from executive.cells.ground_truth import UNKNOWN_LABEL
 from executive.cells.sim.camera import CELL_LIGHT
 from executive.cells.sim.cell import SimCell
 from executive.cells.sim.models import load_mesh
