@@ -133,7 +133,8 @@ def check_detection(
     has_searched = any(isinstance(timed.event, FrameSearched) for timed in events)
     has_tree_succeeded = run_end.status in ("SUCCESS", "INCOMPLETE")
     if has_searched and has_tree_succeeded and audit is not None and audit["unseen"]:
-        yield f"the run succeeded, but {audit['unseen']} objects were never seen; the audit {format_counts(audit)}"
+        counts = format_counts(audit)
+        yield f"the run succeeded, but {audit['unseen']} objects were never seen; the audit {counts}"
 
 
 def check_losses(audit: Mapping[str, int] | None, events: Sequence[TimedEvent]) -> Iterator[str]:
