@@ -50,7 +50,7 @@ class Interruption:
 
 
 class Halt(NamedTuple):
-    """Halt of a run in control step `tick`; `is_tree_ticked` is True if the tree was ticked before the halt."""
+    """Halt of a run in step `tick`; `is_tree_ticked` is True if the tree was ticked before the halt."""
 
     tick: int
     is_tree_ticked: bool
