@@ -34,9 +34,9 @@ class Approach(Skill):
     detection from an object.
 
     A touch at a wrong height contradicts the class of the target, unless an earlier touch matched the class.
-    If the detections alone prove the class, the first touch that is too low does not contradict the class,
-    except at the height of another class. A touch below the middle of the object, or more than `overtravel`
-    too low, missed the target; the skill then fails with `no_contact` if an earlier touch matched the class.
+    The first touch that is too low is no contradiction if the detections alone prove the class and no class
+    has this height. A touch below the centre of the object, or more than `overtravel` below its top, misses;
+    the skill then fails with `no_contact` if an earlier touch matched the class, else with `contradicted`.
     """
 
     target: In[Target] = port(doc="the target to touch")

@@ -12,7 +12,7 @@ from executive.skill import EMPTY, HOLDING, In, Out, Seconds, Skill, param, port
 class Grasp(Skill):
     """Close the tool on the target and verify the grasp.
 
-    The skill succeeds if the tool's sensor reports a seal after `settle`.
+    The skill succeeds if the tool's sensor reports a seal after the settling time `settle`.
     """
 
     target: In[Target] = port(doc="the target that the tool touches")

@@ -12,12 +12,12 @@ from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
 
 AUDIT_KEYS = ("right", "wrong_bin", "left", "elsewhere", "fell_in_wrong_bin", "unseen")
-"""Keys of the object counts of an audit: objects in permitted bins, in other bins, left on the table, and
-elsewhere. The last two keys count subsets: objects that fell into a wrong bin, and undetected objects."""
+"""Keys of the object counts of an audit: objects in permitted bins (`right`), in other bins, on the table
+(`left`), and elsewhere. The last two keys count subsets: fallen into a wrong bin; never detected."""
 
 
 class Accounts(Protocol):
-    """Ledger with the methods that are called at the end and at the resumption of a run."""
+    """The ledger of a run, as the end and the resumption of the run use it."""
 
     def close(self, *, completed: bool) -> None:
         """Set the final state of each item; `completed` is True if the tree succeeded."""
@@ -26,11 +26,11 @@ class Accounts(Protocol):
         """Discard the items on the table; the next frame adds a new item for each detected object."""
 
     def count_states(self) -> dict[str, int]:
-        """Return the number of items by final state; `seen` counts all items whose state is not `phantom`."""
+        """Return the number of items by final state; the key `seen` is the total without phantoms."""
 
     @property
     def unknown_labels(self) -> Mapping[str, int]:
-        """Maximum number of boxes per frame, by label, of the labels that the cell file does not declare."""
+        """For each label that the cell file does not declare: maximum number of its boxes in one frame."""
 
     @property
     def assumption_reasons(self) -> Sequence[str]:
@@ -78,7 +78,7 @@ class Workcell(Protocol):
         """Return the shapes and poses of the bodies for displays, or None if the cell has no visuals."""
 
     def audit(self) -> Mapping[str, int] | None:
-        """Return the true object counts by `AUDIT_KEYS`, or None if the counts are unknown (hardware)."""
+        """Count the objects by true place, and return the counts by `AUDIT_KEYS`; None for hardware."""
 
     def close(self) -> None:
         """Release all resources; the cell is unusable afterwards."""
@@ -123,7 +123,7 @@ KeyPath = tuple[str | int, ...]
 
 
 class CellKind(Protocol):
-    """A factory of one kind of work cells: an entry point of the group `executive.cells`."""
+    """Factory of work cells. Each entry point of the group `executive.cells` is such a factory."""
 
     def __call__(
         self, config: Any, *, seed: int, routes: Routes, emit: Emit, options: CellOptions

@@ -96,7 +96,7 @@ class DetectedObject:
 
 @dataclass(frozen=True)
 class FrameSearched(Event):
-    """A detector processed a frame, and the ledger received the detections.
+    """A detector searched a frame for objects, and the ledger received the detections.
 
     Attributes:
         frame: Number of the frame.

@@ -1,4 +1,4 @@
-"""Recovery of the contents of the bins, if the journal of a resumed run lacks actions of the tool.
+"""Recovery of bin contents from images, because the journal of a resumed run may lack tool commands.
 
 A look is an image with its detections.
 """
@@ -25,10 +25,10 @@ class BinRecovery:
     def __init__(self, bins: BinContents) -> None:
         self._bins, self._records = bins, bins.records
         self._object_counts: dict[str, list[Counter[str]]] = defaultdict(list)
-        """Numbers of detected objects by class, one counter for each look at a bin, by name of the bin."""
+        """For each bin name: one counter per look, with the number of detected objects of each class."""
 
     def add_look(self, look: Detections, bin_names: BinNames) -> None:
-        """Count the confidently detected objects in each bin whose floor the look shows completely."""
+        """Count the confident detections in each bin (`bin_names`) whose floor the look shows completely."""
         for name in self._bins.bins:
             if self._bins.is_floor_visible(name, look):
                 observed_objects = [entry for entry in bin_names if bin_names[entry] == name]
@@ -39,7 +39,7 @@ class BinRecovery:
         """Record an item in each bin for each object that the ledger does not know.
 
         The item is a dropped, untracked item of the same class, or else a new item. The item is placed if the
-        bin is permitted for the class, and rejected otherwise. `change_count` is `Ledger.change_count`.
+        bin is permitted for the class, and rejected otherwise. `change_count`: number of changes so far.
         """
         found_items: list[ItemRecord] = []
         for label, bin_name in self._find_unknown_objects():
@@ -61,10 +61,10 @@ class BinRecovery:
         """Yield class and bin name of each object in a bin that is not an item of the ledger.
 
         The number of objects of a class is the median over the looks. The number of unknown objects of a
-        class is the number of objects minus the number of items of the class in the bin. In total, at most
-        the number of objects minus the number of items in the bin are unknown. Classes with a route to the
-        bin have priority: an object of another class may be a known item with a wrongly detected class, and
-        must not be rejected.
+        class is the number of objects minus the number of items of the class in the bin. The total number of
+        unknown objects is limited to the number of objects minus the number of items in the bin. Classes with
+        a route to the bin have priority: an object of another class may be a known item with a wrongly
+        detected class, and must not be rejected.
         """
         for bin_name, counts in self._object_counts.items():
             labels = set().union(*counts)

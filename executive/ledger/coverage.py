@@ -39,9 +39,9 @@ class Coverage:
     """Probability, for each of `N` grid points on the table, that looks have missed an object at the point.
 
     A look is an image with its detections. The miss probability of a point is the probability that all looks
-    missed an object at the point. The initial value is 1 in the workspace, and the prior probability of an
-    object outside the workspace. A look multiplies the values of the searched points by the miss rate of the
-    detector. A change of the table that may have moved an object to a point resets the value of the point.
+    missed an object at the point. Its initial value is 1 in the workspace; outside, it is the prior
+    probability of an object at the point. A look multiplies the values of the searched points by the miss
+    rate of the detector. A change of the table that may have moved an object to a point resets the value.
 
     Args:
         table: The workspace.
@@ -56,7 +56,7 @@ class Coverage:
         self._workspace_mask = self._find_points_inside(self._points, 0.0)
         inside_mask = self._find_points_inside(self._points, WORKSPACE_TOLERANCE)
         self._priors = np.where(inside_mask, PRIOR_IN_WORKSPACE, 1.0)
-        """Prior probabilities `(N,)`; 1 where the miss probability already contains the prior probability."""
+        """Priors `(N,)`; 1 outside the workspace: `_miss_probabilities` starts there at the prior."""
         self._miss_probabilities = np.where(inside_mask, 1.0, PRIOR_OUTSIDE_WORKSPACE)
         self._reset_values = np.where(inside_mask, 1.0, PRIOR_OUTSIDE_AFTER_CHANGE)
         """Miss probabilities `(N,)` after a change of the table."""
@@ -73,12 +73,12 @@ class Coverage:
 
         Points near the positions `(3,)` [m] of low-confidence detections do not count as searched.
         """
-        visible_mask = look.compute_searched_mask(self._points)
+        visible_mask = look.compute_searched_mask(self._points)  # Points that this look shows.
         for position in uncertain_positions:
             visible_mask &= self._compute_distances(position) > GRID_PITCH
         searched_mask = visible_mask & (self._last_change_numbers <= look.frame.change_count)
-        # The views of one pose count as two viewpoints: of 31 objects that the detector of the cell fasteners
-        # missed in the view `table`, the detector found 27 in the view `full`.
+        # The crop (`table`) and the full image of one pose count as two viewpoints: in the cell fasteners,
+        # the detector found in the full image 27 of the 31 objects that it missed in the crop.
         viewpoint = f"{make_viewpoint_key(look)} {look.view}"
         miss_rate = look.error_rates.miss_rate
         repeated_miss_rate = compute_repeat_probability(miss_rate, look.error_rates.repeated)

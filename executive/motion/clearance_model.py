@@ -103,7 +103,7 @@ class ClearanceModel:
         self._end_margins = np.full(len(self._prisms.names), self._margin)
 
     def relax_end_margins(self, tcps: Array, axes: Array, discs: Discs) -> None:
-        """Reduce the required distance near the ends of the motion to the smallest distance at an end.
+        """For each prism, lower the required distance near both ends to the distance at the closer end.
 
         `tcps` `(E, 3)` [m] and `axes` `(E, 3)` are the tool centre points and tool axes at the ends.
         """
@@ -124,14 +124,14 @@ class ClearanceModel:
         """Return the change of the slack of each state for each of `M` small displacements `(N, M)` [m].
 
         For each state, only the pair of disc and prism with the smallest slack counts. The states have the
-        tool centre points `tcps` `(N, 3)` [m] and the tool axes `axes` `(N, 3)`; `displaced` contains the
-        tool centre points and axes of the displaced states, `(N, M, 3)` each.
+        tool centre points `tcps` `(N, 3)` [m] and the tool axes `axes` `(N, 3)`; `displaced` is a pair of
+        the displaced tool centre points and the displaced tool axes, `(N, M, 3)` each.
         """
         required_distances = self._find_required_distances(tcps)
         slack = self._compute_all_distances(tcps, axes, discs) - required_distances[:, None]
         state_count, disc_count, prism_count = slack.shape
         pair_slack = slack.reshape(state_count, disc_count * prism_count)
-        disc, prism = np.divmod(pair_slack.argmin(axis=1), prism_count)
+        disc, prism = np.divmod(pair_slack.argmin(axis=1), prism_count)  # Indices `(N,)` of the pairs.
         old_slack = pair_slack.min(axis=1)
         required_distances = required_distances[np.arange(state_count), prism]
         nearest_disc = Discs(discs.offsets[disc, None], discs.radii[disc, None], discs.min_cosine)

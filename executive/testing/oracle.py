@@ -36,10 +36,10 @@ ORACLE_CONFIDENCE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class TrueFrame(Frame):
-    """A frame with the true detections of its objects.
+    """A frame with ground truth: the true detections of its objects.
 
     Attributes:
-        true_detections: Detections of loose objects; excluded if another object occludes the box centre.
+        true_detections: Detections of all objects with a class whose box centre no other object occludes.
     """
 
     true_detections: tuple[Detection, ...]
@@ -68,7 +68,7 @@ class _Outline:
 
 
 class TruthCamera(SimCamera):
-    """A simulated camera whose frames contain true detections.
+    """A simulated camera whose frames contain ground truth: the true detections.
 
     Images are black unless `renders_images` is True or the camera measures depth.
     """
@@ -146,9 +146,9 @@ class Oracle:
 
 
 def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> Callable[..., SimCell]:
-    """Return a function for `RunOptions.kind` that makes simulated cells with oracles as detectors.
+    """Return a factory of simulated cells with oracles as detectors, for `RunOptions.kind`.
 
-    `box_std` is the standard deviation of box coordinates [pixel]; `renders_images` False: black images.
+    `box_std`: standard deviation of box coordinates [pixel]; if `renders_images` is False, images are black.
     """
     camera = partial(TruthCamera, renders_images=renders_images)
     return partial(SimCell, build_camera=camera, build_detectors=partial(_build_oracles, box_std=box_std))
@@ -157,7 +157,7 @@ def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> C
 def _build_oracles(
     config: CellConfig, *, clock: Clock, base: Path, seed: int, folders: Sequence[Path], box_std: float
 ) -> dict[str, Oracle]:
-    del base, folders
+    del base, folders  # An oracle loads no files from the folder of the cell file.
     camera = next(iter(config.cameras.values()))
     return {
         name: Oracle(name, detector_config, camera, clock, box_std, seed)

@@ -20,7 +20,7 @@ from executive.mission.flow_analysis import UnhandledFailure
 from executive.testing.faults.world_access import TrueObject
 
 DISPLACING_EFFECTS = frozenset({"object_removed", "object_moved", "seal_breaks"})
-"""Names of the effects that may move an object out of reach of the arm."""
+"""Values of `FaultInjected.name` for the faults that may move an object out of reach of the arm."""
 MIN_BORDER_DISTANCE = 30.0
 """Minimum distance between the centre of a visible object and the image border [pixel]."""
 
@@ -44,7 +44,7 @@ def check_end(
         run_end: End of the run.
         faults: Injected faults.
         unhandled_failures: Failures with which the mission may end, according to the check of the mission.
-        is_bug_raised: True if an injected bug was raised: the run must end as a fault at the node of the bug.
+        is_bug_raised: True if an injected exception was raised; the run must then end as FAULT at its node.
     """
     if run_end.status == "FAULT":
         nodes = [fault.location for fault in faults if fault.is_bug]
@@ -97,8 +97,8 @@ def check_ledger(
     Args:
         run_end: End of the run.
         items: Number of items in the ledger, by state.
-        audit: Number of objects, by true place; None if the places are unknown.
-        removed_count: Number of removed objects, which the ledger need not count as lost.
+        audit: True object counts by `AUDIT_KEYS`, for instance `left` for the table; None if unknown.
+        removed_count: Number of removed objects, which the ledger need not notice or count as lost.
         unobserved: Numbers of unobserved objects, which the ledger may count as lost.
     """
     ledger_text = f"the ledger says {format_counts(items)}"

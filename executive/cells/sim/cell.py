@@ -145,12 +145,12 @@ class SimCell(CellWithoutHardware):
         return SimMinTimes(config)
 
     def log_to(self, path: Path) -> None:
-        """Write all further commands to the world to a log file."""
+        """Record all later commands for the simulated world in a log file."""
         self._world.log = CommandLog(path, self._world.robot.joint_count)
         self._arm.send_command()
 
     def advance(self) -> None:
-        """Advance the cell by one physics step."""
+        """Execute one control step, which is one physics step."""
         self._arm.advance()
         self._world.step()
         super().advance()
@@ -161,7 +161,7 @@ class SimCell(CellWithoutHardware):
         return SimVisuals(self._world)
 
     def audit(self) -> dict[str, int]:
-        """Return the number of objects by outcome, such as `right`, `wrong_bin`, `left` and `elsewhere`."""
+        """Return the number of objects by `AUDIT_KEYS`; `left` counts the objects on the table."""
         world, tool, bins, moves = self._world, self._tool, self.cell.bins, self._world.rest_positions
         rest_positions = {body: [p, *moves.get(body, ())] for body, p in self._initial_positions.items()}
         objects = list_final_objects(world, rest_positions, bins, tool.held_body, tool.dropped_bodies)

@@ -1,4 +1,4 @@
-"""Simulated suction tool with a seal that breaks at a force that depends on the contact."""
+"""Simulated suction tool; the breakaway force of the seal depends on the contact."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from executive.geometry import Array, Pose
 TOUCH_DISTANCE = 0.001
 """Maximum distance from a surface at which the soft lip detects the surface [m]."""
 LIP_LENGTH = 0.002
-"""Length of the lip at the end of the tool [m]; other contacts of the tool are contacts of the shaft."""
+"""Length of the lip at the end of the tool [m]. Contacts above the lip touch the shaft, and do not count."""
 PULL_SMOOTHING = 0.25
 """Weight of the newest step in the low-pass filter of the pull on the seal: the time constant is 3.5 steps
 or 14 ms, because a seal breaks within milliseconds, but impact forces of the solver last a single step."""
@@ -56,7 +56,7 @@ class SuctionTool:
         self._config = config
         self._is_vacuum_on = False
         self._grip: _Grip | None = None
-        self._separating_body: int | None = None
+        self._separating_body: int | None = None  # Body whose seal broke and that is still within reach.
         self._last_touch_check = (-1, False)
         """Number of physics steps at the last check of `touching`, and the result of the check."""
         self.dropped_bodies: set[int] = set()

@@ -20,7 +20,7 @@ def make_override_source(key: str, value: str) -> Source:
 
 
 def parse_override(key: str, value: str, is_text: bool = False) -> tuple[YamlNode | None, list[Finding]]:
-    """Return the YAML node of an override (None after an error) and findings; `is_text`: without parsing."""
+    """Return YAML node (None after an error) and findings; if `is_text` is True, the value is not parsed."""
     source = make_override_source(key, value)
     span = source.make_span(1, len(key) + 2, max(1, len(value)))
     if is_text or not value.strip():
@@ -46,7 +46,7 @@ def override_cell(root: YamlNode, overrides: Mapping[str, str]) -> tuple[YamlNod
 
 
 def _has_section(root: YamlNode, path: list[str], value: YamlNode, findings: list[Finding]) -> bool:
-    """Return True if `path` is one key, or starts with a section of the cell; add an error if not."""
+    """Check that `path` is one key, or starts with a key of the cell; else add an error, return False."""
     keys = root.keys if isinstance(root, YamlMapping) else ()
     if len(path) == 1 or path[0] in (*keys, *CellConfig.model_fields):
         return True

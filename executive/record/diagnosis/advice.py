@@ -39,7 +39,7 @@ def list_advice(run: FailedRun, arm_state: str, readings: Sequence[Reading]) -> 
     for reading in readings:
         if reading.raised == Unavailable.__name__:
             yield f"make sure that {reading.name} answers again"
-        elif reading.name == "arm.met":
+        elif reading.name == "arm.met":  # Recorded name of `arm.collision`.
             yield f"find what the arm collided with: {reading.value}"
     if run.is_record_lost:
         yield "free some space on the disk of the run directory, or name another folder with --runs DIR"
@@ -64,7 +64,7 @@ def _list_changes(run: FailedRun) -> Iterator[str]:
     """Yield changes of the mission after which the failure would not end the run."""
     if not run.failure_path:
         return
-    # A control node with a `remedy` can handle failures, for instance `try`.
+    # Only control nodes that can handle a failure have a `remedy`, for instance `try`.
     changes = [
         (bool(entry.control_node.remedy), entry, advice)
         for entry in reversed(run.failure_path)
@@ -90,6 +90,6 @@ def _format_advice(run: FailedRun, entry: FailurePathNode, advice: Advice) -> st
     changed_node = get_mission_node(advice.child) if advice.child else entry.node
     value = entry.node.values.get(advice.key) if isinstance(entry.node, InnerNode) else None
     params = run.loaded.mission.params.items() if isinstance(value, Literal) else ()
-    # A value from a param has the span of this param in the mission file.
+    # If a value comes from a param, its span is the span of the value of the param.
     name = next((name for name, param in params if param.value.span == getattr(value, "span", None)), "")
     return f"{advice.text} {f'with --set {name}=...' if name else f'at {run.format_place(changed_node)}'}"

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from executive.mission.load import LoadedMission
 
 DECIDING_INPUTS: Mapping[str, tuple[str, ...]] = {
-    "arm": ("arm.met",),
-    "tool": ("tool.holding", "tool.touching", "tool.bears"),
+    "arm": ("arm.met",),  # Recorded name of `arm.collision`.
+    "tool": ("tool.holding", "tool.touching", "tool.bears"),  # `bears` is the name of `holding_force`.
     "camera": ("camera.sees_table",),
 }
 """Inputs that decide whether a skill succeeds, by the part of the cell that the skill `uses`."""
@@ -100,7 +100,7 @@ def diagnose(
 def _list_deciding_readings(run: FailedRun, skills: Mapping[str, type[Skill]]) -> Iterator[Reading]:
     """Yield the inputs that explain the failure of a skill, the latest first.
 
-    If the cell raised exceptions in the last control step of the skill, they replace `DECIDING_INPUTS`.
+    If inputs raised exceptions in the last control step of the skill, only these inputs are yielded.
     """
     node, activation = run.deciding_node, run.deciding_activation
     if activation is None or not isinstance(node, SkillNode):

@@ -81,12 +81,12 @@ class Diagnosis:
     Attributes:
         status: `FAILURE`, `FAULT` or `HALTED`.
         reason: Name of the failure.
-        clock: Time of the end of the run [s].
+        clock: Robot time at the end of the run [s].
         mission: Path of the mission file.
-        verdict: Sentence with the cause of the end of the run.
+        verdict: Cause of the end of the run, as a sentence.
         node: Node that determined the status, or None.
         item: Name of the item of `node`, else of a halted skill, else of the first lost item; "" for none.
-        passed_nodes: Nodes that did not handle the failure, from the root down, and the origin.
+        passed_nodes: Failure path: nodes that did not handle the failure, from the root down, and the origin.
         readings: Inputs that the failed skill read from the cell, the latest first.
         last_look: Last look with a detection of `item`, else the last look of the run; None without a look.
         lost_items: Items whose loss made the run fail.

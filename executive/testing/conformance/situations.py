@@ -1,4 +1,4 @@
-"""Start of a test run of a skill: a situation, a fake cell with objects, and values of params and inputs."""
+"""Setup of a conformance test of a skill: situation, fake cell with objects, values of params and inputs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from executive.mission.model.port_types import describe_type
 from executive.skill import ANY, EMPTY, HOLDING, Direction, Param, Port, Skill
 
 GENERATED_NUMBER = 0.1
-"""Value generated for each number, clipped to the bounds of its param; as a duration [s], it is short."""
+"""Value generated for each numeric param, clipped to its bounds; small, so that durations [s] are short."""
 
 _HOLDING_BY_STATE: Mapping[Any, tuple[bool, ...]] = {EMPTY: (False,), HOLDING: (True,), ANY: (False, True)}
 """Values of `Situation.is_holding` by the declared state of the tool before the run."""
@@ -58,7 +58,7 @@ class ArrangementFailed(NotTestable):
 
 @dataclass(frozen=True)
 class Situation:
-    """Conditions at the start of a test run of a skill.
+    """Test scenario: the conditions at the start of a test run of a skill.
 
     Attributes:
         name: Description, as the beginning of a sentence: `with an empty tool`.
@@ -76,8 +76,8 @@ class Situation:
 def list_situations(skill: type[Skill], arrange: Arrange) -> Iterator[Situation]:
     """Yield the situations in which a skill is tested.
 
-    The situations are each allowed state of the tool with default values, all optional inputs given, and
-    each choice of a param except its default, unless `arrange` returns a value of this param.
+    There is one situation for each allowed state of the tool, with default values; one with all optional
+    inputs; and one for each other choice of each param of which `arrange` returns no value.
 
     Raises:
         ArrangementFailed: The declared `tool_state` is invalid, or a value cannot be generated.
@@ -127,14 +127,14 @@ def prepare_scene(
 
 
 def _list_choices(param: Param, scene: SkillScene) -> list[Any]:
-    """Return possible values of a param other than its default: choices, a name of the cell, False, True."""
+    """Return the choices of a param, or False and True, and a name to which it may refer; no default."""
     values = [False, True] if param.type is bool else list(param.choices or ())
     values += [_find_name_in_scene(param.refers_to, scene)] if param.refers_to else []
     return [value for value in values if value not in (param.default, None)]
 
 
 def _generate_value(declared: Param | Port, scene: SkillScene) -> Any:
-    """Return a valid value of a param or an input; None if no value can be generated."""
+    """Return a valid value for a declared param or input; None if no value can be generated."""
     if isinstance(declared, Port):
         return _find_value_of_type(declared.type, declared.refers_to, scene)
     if declared.choices:

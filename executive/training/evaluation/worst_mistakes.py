@@ -47,7 +47,7 @@ Colour = tuple[int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class Mistake:
-    """Missed object, false detection, wrong class, or position error of a correct detection.
+    """Detection error: missed object, false detection, wrong class, or offset of a correct detection.
 
     Attributes:
         severity: Visible fraction of a missed object (halved if truncated), confidence of a wrong detection,

@@ -1,4 +1,4 @@
-"""Film of a recorded run: the simulated world at the left, the decisions of the tree at the right."""
+"""Film (video) of a recorded run: simulated world at the left, decisions of the tree at the right."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def write_film(
         workers: Number of rendering processes.
         progress: Callback that receives the number of written frames and the number of all frames.
     """
-    steps_per_frame = speed / film_format.frame_rate / source.start.step
+    steps_per_frame = speed / film_format.frame_rate / source.start.step  # `start.step` is a duration.
     steps = select_steps(count_steps(source.directory.world_log), steps_per_frame)
     result_frame_count = round(RESULT_DISPLAY_TIME * film_format.frame_rate)
     frame_count = len(steps) + result_frame_count

@@ -1,4 +1,4 @@
-"""Messages about failures of an inference server: server, failure, and advice."""
+"""Messages about failures of an inference server. Each message names server, failure, and advice."""
 
 from __future__ import annotations
 
