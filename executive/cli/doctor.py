@@ -2,7 +2,7 @@
 
 Each check imports its packages itself, so that a missing package affects only this check. The module is also
 a program, `python -m executive.cli.doctor tiny|egl`, that prints the median rendering time of a frame.
-Its separate process protects the command from crashes of an EGL driver.
+The command runs it in a separate process, so that a crash of an EGL driver does not end the command.
 """
 
 from __future__ import annotations

@@ -19,11 +19,11 @@ from executive.ledger.staleness import Staleness
 MAX_STANDARD_DEVIATIONS = 3.5
 """Number of standard deviations within which two measurements of a position agree with probability 0.999."""
 AMBIGUITY_FACTOR = 1.5
-"""Maximum distance of an observation from an item that it may show [association distances]."""
+"""Maximum distance between an item and an observation that may show it, in units of the gating distance."""
 MAX_PUSH_DISTANCE = 0.12
 """Maximum distance by which a person may push an item that still counts as the same item [m]."""
 MAX_MISS_PROBABILITY_OF_MOVED_ITEM = 0.05
-"""Maximum miss probability (`Belief.miss_probability`) of an item that counts as moved."""
+"""Maximum probability, for a moved item, that all images since its last detection missed it by chance."""
 MIN_EXISTENCE_PROBABILITY = 0.9
 """Minimum probability of existence of an item that is picked, or matched to a moved item."""
 
@@ -39,8 +39,8 @@ def associate(
     Args:
         observations: Confident observations on the table.
         records: Items on the table.
-        staleness: Changes of the table by the robot.
-        gate: Minimum association distance [m].
+        staleness: Record of the actions of the robot that may have moved objects.
+        gate: Lower bound of the gating distance (`compute_association_distance`) [m].
     """
     pairs = []
     for observation in observations:
@@ -58,18 +58,18 @@ def associate(
 
 
 def compute_association_distance(record: ItemRecord, observation: Observation, gate: float) -> float:
-    """Return the maximum distance between an item and an observation that is associated with the item [m].
+    """Return the gating distance [m]: the maximum distance between an item and an observation assigned to it.
 
-    The distance grows with the standard errors of both positions, from `gate` [m] to `2 * gate`.
+    The gating distance grows with the standard errors of both positions, from `gate` [m] to `2 * gate`.
     """
     error = math.hypot(record.standard_error, observation.std)
     return min(max(gate, MAX_STANDARD_DEVIATIONS * error), 2 * gate)
 
 
 def may_show_item(observation: Observation, record: ItemRecord, gate: float) -> bool:
-    """Return True if an observation may show an item, even if the measured position has a large error.
+    """Return True if an observation lies within `AMBIGUITY_FACTOR` gating distances of an item.
 
-    `gate` is the minimum association distance [m].
+    The observation may then show the item. `gate` is the lower bound of the gating distance [m].
     """
     max_distance = AMBIGUITY_FACTOR * compute_association_distance(record, observation, gate)
     return record.distance_to(observation.position) <= max_distance
@@ -102,7 +102,7 @@ def find_duplicate(record: ItemRecord, records: Iterable[ItemRecord], gate: floa
 def _may_be_same_object(
     old_item: ItemRecord, new_item: ItemRecord, staleness: Staleness, config: LedgerConfig
 ) -> bool:
-    """Return True if a new item may be the object of an old item that looks no longer show.
+    """Return True if a new item may be the same object as an old item that recent images no longer show.
 
     The robot may push an object anywhere, a person by at most `MAX_PUSH_DISTANCE`. An item that became a
     phantom after an attempt to pick it may be an object that the attempt pushed away.

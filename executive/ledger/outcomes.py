@@ -24,16 +24,16 @@ def find_final_state(
     The first rule that applies determines the state:
 
     1. An item in the tool is rejected.
-    2. An item that only low-confidence detections show, and that no look has missed, is rejected.
+    2. An item is rejected if all detections have low confidence and all later images of its place show it.
     3. An item whose probability of existence is below 0.5 is a phantom.
     4. An item that the tool never touched in at least `MIN_EMPTY_PROBES` descents to the table is a phantom,
        if the tool has touched another item at the expected height.
     5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
-    6. Any other dropped item, and an item on the table whose position is empty, is lost.
+    6. An item is lost if it was dropped, or if its position on the table is now empty.
     7. An item that is already rejected stays rejected.
     8. An item without a route is skipped.
-    9. If the mission was completed, a certain item without a failed attempt or a contradiction is skipped,
-       because a quota was reached or the operator quit.
+    9. If the mission was completed, an item with sufficient evidence (`certainty`), no failed attempt and no
+       evidence against its class is skipped, because a quota was reached or the operator quit.
     10. Any other item is rejected.
 
     Args:
@@ -74,7 +74,7 @@ def discard_moved_items(records: Collection[ItemRecord], dropped: Collection[Ite
 
     A lost item counts as moved if a new item of the same class appeared at an empty position after the last
     detection of the lost item. The new item must be proved to exist, and replaces only one lost item.
-    Dropped items do not count, because the tool held them after their last detection.
+    Lost items in `dropped` do not count, because the tool held them after their last detection.
     """
     proved_items = (record for record in records if record.belief.is_proved and record.state in FINAL_STATES)
     new_items = [record for record in proved_items if record.has_appeared]

@@ -57,8 +57,7 @@ def compute_look_at_pose(position: ArrayLike, target: ArrayLike, up: ArrayLike) 
 def convert_from_opencv(matrix: ArrayLike, rvec: ArrayLike, tvec: ArrayLike) -> tuple[Array, Pose]:
     """Return camera matrix `(3, 3)` [pixel] and pose `X_WC` of a camera calibrated with OpenCV.
 
-    `rvec` [rad] and `tvec` [m] of `cv2.solvePnP` transform points from the world to the camera. The function
-    is the inverse of `Frame.to_opencv`.
+    `rvec` [rad] and `tvec` [m] of `cv2.solvePnP` transform from world to camera (inverse: `Frame.to_opencv`).
     """
     # scipy.spatial is imported here because the import takes 0.3 s, and few cells need it.
     from scipy.spatial.transform import Rotation

@@ -28,6 +28,7 @@ class MountedCamera:
         name: Name of the camera in the cell file.
         config: Section of the camera in the cell file.
         matrix: Camera matrix `(3, 3)` [pixel].
+        _X_MC: Pose of the camera in the frame M of its mount: the world or the flange.
     """
 
     def __init__(
@@ -54,7 +55,7 @@ class MountedCamera:
         return self.scan_poses[self._pose_count % len(self.scan_poses)]
 
     def get_view_box(self, view: str) -> Box:
-        """Return the region of the image [pixel] that belongs to a view: `table` or `full`."""
+        """Return the region of interest in the image [pixel] for a view: `table` or `full`."""
         return self.config.get_view_box(view)
 
     def capture(self) -> Frame:

@@ -50,7 +50,7 @@ class Interruption:
 
 
 class Halt(NamedTuple):
-    """Halt of a run in step `tick`; `is_tree_ticked` is True if the tree was ticked before the halt."""
+    """Halt in step `tick`; `is_tree_ticked` is True if the tree was ticked in this step before the halt."""
 
     tick: int
     is_tree_ticked: bool
@@ -123,8 +123,8 @@ class InputLog:
     ) -> Interruption:
         """Return the interruption at the end of the log.
 
-        The resumed run keeps all steps of a run that ended as INCOMPLETE. Otherwise, the resumed run does not
-        keep the steps in which the arm only braked: after a halt, and in a resumption that was interrupted.
+        The resumed run keeps all steps of a run that ended as INCOMPLETE. Otherwise, it keeps no steps in
+        which the arm only braked: the steps after a halt, and those of a resumption that was interrupted.
 
         Args:
             step_count: Number of control steps that the cell has executed.

@@ -34,8 +34,8 @@ TRACKING_TOLERANCE = math.radians(0.5)
 class SimArm:
     """The arm of a PyBullet world; implements `executive.cell.arm.Arm`.
 
-    Each physics step needs one call of `advance` before the step, which commands the joint positions at the
-    end of the step. The arm brakes after a collision, or if a disturbance pushes the arm off its path.
+    Call `advance` before each physics step; it commands the joint positions for the end of that step. The arm
+    brakes after a collision, or if a disturbance pushes the arm off its path.
 
     Args:
         world: The world of the arm.
@@ -106,7 +106,7 @@ class SimArm:
 
     @property
     def at_rest(self) -> bool:
-        """True while the arm neither follows a motion nor brakes.
+        """True while the arm neither follows a motion nor brakes; raises and clears a stored fault.
 
         Raises:
             Fault: The arm has left its commanded path since the last call.
@@ -204,7 +204,7 @@ class SimArm:
             raise Fault(f'the cell file has no arm pose "{goal}"; it has {", ".join(sorted(self._poses))}')
 
     def _check_positions(self, q: Array, tolerance: float, description: str) -> None:
-        """Store a fault message if a joint is over `tolerance` [rad] from `q`, which `description` names."""
+        """Store a fault message with `description` if a joint is over `tolerance` [rad] away from `q`."""
         errors = np.abs(self.q - q)
         joint = int(np.argmax(errors))
         if errors[joint] > tolerance:
@@ -220,6 +220,7 @@ class SimArm:
             raise Fault(f"the arm cannot {action} while moving ({remaining:.2f} s to go); wait for `at_rest`")
 
     def _raise_fault(self) -> None:
+        """Raise and clear the stored fault, if any."""
         if self._fault_message is not None:
             message, self._fault_message = self._fault_message, None
             raise Fault(message)

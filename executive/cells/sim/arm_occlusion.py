@@ -32,7 +32,7 @@ class ArmOcclusion:
         arm: The arm.
         kinematics: Kinematics of the arm.
         config: The cell file.
-        is_loaded: Returns True if the tool holds an object; its assumed size is that of the largest class.
+        is_loaded: Returns True if the tool holds an object; the object is assumed to be of the largest class.
     """
 
     def __init__(

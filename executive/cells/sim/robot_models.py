@@ -22,8 +22,7 @@ class RobotModel:
         wrist_link: Index of the first link of the wrist, whose links a held object is permitted to touch.
         self_collision_pairs: Pairs of indices of links that can collide with each other.
         link_radius: Radius of a cylinder around the housing of each link [m].
-        ik_seed_deg: Positions of the joints except the first [degree] from which the numerical inverse
-            kinematics starts.
+        ik_seed_deg: Start of the numerical inverse kinematics: positions of joints 2 and higher [degree].
     """
 
     flange_link: str

@@ -101,7 +101,7 @@ def spawn_objects(
 
 
 def find_lack_of_room(config: CellConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield key and message if all random sets with the maximum number of objects find no room."""
+    """Yield the key and an error if no random set with the maximum number of objects fits the workspace."""
     message = ""
     for seed in range(OBJECT_SET_COUNT):
         rng = np.random.default_rng(seed)

@@ -127,7 +127,6 @@ def _find_denoted_nodes(flow: FlowAnalysis, name: FailureName, matching: list[Po
     """Return the nodes whose failures `name` denotes; none for a label, because labels are unambiguous."""
     if any(name.source in failure.labels for failure in matching):
         return []
-    # Nodes with the same position are one node of a subtree that is used more than once.
     denoted = [flow.nodes[failure.origin] for failure in matching if failure.must_match([name])]
     nodes_by_span = {node.span: node for node in denoted}
     return sorted(nodes_by_span.values(), key=lambda node: (node.span.line, node.span.col))

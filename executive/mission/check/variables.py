@@ -29,7 +29,7 @@ def find_unwritten_inputs(context: CheckContext) -> Iterator[Finding]:
 
 
 def find_unwritten_library_inputs(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every use of a library in which inputs may read unwritten variables."""
+    """Yield an error for every use of a library subtree in which an input may read an unwritten variable."""
     inputs_by_use: dict[str, dict[str, str]] = {}
     for read in _find_unwritten_reads(context, in_libraries=True):
         path = context.library_uses_by_path[read.node.path].path
@@ -57,7 +57,7 @@ def _find_unwritten_reads(context: CheckContext, in_libraries: bool) -> Iterator
 
 
 def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
-    """Yield a warning for every variable that the mission names for an output and no node reads."""
+    """Yield a warning for every variable that the mission assigns to an output by name, but no node reads."""
     read_variables = {read.variable for read in context.iterate_reads(context.tree)}
     for node in context.tree.walk():
         for _, variable in find_control_node_outputs(node):
@@ -79,7 +79,7 @@ def find_unread_variables(context: CheckContext) -> Iterator[Finding]:
 
 
 def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every loop variable that another node writes; a loop deletes its variable."""
+    """Yield an error for every loop variable that another node writes; the loop deletes it when it ends."""
     wires = [wire for node in context.tree.walk() for wire in context.find_wires(node, Direction.OUT)]
     skill_writes = {wire.variable: (str(wire), wire.span) for wire in wires}
 
@@ -99,7 +99,7 @@ def find_overwritten_loop_variables(context: CheckContext) -> Iterator[Finding]:
 
 
 def find_unwritten_returns(context: CheckContext) -> Iterator[Finding]:
-    """Yield an error for every variable below `returns` that the subtree may not write before it succeeds."""
+    """Yield an error for every variable in `returns` that may be unwritten when the subtree succeeds."""
     for use in context.tree.walk():
         if not isinstance(use, SubtreeNode) or use.body is None:
             continue
@@ -161,5 +161,6 @@ def _make_unwritten_hint(context: CheckContext, variable: str) -> str:
 
 
 def _list_skills_with_output(context: CheckContext, name: str) -> str:
+    """Return the names of the skills that have an output `name`, separated by commas."""
     outputs = {skill: context.skills[skill].ports.get(name) for skill in context.skills}
     return ", ".join(skill for skill, port in outputs.items() if port and port.direction is Direction.OUT)

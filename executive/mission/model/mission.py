@@ -28,8 +28,7 @@ class Subtree:
         span: Position of the name.
         doc: Purpose of the subtree, or "".
         arguments: Arguments by name.
-        returns: Positions of the variables that the caller gets, by name; all other variables are local.
-            None if the subtree shares all variables with the caller.
+        returns: Positions of the variables that are not local, by name; None: no variable is local.
         body: Root node of the subtree.
         library: Name of the library that defines the subtree; "" if the mission file defines it.
     """

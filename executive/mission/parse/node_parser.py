@@ -1,4 +1,4 @@
-"""Parser of the nodes of a mission's tree from YAML words, lists and mappings."""
+"""Parser of the nodes of a mission's tree from YAML scalars, sequences and mappings."""
 
 from __future__ import annotations
 
@@ -79,6 +79,7 @@ class NodeParser:
         return InnerNode(node.span, "", node_class, {"do": nodes}, is_list=True)
 
     def _read_word(self, node: YamlScalar) -> Node:
+        """Return the mission node for a YAML scalar: a skill, or a keyword that needs no body."""
         word = node.text
         node_class = self._node_classes.get(word)
         if node_class is not None and has_optional_body(node_class):

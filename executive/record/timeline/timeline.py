@@ -128,7 +128,7 @@ class Timeline:
         return sorted(activations, key=lambda activation: activation.number)
 
     def find_current_activation(self, path: str) -> Activation | None:
-        """Return the last activation of a node, or None if an ancestor of the node was started after it."""
+        """Return the last activation of a node, or None if an ancestor was started after this activation."""
         last = self.activation_by_path.get(path)
         ancestor_path = path.rpartition("/")[0]
         while last is not None and ancestor_path:

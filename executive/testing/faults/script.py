@@ -1,4 +1,4 @@
-"""Faults with their times: in activations of a node, in random activations, or in a time span."""
+"""Scheduled faults of a fault script: in activations of a node, in random activations, or in a time span."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class TimeSpan:
 
 
 class ScheduledFault(NamedTuple):
-    """A fault of a script: an effect on the cell, and the time of the effect."""
+    """A fault of a script: an effect on the cell, and the activations or the time span in which it occurs."""
 
     effect: Effect
     time: NodeActivations | TimeSpan

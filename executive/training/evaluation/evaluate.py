@@ -47,7 +47,7 @@ def evaluate(
         samples: The images.
         threshold: Minimum confidence of a detection; None: the threshold of the detector.
         localizer: Computes positions, which are compared with the true positions; None: no comparison.
-        mistakes: Collection of the worst mistakes; None: mistakes are not collected.
+        mistakes: Collects the missed objects and detections with the worst errors; None: no collection.
         table: Workspace whose brightness, contrast and colours are measured; None: no measurement.
     """
     errors, repeated_errors = ErrorStatistics(localizer), RepeatedErrors(localizer)
@@ -127,7 +127,7 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
     Args:
         model: The ONNX file.
         labels: The text file with the class names.
-        folder: Folder of a split, or of a dataset (its first split in `samples.EVALUATION_SPLITS`).
+        folder: Folder of a split or dataset; of a dataset, the first of `samples.EVALUATION_SPLITS` is used.
         threshold: Minimum confidence of a detection.
 
     Raises:
@@ -139,7 +139,7 @@ def evaluate_folder(model: Path, labels: Path, folder: Path, threshold: float) -
 
 
 class AveragePrecision:
-    """Mean average precision over all classes in the images."""
+    """Mean average precision (mAP) over all classes in the images."""
 
     def __init__(self) -> None:
         # The import takes half a second and 120 MB; only an evaluation needs the package.

@@ -1,4 +1,4 @@
-"""Program of the server process of the live page: reads messages from stdin, writes commands to stdout."""
+"""Server process of the live page: reads messages from stdin, and writes commands to stdout."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ MIN_AXIS_LENGTH, MAX_AXIS_LENGTH = 900.0, 6000.0
 PIXELS_PER_SECOND = 45.0
 """Scale of the time axis between its minimum and maximum length [pixel/s]."""
 MIN_GAP, MIN_BAR_WIDTH = 1.0, 3.0
-"""Activations closer than `MIN_GAP` share a bar that is narrower than `MIN_BAR_WIDTH` [pixel]."""
+"""Activations share a bar if their gap is below `MIN_GAP` and the bar is below `MIN_BAR_WIDTH` [pixel]."""
 MAX_BAR_COUNT = 8000
 """Maximum number of bars in addition to one bar per lane; a bar takes about 250 bytes."""
 _LEVEL_INDENT, _FONT_SIZE, _NAME_MARGIN = 9.0, 11.0, 12.0
