@@ -37,7 +37,7 @@ class Detection:
 
 @dataclass(frozen=True)
 class Answer:
-    """Detections of a detector in a frame.
+    """Result of a detector for one frame: its detections, divided by their certainty.
 
     A detector puts all detections into `confident`. Before a skill reads the answer, the function
     `executive.perception.detectors.screening.screen_answer` moves detections to `doubtful` and `unknown`.
@@ -68,12 +68,12 @@ class Answer:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Detections(Answer):
-    """Answer of a detector, with the searched frame and the searched region of its image.
+    """Detections of a detector in one frame, with the frame and the searched region of its image.
 
     Attributes:
         frame: The searched frame.
         view: Name of the searched region of the image: `table` (the workspace) or `full`.
-        area: Searched region of the image [pixel].
+        area: Searched region of the image: left, top, right and bottom side [pixel].
     """
 
     frame: Frame
@@ -101,7 +101,7 @@ class Observation:
         position: Centre of the object `(3,)` [m] in the world.
         std: Standard deviation of the random error of the position along each axis [m].
         is_confident: False if the detection is in `Answer.doubtful`, or if `contradiction` is not empty.
-        contradiction: Sentence that states how size or height contradict the detected class; "" if neither.
+        contradiction: Sentence that states how the size or height contradicts the detected class, or "".
     """
 
     detection: Detection

@@ -31,7 +31,7 @@ class Frame:
         X_WC: Camera pose in the world at capture, in the convention of OpenCV (z forward, y down).
         stamp: Capture time on the clock of the run [s].
         visible: Mask `(H, W)`, False for pixels that the arm may occlude at its measured joint positions.
-        change_count: Value of `Ledger.change_count` at capture.
+        change_count: Number of robot actions that may have moved objects before the capture.
     """
 
     id: int

@@ -20,7 +20,7 @@ class Ledger(Protocol):
 
     @property
     def unknown_labels(self) -> Mapping[str, int]:
-        """Maximum number of boxes per frame, by label, of the labels that the cell file does not declare."""
+        """Labels that are not in the cell file, each with its maximum number of boxes per frame."""
 
     def observe(self, detections: Detections, observations: Sequence[Observation]) -> Sequence[Target]:
         """Update all items with the detections in a frame, and return the targets (`find_targets`).
@@ -46,7 +46,7 @@ class Ledger(Protocol):
         """Return the item in the tool, or None."""
 
     def is_current(self, frame: Frame) -> bool:
-        """Return False if an action since the capture of a frame may have moved all objects on the table."""
+        """Return False if an action since a frame's capture may have moved objects anywhere on the table."""
 
     def is_fresh(self, target: Target) -> bool:
         """Return False if the robot may have moved a target since its last detection."""
@@ -60,7 +60,7 @@ class Ledger(Protocol):
     def is_table_empty(self, label: str | None = None) -> bool:
         """Return True if almost certainly no object with a route is visible on the table.
 
-        `label` is the class of the counted objects; None: all classes with a route.
+        `label` restricts the check to objects of one class; None: all classes with a route.
         """
 
     def get_label(self, item: Item) -> str:
@@ -109,7 +109,7 @@ class Ledger(Protocol):
         """Record that the robot may have moved any object on the table."""
 
     def lose_track(self) -> None:
-        """Record that the tool may have moved any item outside of the bins."""
+        """Record a loss of track: the tool may have moved any item outside of the bins."""
 
     def mark_unseen_as_dropped(self) -> None:
         """Record as dropped every item that no frame has shown since `lose_track`.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from executive.geometry import Array
 
 Item = str
-"""Identity of one physical object in the ledger, for instance `cube-2`."""
+"""Id of one physical object in the ledger, for instance `cube-2`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,12 +16,12 @@ class Target:
     """An item on the table that a skill may pick.
 
     Attributes:
-        item: The item.
+        item: Id of the item.
         label: Class name.
         position: Centre of the object `(3,)` [m] in the world, at half the height of its class.
         confidence: Confidence of the last detection, 0 to 1.
         frame: Id of the last frame that showed the item.
-        change_count: Value of `Ledger.change_count` at the capture of that frame.
+        change_count: Number of robot actions that may have moved objects before the capture of that frame.
         stamp: Capture time of the last frame that showed the item [s].
     """
 

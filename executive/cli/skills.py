@@ -36,8 +36,8 @@ Declaration = Mapping[str, Any]
 def command(ctx: click.Context, name: str | None, conform: bool, as_json: bool) -> None:
     """List the installed skills, or describe one skill.
 
-    With NAME, prints all ports, params and reasons of this skill. Exit code 1 if a check of --conform fails
-    or cannot be run.
+    With NAME, prints all ports, params and failure reasons of this skill. Exit code 1 if a check of --conform
+    fails or cannot be run.
     """
     with keep_stdout_clean():
         from executive.errors import InputError
@@ -89,7 +89,7 @@ def _describe_verdict(verdict: Verdict) -> str:
 
 
 def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
-    """Return the declarations of a skill as JSON values."""
+    """Return a skill's declaration as JSON values; `tool.left` is the tool state after each failure."""
     from pydantic_core import to_json
 
     state_before, state_after = skill.tool_state
@@ -108,7 +108,7 @@ def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
 
 
 def _declare_entry(entry: Param | Port) -> dict[str, Any]:
-    """Return the declaration of a param or port as JSON values, with the keys `min`, `max` and `refers`."""
+    """Return a declaration as JSON values; `ge`, `le` and `refers_to` become `min`, `max` and `refers`."""
     values = {**vars(entry), "type": _format_type(entry.type), "required": entry.is_required}
     values["default"] = None if entry.default is ... else entry.default
     keys = {"ge": "min", "le": "max", "refers_to": "refers"}

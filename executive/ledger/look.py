@@ -50,7 +50,7 @@ class LookUpdate:
         config: Thresholds of the ledger, from the cell file.
         records: All items; `apply` adds new items.
         coverage: Miss probabilities of the grid points on the table; `apply` updates them.
-        staleness: Changes of the table by the robot.
+        staleness: Actions of the robot that may have moved objects on the table.
         look: Detections in the image of the look.
     """
 
@@ -87,7 +87,7 @@ class LookUpdate:
         self, known_items: Sequence[ItemRecord], observations: Sequence[Observation]
     ) -> list[ItemRecord]:
         """Update known items with confident observations, add new items, and return the detected items."""
-        # An object at the position of an improbable item that may have been moved counts as a new item.
+        # An object detected at the position of an improbable item that may have been moved is a new item.
         rates, viewpoint, staleness = self.look.error_rates, make_viewpoint_key(self.look), self.staleness
         candidates = [item for item in known_items if item.belief.is_probable or staleness.is_unmoved(item)]
         matches = associate(observations, candidates, staleness, self.config.gate)
@@ -112,7 +112,7 @@ class LookUpdate:
     def _update_uncertain_items(
         self, detected_items: Sequence[ItemRecord], observations: Sequence[Observation]
     ) -> list[ItemRecord]:
-        """Update items with low-confidence observations, and return these items.
+        """Update items with doubtful observations (low confidence or contradiction); return these items.
 
         Observations near detected items are ignored. Other observations are assigned to the nearest item. If
         no item is near, the observation becomes a new item, unless earlier looks found the position empty.

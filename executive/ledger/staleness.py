@@ -45,5 +45,5 @@ class Staleness:
         return None
 
     def is_table_unchanged(self, change_count: int) -> bool:
-        """Return True if no change after `change_count` may have moved all objects on the table."""
+        """Return True if no change after `change_count` concerns the whole table."""
         return all(math.isfinite(radius) for _, radius in self._changes[change_count:])

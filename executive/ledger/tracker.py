@@ -43,7 +43,7 @@ class Tracker:
         labels_with_unique_height: Classes whose height distinguishes them from all others.
 
     Attributes:
-        unknown_labels: Maximum number of boxes in a frame, by label that is not in the cell file.
+        unknown_labels: Labels that are not in the cell file, each with its maximum number of boxes per frame.
         assumption_reasons: Reasons why error rates of detectors were assumed, and not measured.
     """
 
@@ -111,7 +111,7 @@ class Tracker:
         return next((record.item for record in self._records.filter_by_state(State.HELD)), None)
 
     def is_current(self, frame: Frame) -> bool:
-        """Return False if the robot may have moved all objects on the table since the capture of a frame."""
+        """Return False if an action since a frame's capture may have moved objects anywhere on the table."""
         return self._staleness.is_table_unchanged(frame.change_count)
 
     def is_fresh(self, target: Target) -> bool:
@@ -130,7 +130,7 @@ class Tracker:
     def is_table_empty(self, label: str | None = None) -> bool:
         """Return True if almost certainly no object with a route is visible on the table.
 
-        `label` is the class of the counted objects; None: all classes with a route.
+        `label` restricts the check to objects of one class; None: all classes with a route.
         """
         if self._coverage.max_object_probability > self._config.max_miss_probability:
             return False
@@ -155,8 +155,8 @@ class Tracker:
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
         """Record a touch, and return False if the touch contradicts the class of the item.
 
-        A touch proves that the item exists. After a touch at the height of the class, a touch at another
-        height is no contradiction, because the item may have fallen over.
+        A touch proves that the item exists. After a touch at the height of the class, other heights are no
+        contradiction: the item may have fallen. `may_miss_top`: the cup may have touched below the top.
         """
         record = self._records.find(item)
         record.belief.is_proved, record.had_contact, record.empty_probe_count = True, True, 0
@@ -199,7 +199,7 @@ class Tracker:
         self._invalidate_near(record.position, self._config.neighbourhood)
 
     def record_drop(self, item: Item, landing: Array | None = None) -> None:
-        """Record that the tool lost an item during a motion, which may have moved any object."""
+        """Record that the tool lost an item; `landing` is the predicted landing position `(3,)` [m]."""
         record = self._records.find(item)
         record.is_untracked = False
         self._records.change_state(record, State.DROPPED)
@@ -235,7 +235,7 @@ class Tracker:
         self._invalidate_near(np.zeros(3), math.inf)
 
     def lose_track(self) -> None:
-        """Record that the tool may have moved any item outside of the bins."""
+        """Record a loss of track: the tool may have moved any item outside of the bins."""
         self._bin_recovery = BinRecovery(self._bins)
         self._mark_as_dropped(self._records.filter_by_state(State.HELD, State.DROPPED))
 
@@ -267,7 +267,7 @@ class Tracker:
         self._records.emit(*outcomes.discard_moved_items(self.records, dropped_items))
 
     def reopen(self) -> None:
-        """Discard the items on the table; the next look adds a new item for each visible object."""
+        """Discard all rejected and skipped items; the next look adds a new item for each visible object."""
         for record in self._records.filter_by_state(State.REJECTED, State.SKIPPED):
             record.set_state(State.PHANTOM, "the run was resumed, and the next look adds its object again")
             self._records.emit(record)

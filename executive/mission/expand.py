@@ -24,7 +24,7 @@ _MAX_DEPTH = 40
 _MAX_NODE_COUNT = 5000
 """Maximum number of expanded nodes."""
 _CALLER_PREFIX = "^"
-"""Temporary prefix of variables of the caller in the arguments of a subtree with local variables."""
+"""Temporary prefix that protects the caller's variables while the variables of a subtree are renamed."""
 
 ValuesByName = Mapping[str, Value]
 """Values of params and arguments by name."""

@@ -44,7 +44,7 @@ class MotionSearch:
     """Search for a motion between two joint configurations, or from a joint configuration to a goal.
 
     A motion consists of an optional straight departure upwards, a free part (joint motion), and an optional
-    straight arrival downwards.
+    straight arrival (approach) downwards.
 
     Args:
         config: Content of the cell file.
@@ -85,7 +85,7 @@ class MotionSearch:
         self._start = departure.state_at(departure.duration) if departure else JointState.at_rest(start)
 
     def list_motions(self) -> Iterator[Trajectory]:
-        """Yield motions in order of preference: direct and optimized motions, then motions with corners."""
+        """Plan and yield motions, the best first: direct and optimized motions, then motions with corners."""
         candidates = list(islice(self._list_candidates(), MAX_CANDIDATES))
         yield from self._list_direct_and_optimized(candidates)
         for extra_height in EXTRA_HEIGHTS:
@@ -134,7 +134,7 @@ class MotionSearch:
         return sorted(motions, key=lambda motion: payload.make_safe_motion(motion).duration)
 
     def _list_optimized(self, candidate: Candidate, optimizer: Optimizer) -> Iterator[Trajectory]:
-        """Yield the optimized motion to a candidate, first in minimum time, then with exact timing."""
+        """Yield the optimized motion, retimed to minimum time, then with the timing of the optimizer."""
         for is_exact in (False, True):
             with contextlib.suppress(JointLimitError):
                 yield self._build_motion(candidate, *optimizer.connect_states(is_exact=is_exact))
@@ -186,7 +186,7 @@ class MotionSearch:
     def _connect_with_corners(
         self, candidate: Candidate, extra_height: float, *, is_straight: bool
     ) -> list[MotionPiece]:
-        """Return a free part that stops at two corners: above the start and above the goal.
+        """Return a free part that stops at two corners (via points), above the start and above the goal.
 
         Args:
             candidate: The end of the motion.
@@ -237,7 +237,7 @@ class MotionSearch:
     def _solve_corner(
         self, position: tuple[float, float, float], branch: BranchKey, q_seed: Array
     ) -> JointState:
-        """Return the state of rest at a tool position [m], with joint n as in `q_seed` `(n,)` [rad]."""
+        """Return the state of rest at the corner `position` [m], with joint n as in `q_seed` `(n,)` [rad]."""
         q = self._kinematics.solve(make_tool_down_pose(position), branch)
         q[-1] = q_seed[-1]
         return JointState.at_rest(q)

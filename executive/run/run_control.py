@@ -55,7 +55,7 @@ class RunControl:
         self._wake_up.set()
 
     def add_request(self, text: str) -> None:
-        """Store a request for `TerminalOperator`, which discards all requests from before its question."""
+        """Store a request of the operator; `TerminalOperator` ignores requests that precede its question."""
         self._requests.append(text)
 
     def take_request(self) -> str | None:
@@ -70,7 +70,7 @@ class RunControl:
         self._callbacks.append(callback)
 
     def wait_while_paused(self) -> None:
-        """Call the callbacks, and wait until the next tick may begin or the run is stopped."""
+        """Call the callbacks; in a pause, wait for `resume` or `stop`, or begin a tick of `step`."""
         for callback in self._callbacks:
             callback()
         while self.is_paused:

@@ -244,7 +244,7 @@ def _read_text(file: Path, max_size: int) -> str:
 
 
 def read_json(file: Path) -> dict[str, Any]:
-    """Return the values in a JSON file by file name of the image; {} if the JSON file does not exist."""
+    """Return the values in a JSON file, by image file name; {} if the JSON file does not exist."""
     parse = TypeAdapter(dict[str, Any]).validate_json
     return _parse_file(file, MAX_COCO_FILE_SIZE, parse) if file.is_file() else {}
 

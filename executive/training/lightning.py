@@ -1,4 +1,4 @@
-"""Extensions of RF-DETR's training loop: augmentation by symmetries, and mixed precision on CPUs."""
+"""Extensions of RF-DETR's PyTorch Lightning modules: augmentation by symmetries, mixed precision on CPUs."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class ForEach(Loop):
         return f"${self.each} in [{', '.join(map(str, self.in_))}]"
 
     def start(self) -> None:
-        """Read the list and its first element.
+        """Read the list, and write its first element to the variable `each`.
 
         Raises:
             Fault: The variable with the list was never written, or its value is not a list.
@@ -87,7 +87,7 @@ class ForEach(Loop):
         raise Fault(f"{self.name}: {problem}", self.path)
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the outcomes; each further iteration starts in the state after success of the body."""
+        """Return the possible outcomes; the next iteration starts in the state after success of the body."""
         if self.in_ == ():
             return Flow(state, {}, None)
         entry = state.with_variables([self.each])

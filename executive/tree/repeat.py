@@ -57,7 +57,7 @@ class Repeat(Loop):
         return Status.SUCCESS
 
     def compute_flow(self, get_flow: FlowFunction, state: FlowState) -> Flow:
-        """Return the outcomes; each further iteration starts in the state after success of the body."""
+        """Return the possible outcomes; the next iteration starts in the state after success of the body."""
         if self.times == 0:
             return Flow(state, {}, None)
         body, entry = find_fixed_point(

@@ -47,7 +47,7 @@ class SimMinTimes(CellMinTimes):
             return 0.0
 
     def _compute_min_time(self, positions: Array, slots: Array) -> float:
-        """Return the minimum time [s] between the nearest rows of `positions` and `slots`, `(N, 2)` [m]."""
+        """Return the minimum time [s] from `positions[i]` to `slots[i]` `(2,)` [m] for the nearest pair i."""
         nearest_row = np.argmin(np.linalg.norm(positions - slots, axis=1))
         starts, ends = (self._solve_configurations(points[nearest_row]) for points in (positions, slots))
         return float(compute_min_time(ends - starts[:, None], self._limits).min())

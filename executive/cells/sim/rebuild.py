@@ -55,7 +55,7 @@ class WorldRebuilder:
         self._motion_time = 0.0
         self._step_count = self._last_command_step = 0
         self._applied_targets: tuple[Array, float] | None = None
-        """Joint targets and motion time of the last physics step; None if no targets followed the step."""
+        """Joint targets and motion time of the last physics step, if newer targets followed it; else None."""
 
     @property
     def interrupted_state(self) -> InterruptedState:
@@ -121,7 +121,7 @@ class SampledMotion:
         self._states = states
 
     def state_at(self, s: float) -> JointState:
-        """Return the state at time `s` [s]."""
+        """Return the state at the time `s` since the start of the motion [s]."""
         return JointState(*(curve(s) for curve in self._curves))
 
     def sample(self, times: Array) -> JointState:

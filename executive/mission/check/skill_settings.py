@@ -82,7 +82,7 @@ def _find_unknown_names(
 
 
 def find_param_problem(param: Param, value: object) -> tuple[str, str]:
-    """Return the code and the message (predicate of a sentence) of an error; ("", "") without an error."""
+    """Return the code of an error and its message without the subject; ("", "") without an error."""
     try:
         converted = convert_value(value, param.type)
     except WrongType as problem:

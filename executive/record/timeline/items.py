@@ -17,7 +17,7 @@ class Look:
     Attributes:
         frame: Number of the frame.
         camera, detector: Names of the camera and of the detector.
-        clock: Time of the look [s].
+        clock: Time of the look on the clock of the run [s].
         found: Number of confident detections.
     """
 
@@ -30,13 +30,13 @@ class Look:
 
 @dataclass(frozen=True)
 class Sighting:
-    """Look in which an item was detected.
+    """Detection of an item in a look.
 
     Attributes:
         frame, camera, detector, clock: Number of the frame, names of camera and detector, time [s].
         item: Name of the item.
         attempts: Number of failed attempts to pick the item.
-        looks: Number of looks in which the item was detected, up to this look.
+        looks: Number of looks in which the item was detected, including this look.
         label, confidence: Class and confidence of the detection nearest to the item, or None.
         position: Position `(3,)` of the detection nearest to the item [m], or None.
     """
@@ -59,7 +59,7 @@ class ItemHistory:
 
     Attributes:
         last_change: Last event that changed the item.
-        last_change_number: Number of the last state change of the item, counted over all items of the run.
+        last_change_number: Sequence number of the item's last state change among those of all items.
         state_at_tree_end: State of the item at the end of the tree; the ledger sets final states afterwards.
         sighting: Last look in which the item was detected, or None.
         unseen_look_count: Number of looks after `sighting`.
@@ -116,7 +116,7 @@ class ItemsTimeline:
     def add_look(self, event: FrameSearched, clock: float) -> None:
         """Add a look at the time `clock` [s], after `add_change` added the changes of all detected items."""
         self.look = Look(event.frame, event.camera, event.detector, clock, len(event.confident))
-        # Sorting gives the classes the same colours in most runs of a mission.
+        # The colours follow the order of `classes`; sorting keeps them equal in most runs of a mission.
         self.classes |= dict.fromkeys(sorted(detection.label for detection in event.confident))
         for item in self.by_name.values():
             item.unseen_look_count += 1
