@@ -1,4 +1,4 @@
-"""What a report is told from: which files of a run directory are believed, and which pictures it holds."""
+"""Data of a report: valid files of a run directory, and pictures of the run."""
 
 from __future__ import annotations
 
