@@ -16,7 +16,7 @@ from executive.ledger.item import ItemRecord, State
 
 
 class BinRecovery:
-    """Finds objects in the bins that the ledger does not know, and records items for these objects.
+    """Finds objects in the bins that are missing from the ledger, and records items for these objects.
 
     Args:
         bins: Contents of the bins according to the ledger.
@@ -43,8 +43,10 @@ class BinRecovery:
         """
         found_items: list[ItemRecord] = []
         for label, bin_name in self._find_unknown_objects():
-            lost_items = [item for item in self._records.filter_by_state(State.DROPPED) if item.is_untracked]
-            same_class = (item for item in lost_items if item.label == label and item not in found_items)
+            dropped_items = [
+                item for item in self._records.filter_by_state(State.DROPPED) if item.is_untracked
+            ]
+            same_class = (item for item in dropped_items if item.label == label and item not in found_items)
             record = next(same_class, None)
             if record is None:
                 belief = Belief(label, MIN_LOG_ODDS_OF_PROOF, is_proved=True)
@@ -58,7 +60,7 @@ class BinRecovery:
                 self._records.reject(record, f"found in {bin_name} when the run was resumed")
 
     def _find_unknown_objects(self) -> Iterator[tuple[str, str]]:
-        """Yield class and bin name of each object in a bin that is not an item of the ledger.
+        """For each object that lies in a bin and has no item in the ledger, yield its class and bin name.
 
         The number of objects of a class is the median over the looks. The number of unknown objects of a
         class is the number of objects minus the number of items of the class in the bin. The total number of

@@ -25,7 +25,7 @@ def detect_and_record_drop(cell: Cell, item: Item) -> bool:
     if cell.ledger.find_held_item() == item:
         velocity, height = cell.arm.tool_velocity, cell.classes[cell.ledger.get_label(item)].height
         is_predictable = float(np.linalg.norm(velocity)) <= MAX_PREDICTABLE_SPEED
-        # The pose of the tool is a recorded input, so it is read only if it is needed.
+        # Each read of the tool pose is written to the journal, so it is read only if it is needed.
         landing = predict_landing(cell.arm.tool_pose.position, velocity, height) if is_predictable else None
         cell.ledger.record_drop(item, landing)
     return True

@@ -53,7 +53,7 @@ class FlowAnalysis:
         self.root_flow = self._analyse(tree, INITIAL_STATE)
 
     def find_skill_or_most_similar(self, name: str) -> type[Skill] | None:
-        """Return the skill `name`; for a typo, the most similar skill, to avoid further findings; or None."""
+        """Return the skill `name`, or the most similar one to avoid further findings, or None."""
         known_name = name if name in self._skills else find_similar_word(name, self._skills)
         return self._skills[known_name] if known_name else None
 
@@ -75,7 +75,7 @@ class FlowAnalysis:
             case SkillNode():
                 return self._compute_skill_flow(node, state)
             case SubtreeNode(body=Node() as body):
-                return self._compute_use_flow(node, body, state)
+                return self._compute_subtree_flow(node, body, state)
         for child in node.children:
             self._analyse(child, UNKNOWN_STATE)
         return make_unknown_flow(UNKNOWN_NAME, node.path)
@@ -99,7 +99,7 @@ class FlowAnalysis:
         failures = {PossibleFailure(node.skill, key, node.path): end_states[key] for key in skill.reasons}
         return Flow(success, failures, end_states[HALT_KEY])
 
-    def _compute_use_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:
+    def _compute_subtree_flow(self, node: SubtreeNode, body: Node, state: FlowState) -> Flow:
         flow = self._analyse(body, state)
         # In a loop, one use may start in several states.
         self.body_end_states[node.path] = join_states((self.body_end_states.get(node.path), flow.success))

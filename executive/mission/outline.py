@@ -40,13 +40,13 @@ class OutlineNode:
 
     Attributes:
         path: Unique path from the root.
-        name: Name of the node, with the key of the parent if the path contains the key: `recover: look`.
+        name: Name of the node, with `parent_key` in front if the path contains this key: `recover: look`.
         depth: Number of ancestors.
         detail: Summary of the node's settings in the mission.
         kind: `skill`, or the keyword of a control node.
         symbol, shape: Symbol and Graphviz shape of a control node in drawings; "" for a skill.
         title: Label of the node; for a node without label, name of the skill or keyword.
-        parent_key: Key of the parent that contains the node: `do`, `recover`, `catch 1`; "" in a list.
+        parent_key: Key under which the parent has the node: `do`, `recover`, `catch 1`; "" in a list.
         trigger: Failures after which the handler of a catch runs: `on Grasp.missed`; "" for other nodes.
         subtrees: Names of the subtrees with this node as root, the outermost first.
         skill: Name of the skill. In a control node, all attributes from `skill` to `uses` are empty.
@@ -147,7 +147,7 @@ def _format_name(relative_path: str) -> str:
 def _find_parent_key(
     node: Behaviour, parent: Behaviour | None, relative_path: str, names: Sequence[str]
 ) -> str:
-    """Return the key of the parent that contains a node, or "".
+    """Return the key under which the parent has a node, or "".
 
     The path of the node relative to its parent consists of the key and some of the `names`, from the last
     to the first. If the path has no key, the function compares the node with the children of the parent.

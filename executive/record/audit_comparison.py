@@ -38,7 +38,7 @@ class Audit:
     Attributes:
         agrees: True if the true places confirm the counts of the ledger.
         right, wrong_bin: Number of objects in a permitted bin, and in another bin.
-        left, elsewhere: Number of objects that are still on the table, and at other places.
+        left, elsewhere: Number of objects on the table, and below the table or fallen into wrong bins.
         fell_in_wrong_bin, unseen: Number of objects that fell into a wrong bin; number of undetected objects.
     """
 

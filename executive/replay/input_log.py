@@ -61,7 +61,7 @@ class InputLog:
     """Recorded inputs and interruptions of a run.
 
     Attributes:
-        events: Events of the journal in order, without the control steps that a resumed run did not keep.
+        events: Events of the journal in order, without the control steps that a resumption discarded.
         inputs: Recorded values by name of the input, in order; equal consecutive values are recorded once.
         interruptions: Interruptions after which the run was resumed, by `kept_step_count`.
         halt: The last halt, or None.
@@ -74,7 +74,7 @@ class InputLog:
 
     @staticmethod
     def from_events(events: Iterable[TimedEvent]) -> InputLog:
-        """Return the log of a journal, without the control steps that a resumed run did not keep."""
+        """Return the log of a journal, without the control steps that a resumption discarded."""
         kept_events: list[TimedEvent] = []
         for timed in events:
             if isinstance(timed.event, RunResumed):
@@ -118,13 +118,14 @@ class InputLog:
         events = (timed.event for timed in reversed(self.events))
         return next((event.action for event in events if isinstance(event, ToolCommanded)), "")
 
-    def find_interruption(
+    def make_final_interruption(
         self, step_count: int, last_command_tick: int = 0, *, is_complete: bool = True
     ) -> Interruption:
-        """Return the interruption at the end of the log.
+        """Return the interruption between the end of the log and the next resumption.
 
-        The resumed run keeps all steps of a run that ended as INCOMPLETE. Otherwise, it keeps no steps in
-        which the arm only braked: the steps after a halt, and those of a resumption that was interrupted.
+        A run that ended as INCOMPLETE keeps all control steps. Otherwise, the kept steps are in the log and
+        were executed by the cell. Steps in which the arm only braked are discarded: the steps after a halt,
+        and the steps of a resumption that was interrupted before the tree was ticked again.
 
         Args:
             step_count: Number of control steps that the cell has executed.

@@ -101,7 +101,7 @@ class ReplayedCell(CellWrapper):
         clock = StepClock(self._read_clock, self.log.control_period)
         self._cell = replace(intercept(inner.cell, self._handle_access, RECORDED_ROLES), clock=clock)
         self._begin_step(0)
-        self.pending_interruption = self._find_interruption(0)
+        self.pending_interruption = self._make_final_interruption(0)
 
     @property
     def cell(self) -> Cell:
@@ -126,7 +126,7 @@ class ReplayedCell(CellWrapper):
     @property
     def is_resumed_from_incomplete(self) -> bool:
         """True if the recorded run ended as INCOMPLETE in this control step, and was then resumed."""
-        interruption = None if self.is_live else self._find_interruption(self._steps + 1)
+        interruption = None if self.is_live else self._make_final_interruption(self._steps + 1)
         return interruption is not None and interruption.restarts_tree
 
     def resume(self) -> None:
@@ -166,13 +166,13 @@ class ReplayedCell(CellWrapper):
             self._has_raised_stop = True
             raise errors.Stopped("the recorded run was halted in this control step")
         self._begin_step(self._steps + 1)
-        self.pending_interruption = self._find_interruption(self._steps)
+        self.pending_interruption = self._make_final_interruption(self._steps)
 
     def _begin_step(self, step_count: int) -> None:
         self._steps = step_count
         self._replayer.begin_step(step_count)
 
-    def _find_interruption(self, step_count: int) -> Interruption | None:
+    def _make_final_interruption(self, step_count: int) -> Interruption | None:
         """Return the interruption after `step_count` control steps, or None."""
         if self.last_interruption is not None and step_count == self.last_interruption.kept_step_count:
             return self.last_interruption

@@ -117,7 +117,9 @@ def assemble_resumed(
     frame_count, pose_count = (len(log.inputs.get(name, ())) for name in ("camera.frame", "camera.next_pose"))
     request_count = sum(isinstance(timed.event, RequestGiven) for timed in log.events)
     workcell = builder.build_workcell(ResumePoint(world_log, frame_count, pose_count), request_count)
-    interruption = log.find_interruption(workcell.steps, workcell.last_command_step, is_complete=is_complete)
+    interruption = log.make_final_interruption(
+        workcell.steps, workcell.last_command_step, is_complete=is_complete
+    )
     return builder.build_resumed_run(workcell, log, None if has_ended else interruption)
 
 

@@ -62,7 +62,7 @@ class ResumedRun(Run):
         self._recorders.append(recorder)
 
     def _execute_tree(self) -> RunEnded:
-        """Execute the tree, again after each recorded resumption of INCOMPLETE runs; return the last end."""
+        """Execute the tree, and again after each resumption of an INCOMPLETE run; return the last end."""
         run_end = super()._execute_tree()
         while run_end.status == "INCOMPLETE" and self.replayed_cell.is_resumed_from_incomplete:
             self._context.advance()
@@ -105,7 +105,7 @@ class ResumedRun(Run):
             self._recover_scene()
 
     def _begin_on_inner_cell(self, interruption: Interruption) -> None:
-        """Brake the arm, then emit `RunResumed`; until then, a killed process does not change the journal."""
+        """Brake the arm, then emit `RunResumed`. A kill before this event leaves the journal unchanged."""
         context, inner = self._context, self.replayed_cell.inner
         brake_arm(inner.cell, inner.advance)
         for recorder in self._recorders:
@@ -154,5 +154,5 @@ def reconcile_ledger(cell: Cell, last_action: str) -> None:
     elif held_item is not None and not is_holding and last_action == "close":
         cell.tool.open()
         cell.ledger.record_drop(held_item)
-    # After the action `open`, the ledger still contains the grasp: the restarted skill records the release.
+    # After the action `open`, the item stays held: the skill starts again and records the release.
     cell.ledger.invalidate_positions()

@@ -55,7 +55,7 @@ def test_a_second_resumption_voids_only_the_end_of_the_first() -> None:
 def test_the_steps_after_a_halt_do_not_count() -> None:
     halted = [START, sense(8, 1), at(9, RunHalted(True)), sense(30, 2), at(30, run_ended())]
     log = InputLog.from_events(halted)
-    assert (log.find_interruption(30).kept_step_count, values(log.select_before(9))) == (9, [1])
+    assert (log.make_final_interruption(30).kept_step_count, values(log.select_before(9))) == (9, [1])
     # Once the run was resumed, the halt is void.
     assert InputLog.from_events([*halted, resume(30, 9)]).halt is None
 
@@ -65,7 +65,9 @@ def test_a_control_step_counts_if_the_world_made_it_and_the_journal_reaches_it(
     steps: int, complete: int
 ) -> None:
     # Step 8 is the last one in the journal: whether it is complete is known from the steps of the world.
-    assert InputLog.from_events([START, sense(8, 1)]).find_interruption(steps).kept_step_count == complete
+    assert (
+        InputLog.from_events([START, sense(8, 1)]).make_final_interruption(steps).kept_step_count == complete
+    )
 
 
 @pytest.mark.parametrize(
@@ -83,24 +85,24 @@ def test_a_world_that_did_more_than_the_journal_knows(
     last_command: int, is_complete: bool, complete: int, action: str
 ) -> None:
     log = InputLog.from_events([START, at(8, ToolCommanded("open"))])
-    interruption = log.find_interruption(20, last_command, is_complete=is_complete)
+    interruption = log.make_final_interruption(20, last_command, is_complete=is_complete)
     assert (interruption.kept_step_count, interruption.last_action) == (complete, action)
 
 
 def test_a_command_without_an_event_before_it_is_missing_in_the_journal() -> None:
     log = InputLog.from_events([START, at(5, ToolCommanded("open")), sense(8, 1)])
-    assert log.find_interruption(9, 8).last_action == "unknown"
-    assert log.find_interruption(9, 7).last_action == "open"
+    assert log.make_final_interruption(9, 8).last_action == "unknown"
+    assert log.make_final_interruption(9, 7).last_action == "open"
 
 
 def test_actions_stay_unknown_if_the_resumption_was_interrupted_at_once() -> None:
     log = InputLog.from_events([START, sense(5, 1), resume(9, 6, "unknown"), sense(9, 2)])
-    interruption = log.find_interruption(9, 8)
+    interruption = log.make_final_interruption(9, 8)
     assert (interruption.kept_step_count, interruption.last_action) == (6, "unknown")
 
 
 def test_a_kill_within_a_control_step_loses_no_action() -> None:
-    interruption = InputLog.from_events([START, at(8, ToolCommanded("open"))]).find_interruption(
+    interruption = InputLog.from_events([START, at(8, ToolCommanded("open"))]).make_final_interruption(
         8, 8, is_complete=False
     )
     assert (interruption.kept_step_count, interruption.last_action) == (8, "open")
@@ -111,13 +113,13 @@ def test_a_resumption_that_was_interrupted_at_once_is_repeated_from_its_beginnin
     steps: int, complete: int
 ) -> None:
     log = InputLog.from_events([START, sense(5, 1), resume(9, 6, "close"), sense(9, 2)])
-    interruption = log.find_interruption(steps)
+    interruption = log.make_final_interruption(steps)
     assert (interruption.kept_step_count, interruption.resume_tick) == (complete, steps)
 
 
 def test_a_run_that_ended_as_incomplete_is_reopened() -> None:
     log = InputLog.from_events([START, sense(8, 1), at(9, run_ended("INCOMPLETE"))])
-    assert log.find_interruption(9) == Interruption(10, "", True, 10)
+    assert log.make_final_interruption(9) == Interruption(10, "", True, 10)
     log = InputLog.from_events([*log.events, resume(10, 10), sense(11, 2)])
     assert log.interruptions[10].restarts_tree
 

@@ -16,7 +16,7 @@ from executive.testing.substitutes import make_raising, make_raising_when_halted
 Occasion = Literal["first", "middle", "late", "lasting"]
 """Occasion of a fault in a run or in a motion: at the start, in the middle, near the end, or repeatedly."""
 INJECTED_MESSAGE = "failure injected by the campaign"
-"""Message of an injected failure of a skill that has no cause in the cell."""
+"""Message of an injected failure for which the cell has no cause."""
 
 
 class InjectedError(Exception):
@@ -57,7 +57,7 @@ class PlannedFault:
         is_failure_reason: True if `kind` is a failure reason: the fault must let the node fail with it.
         expected_reason: Failure reason that a fault of a part causes in skills; "" if no reason is expected.
         is_conditional: True if the node runs only after another fault.
-        replaces_previous: True if the fault is tried only if the previous fault does not let the node fail.
+        replaces_previous: True if the fault is injected only if the previous fault caused no failure.
     """
 
     location: str
@@ -78,7 +78,7 @@ class PlannedFault:
         return isinstance(self.injected, SkillFault) and self.injected.kind != "fails"
 
     def is_cause_of(self, end: NodeEnded) -> bool:
-        """Return True if a node ended as this bug or this failure of the node requires."""
+        """Return True if a node ended with the injected error, or with the reason of the fault."""
         if self.is_bug:
             return end.status == "INVALID" and InjectedError.__name__ in end.message
         is_failure = (end.status, end.reason) == ("FAILURE", self.kind)

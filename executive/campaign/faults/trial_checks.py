@@ -98,7 +98,7 @@ def check_ledger(
         run_end: End of the run.
         items: Number of items in the ledger, by state.
         audit: True object counts by `AUDIT_KEYS`, for instance `left` for the table; None if unknown.
-        removed_count: Number of removed objects, which the ledger need not notice or count as lost.
+        removed_count: Number of removed objects; the ledger may count each as lost, or still contain it.
         unobserved: Numbers of unobserved objects, which the ledger may count as lost.
     """
     ledger_text = f"the ledger says {format_counts(items)}"

@@ -98,7 +98,7 @@ class PendingSearch:
         clock: Clock of the run.
         detector: Name of the detector.
         error_rates: Error rates of the detector.
-        expiry_time: Time from which the error of a missed deadline is available [s].
+        expiry_time: Time at which a detector that missed its deadline counts as unavailable [s].
     """
 
     future: Future[list[Detection]]

@@ -32,7 +32,7 @@ class SkillRuns:
     Args:
         name: Name of the skill in messages.
         skill: Class of the skill.
-        arrange: Function of the author of the skill that prepares the `SkillScene` of each run.
+        arrange: Function, given by the author of the skill, that prepares the `SkillScene` of each run.
     """
 
     def __init__(self, name: str, skill: type[Skill], arrange: Arrange) -> None:
