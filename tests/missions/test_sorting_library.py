@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from executive.events import FaultInjected
-from executive.testing.faults import after, arm_collides, between, detector_dead, during
+from executive.testing.faults import (
+    ScheduledFault,
+    after,
+    arm_collides,
+    between,
+    detector_dead,
+    detector_unsure,
+    during,
+)
 from executive.testing.run_mission import run_mission
 
 LONGEST_RESTART = 40.0
@@ -39,10 +47,23 @@ def test_a_sort_outlasts_the_restart_of_a_server(start: float, duration: float) 
     assert result.robot_time > start + duration
 
 
+COLLISION = during("*second*/do/MoveToScan", arm_collides(), activations=1)
+COLLISION_OF_RECOVERY = during("*second*/recover/*/MoveToScan", arm_collides(), activations=1)
+
+
 @pytest.mark.parametrize("pose", ["next", "aside"])
-@pytest.mark.parametrize("collision_count", [1, 2])
-def test_after_collisions_look_aside_looks_from_the_same_pose(
-    tmp_path: Path, pose: str, collision_count: int
+@pytest.mark.parametrize(
+    "faults",
+    [
+        [COLLISION],
+        [COLLISION, COLLISION_OF_RECOVERY],
+        [during("*second*/Detect", detector_dead(), activations=1)],
+        [during("*second*/Detect", detector_unsure(), activations=1)],
+    ],
+    ids=["collision", "two collisions", "dead detector", "unsure detector"],
+)
+def test_after_a_failed_attempt_look_aside_looks_from_the_same_pose(
+    tmp_path: Path, pose: str, faults: list[ScheduledFault]
 ) -> None:
     mission = tmp_path / "look_twice.yaml"
     mission.write_text(
@@ -53,10 +74,6 @@ def test_after_collisions_look_aside_looks_from_the_same_pose(
         "  - {use: look_aside, as: first, with: {pose: next}}\n"
         f"  - {{use: look_aside, as: second, with: {{pose: {pose}}}}}\n"
     )
-    collisions = [
-        during("*second*/1:retry/do/MoveToScan", arm_collides(), activations=1),
-        *[during("*second*/recover/*/MoveToScan", arm_collides(), activations=1)] * (collision_count - 1),
-    ]
-    undisturbed, disturbed = run_mission(mission), run_mission(mission, faults=collisions)
+    undisturbed, disturbed = run_mission(mission), run_mission(mission, faults=faults)
     assert len(disturbed.list_activated_nodes("*second*/Localize")) == 1
     assert disturbed.cell.cell.arm.q == pytest.approx(undisturbed.cell.cell.arm.q)
