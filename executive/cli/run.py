@@ -112,10 +112,7 @@ def command(
             click.echo("\n".join(lines), err=True)
         elif result.status == "INCOMPLETE" or result.disagreement:
             end_description = describe_end(result.status, result.reason, result.node, result.message)
-            click.echo(
-                "\n".join(filter(None, (result.disagreement, end_description))),
-                err=True,
-            )
+            click.echo("\n".join(filter(None, (result.disagreement, end_description))), err=True)
     if as_json:
         print_json(to_json(result))
     ctx.exit(find_exit_code(result))

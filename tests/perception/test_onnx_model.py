@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -74,3 +77,16 @@ def test_a_file_that_is_no_model_of_these_classes_is_refused(tmp_path):
     (tmp_path / "model.onnx").write_bytes(b"not a model")
     with pytest.raises(InputError, match="not a model that onnxruntime can run"):
         OnnxModel(tmp_path / "model.onnx", ("cube",))
+
+
+def test_a_model_with_outputs_of_variable_size_is_refused(model, monkeypatch):
+    def node(name, *shape):
+        return SimpleNamespace(name=name, shape=shape)
+
+    session = SimpleNamespace(
+        get_inputs=lambda: [node("input", 1, 3, 256, 256)],
+        get_outputs=lambda: [node("dets", 1, 50, 4), node("labels", 1, 50, "classes")],
+    )
+    monkeypatch.setattr(model, "_session", session)
+    with pytest.raises(InputError, match="input or output of variable size; export it with fixed sizes"):
+        model._check_shapes(Path("model.onnx"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import sys
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from executive.cell.arm import Goal
 from executive.cell.objects import Item, Target
@@ -175,6 +175,15 @@ class LoopsWithoutYield(Pause):
                 cell.camera.get_view_box("table")
             except Exception:
                 return
+
+
+class LoopsInConstructor(Pause):
+    tool_state: ClassVar = (EMPTY, EMPTY)
+
+    def __init__(self, **values: Any) -> None:
+        super().__init__(**values)
+        while values is not None:
+            pass
 
 
 class TrustsTheDetector(Skill):

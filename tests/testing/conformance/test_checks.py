@@ -254,3 +254,9 @@ def test_a_tick_that_does_not_come_back_is_broken_off_once(monkeypatch: pytest.M
     ]
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
     assert signal.getsignal(signal.SIGALRM) is answered
+
+
+def test_a_constructor_that_does_not_return_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("executive.testing.conformance.skill_test_run.STUCK_TIMEOUT", 0.3)
+    (problem, *_) = find_problems(check_of(faulty.LoopsInConstructor, "terminates"))
+    assert "LoopsInConstructor did not return for 0.3 s, at faulty_skills.py:N." in problem
