@@ -33,10 +33,11 @@ class Approach(Skill):
     with a hole. From the fourth attempt on, the descent ends 5 mm above the table, to distinguish a false
     detection from an object.
 
-    A touch at a wrong height contradicts the class of the target, unless an earlier touch matched the class.
-    The first touch that is too low is no contradiction if the detections alone prove the class and no class
-    has this height. A touch below the centre of the object, or more than `overtravel` below its top, misses;
-    the skill then fails with `no_contact` if an earlier touch matched the class, else with `contradicted`.
+    A touch at a wrong height contradicts the class of the target, unless an earlier touch matched the class;
+    the skill then fails with `contradicted`. The first touch that is too low is no contradiction if the
+    detections alone prove the class and no class has this height. A touch at a wrong height that is no
+    contradiction is a miss below the centre of the object, or more than `overtravel` below its top; the skill
+    then fails with `no_contact`.
     """
 
     target: In[Target] = port(doc="the target to touch")

@@ -55,6 +55,7 @@ def count_outcomes(
     * `fell_in_wrong_bin`: only the objects that fell into a wrong bin
     * `unseen`: objects that were never seen: the ledger contains no item, except phantoms, whose first
       position has a horizontal distance of at most `max_distance` [m] from a rest position of the object
+      or from the centre of its bin
 
     A removed object counts only if it was seen: by its bin if the tool placed it there, else as `elsewhere`.
     An object with `UNKNOWN_LABEL` that was never seen counts only if it is in a wrong bin, not as `unseen`.

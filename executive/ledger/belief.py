@@ -50,7 +50,7 @@ class Belief:
         log_odds: Posterior log odds that the item exists.
         is_proved: True if the item certainly exists, by the log odds or by a touch of the tool.
         miss_probability: Probability that all looks since the last detection missed the item by chance.
-        uncertain_look_count: Number of looks with a low-confidence detection since the last confident look.
+        uncertain_look_count: Number of looks with a doubtful detection since the last confident look.
         last_label_by_viewpoint: Last detected class by viewpoint key; cleared if the item may have moved.
         repeat_count: Number of looks that repeated the class of an earlier look from the same viewpoint.
         log_likelihoods: Log likelihood of each detected class, relative to a class that was never detected.

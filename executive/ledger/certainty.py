@@ -30,7 +30,7 @@ MIN_REPEATS_FOR_SATURATION = 2
 MAX_CLASS_ERROR_FOR_TOUCH = 0.2
 """Maximum class error of an item that the tool may touch to determine the class by the height."""
 MIN_UNCERTAIN_LOOKS_TO_REJECT = 10
-"""Minimum number of looks in a row with only low-confidence detections of a rejected item."""
+"""Minimum number of looks in a row with only doubtful detections of a rejected item."""
 
 
 @dataclass(frozen=True)

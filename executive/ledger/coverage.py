@@ -71,7 +71,7 @@ class Coverage:
     def update(self, look: Detections, uncertain_positions: Sequence[Array] = ()) -> None:
         """Update the miss probabilities of the points that a look searched.
 
-        Points near the positions `(3,)` [m] of low-confidence detections do not count as searched.
+        Points near the positions `(3,)` [m] of doubtful detections do not count as searched.
         """
         visible_mask = look.compute_searched_mask(self._points)  # Points that this look shows.
         for position in uncertain_positions:

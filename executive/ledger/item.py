@@ -22,7 +22,7 @@ SAME_POSITION_TOLERANCE = 0.01
 REASON_NOT_FOUND = "more looks missed it than saw it"
 """Reason of the state PHANTOM of an item whose position was empty in most looks."""
 REASON_UNCERTAIN = "no look is certain of it"
-"""Reason for the rejection of an item with low-confidence or contradicted detections only."""
+"""Reason for the rejection of an item with doubtful detections only."""
 
 
 class State(Enum):

@@ -24,7 +24,7 @@ def find_final_state(
     The first rule that applies determines the state:
 
     1. An item in the tool is rejected.
-    2. An item is rejected if all detections have low confidence and all later images of its place show it.
+    2. An item is rejected if all its detections are doubtful and all later images of its place show it.
     3. An item whose probability of existence is below 0.5 is a phantom.
     4. An item that the tool never touched in at least `MIN_EMPTY_PROBES` descents to the table is a phantom,
        if the tool has touched another item at the expected height.

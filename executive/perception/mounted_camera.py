@@ -28,7 +28,6 @@ class MountedCamera:
         name: Name of the camera in the cell file.
         config: Section of the camera in the cell file.
         matrix: Camera matrix `(3, 3)` [pixel].
-        _X_MC: Pose of the camera in the frame M of its mount: the world or the flange.
     """
 
     def __init__(

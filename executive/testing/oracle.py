@@ -146,7 +146,7 @@ class Oracle:
 
 
 def make_oracle_kind(*, box_std: float = 0.7, renders_images: bool = False) -> Callable[..., SimCell]:
-    """Return a factory of simulated cells with oracles as detectors, for `RunOptions.kind`.
+    """Return a factory of simulated cells with oracles as detectors, for `RunOptions.make_cell`.
 
     `box_std`: standard deviation of box coordinates [pixel]; if `renders_images` is False, images are black.
     """

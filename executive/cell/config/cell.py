@@ -38,7 +38,7 @@ class DetectorConfig(Section):
     kind: str
     """Kind of detector: the name of an entry point of the group `executive.detectors`."""
     threshold: float = Field(0.5, gt=0, lt=1)
-    """Minimum confidence of a detection that confirms an item, 0 to 1; below, more looks are needed."""
+    """Confidence below which a detection is doubtful, 0 to 1; a doubtful detection confirms no item."""
     floor: float = Field(0.25, gt=0, lt=1)
     """Minimum confidence of a detection; detections with a lower confidence are discarded."""
     latency: Seconds = 0.05

@@ -77,7 +77,7 @@ def list_situations(skill: type[Skill], arrange: Arrange) -> Iterator[Situation]
     """Yield the situations in which a skill is tested.
 
     There is one situation for each allowed state of the tool, with default values; one with all optional
-    inputs; and one for each other choice of each param of which `arrange` returns no value.
+    inputs, if there are any; and one for each choice except the default, of params that `arrange` omits.
 
     Raises:
         ArrangementFailed: The declared `tool_state` is invalid, or a value cannot be generated.

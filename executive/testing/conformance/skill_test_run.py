@@ -177,7 +177,7 @@ class SkillTestRun:
 
 
 class TickStuck(BaseException):
-    """A tick did not return; the message is the predicate of a sentence about the skill, with time and place.
+    """A tick or the constructor did not return; the message says so of the skill, with time and place.
 
     Not a subclass of Exception, so that a skill that catches exceptions is interrupted, too.
     """

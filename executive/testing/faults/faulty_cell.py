@@ -147,7 +147,7 @@ def with_faults(
     open_world: Callable[[Workcell], WorldAccess] = open_world,
     timeout: float = math.inf,
 ) -> Callable[..., FaultyCell]:
-    """Return a function that makes cells with a fault script, for `RunOptions.kind`.
+    """Return a function that makes cells with a fault script, for `RunOptions.make_cell`.
 
     The cell must observe the run: `run.add_observer(run.workcell.on_event)`.
 
