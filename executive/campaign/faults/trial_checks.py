@@ -26,7 +26,7 @@ MIN_BORDER_DISTANCE = 30.0
 
 
 class UnobservedCounts(NamedTuple):
-    """Numbers of objects, outside and inside of bins, that no image shows at their present positions."""
+    """Numbers of objects, outside and inside of bins, that the ledger cannot have found where they are."""
 
     outside_bins: int = 0
     inside_bins: int = 0
@@ -70,17 +70,28 @@ def check_tree(root: Behaviour) -> Iterator[str]:
 def count_unobserved_objects(
     objects: Sequence[TrueObject], bins: Collection[Bin], events: Sequence[TimedEvent]
 ) -> UnobservedCounts:
-    """Return the numbers of objects whose positions no image has shown since the last drop."""
+    """Return the numbers of objects that the ledger cannot have found since the last drop.
+
+    An object outside of the bins is unobserved if no image shows its position. An object inside of a bin is
+    unobserved if no detector searched a full image that shows its position: if the executive cannot look
+    into the bin, it reports the object as lost.
+    """
     changes = [(timed.tick, timed.event) for timed in events if isinstance(timed.event, ItemChanged)]
     drop_ticks = [tick for tick, change in changes if change.state == State.DROPPED.value]
     if not drop_ticks:
         return UnobservedCounts()
-    later_events = (timed.event for timed in events if timed.tick > drop_ticks[-1])
+    later_events = [timed.event for timed in events if timed.tick > drop_ticks[-1]]
     frames = [event.frame for event in later_events if isinstance(event, FrameCaptured)]
-    all_positions = [true_object.position for true_object in objects]
-    positions = [xyz for xyz in all_positions if not any(_is_visible(xyz, frame) for frame in frames)]
-    inside_count = sum(any(bin.contains(position, BIN_THICKNESS) for bin in bins) for position in positions)
-    return UnobservedCounts(len(positions) - inside_count, inside_count)
+    searches = [event for event in later_events if isinstance(event, FrameSearched)]
+    full_view_ids = {search.frame for search in searches if search.view == "full"}
+    frames_of_bins = [frame for frame in frames if frame.id in full_view_ids]
+    inside_count = outside_count = 0
+    for position in (true_object.position for true_object in objects):
+        if any(bin.contains(position, BIN_THICKNESS) for bin in bins):
+            inside_count += not any(_is_visible(position, frame) for frame in frames_of_bins)
+        else:
+            outside_count += not any(_is_visible(position, frame) for frame in frames)
+    return UnobservedCounts(outside_count, inside_count)
 
 
 def check_ledger(

@@ -20,7 +20,7 @@ from executive.campaign.faults.trial_checks import (
 )
 from executive.cell.frame import FrameCaptured
 from executive.cells.fake.cell import FakeCell
-from executive.events import FaultInjected, RunEnded
+from executive.events import FaultInjected, FrameSearched, RunEnded, TimedEvent
 from executive.mission.flow_analysis import UnhandledFailure
 from executive.testing.faults import during, seal_fails
 from executive.testing.faults.world_access import TrueObject
@@ -38,6 +38,10 @@ PLACES = ((0.5, 0.0, 0.025), (1.6, 0.0, 0.025), (0.24, -0.48, 0.025))
 
 def outcome(status: str, reason: str = "", message: str = "", node: str = "") -> RunEnded:
     return RunEnded(status, reason, message, node, True, "", 10, 1.0)
+
+
+def searched(frame_id: int, view: str) -> TimedEvent:
+    return at(21, FrameSearched(frame_id, "overhead", "rfdetr", view, (), (), ()))
 
 
 def books(*args: Any) -> list[str]:
@@ -175,8 +179,22 @@ def test_an_object_is_out_of_sight_if_no_look_since_the_last_fall_shows_its_plac
     look = at(20, FrameCaptured(camera.capture()))
     before = at(5, look.event)
     things = [seen, beside, inside]
-    assert count_unobserved_objects(things, bins, [fall, look]) == UnobservedCounts(1, 0)
+    search = searched(look.event.frame.id, "full")
+    assert count_unobserved_objects(things, bins, [fall, look, search]) == UnobservedCounts(1, 0)
     assert count_unobserved_objects(things, bins, [before, fall]) == UnobservedCounts(2, 1), (
         "what was seen before it fell is old"
     )
     assert count_unobserved_objects(things, bins, [look]) == UnobservedCounts(0, 0), "nothing fell"
+
+
+@pytest.mark.parametrize("views", [[], ["table"], ["full of another frame"]])
+def test_an_object_in_a_bin_is_out_of_sight_if_no_detector_searched_an_image_of_the_bin(
+    fake: FakeCell, views: list[str]
+) -> None:
+    frame = fake.cell.camera.capture()
+    inside = TrueObject(2, "cube", np.array(PLACES[2]))
+    searches = [
+        searched(frame.id + 1, "full") if "other" in view else searched(frame.id, view) for view in views
+    ]
+    looks = [at(10, item_changed("cube-1", "dropped")), at(20, FrameCaptured(frame)), *searches]
+    assert count_unobserved_objects([inside], fake.cell.bins.values(), looks) == UnobservedCounts(0, 1)
