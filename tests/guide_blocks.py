@@ -23,7 +23,8 @@ import yaml
 ROOT = Path(__file__).parent.parent
 TUTORIAL = "missions/README.md"
 MISSION_GUIDES = (
-    TUTORIAL, "missions/running.md", "missions/editor.md", "missions/detectors.md", "missions/scenes.md"
+    TUTORIAL, "missions/expressions.md", "missions/running.md", "missions/editor.md", "missions/detectors.md",
+    "missions/scenes.md",
 )  # fmt: skip
 GUIDES = ("README.md", *MISSION_GUIDES, "skills/README.md")
 
