@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from py_trees.common import Status
+from py_trees.trees import BehaviourTree
 
 from executive.cell.workcell import Workcell
 from executive.errors import ExecutiveError, Fault, Stopped
@@ -30,6 +31,8 @@ class Run:
 
     Attributes:
         root: Root of the tree, which uses the cell and the events of `context`.
+        behaviour_tree: The tree for py_trees; visitors and handlers that are added to it before `execute`
+            are called at every tick.
         control: Control with which other threads stop, pause and step the run.
         mission: Name of the mission.
     """
@@ -45,6 +48,7 @@ class Run:
         is_realtime: bool = False,
     ) -> None:
         self.root, self.control, self.mission = root, control, mission
+        self.behaviour_tree = BehaviourTree(root)
         self._context = context
         self._start_event = start_event
         self._is_realtime = is_realtime
@@ -127,6 +131,9 @@ class Run:
     def _tick_until_end(self) -> LoopEnd:
         """Tick the tree once in every control step until it ends, or until the run is stopped."""
         context, control, is_tree_ticked = self._context, self.control, False
+        tree = self.behaviour_tree
+        has_callbacks = tree.visitors or tree.pre_tick_handlers or tree.post_tick_handlers
+        tick_tree = tree.tick if has_callbacks else self.root.tick_once
         try:
             if self._start_event is not None:
                 context.emit(self._start_event)
@@ -135,7 +142,7 @@ class Run:
             control.wait_while_paused()
             while not control.is_stopped:
                 is_tree_ticked = True
-                self.root.tick_once()
+                tick_tree()
                 if control.is_stopped:
                     break
                 if self.root.status is not Status.RUNNING:

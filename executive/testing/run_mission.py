@@ -8,6 +8,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from py_trees.visitors import VisitorBase
+
 from executive.cell.cell_wrapper import find_innermost_cell
 from executive.cell.workcell import Accounts, Workcell
 from executive.cells.fake.cell import FakeCell
@@ -77,6 +79,7 @@ def run_mission(
     faults: Sequence[ScheduledFault] = (),
     arrange: Callable[[Any], object] | None = None,
     observers: Sequence[Observer] = (),
+    visitors: Sequence[VisitorBase] = (),
     timeout: float = MISSION_TIMEOUT,
 ) -> MissionResult:
     """Run a mission to its end, close the cell and return the result.
@@ -91,6 +94,7 @@ def run_mission(
         faults: Fault script of the cell.
         arrange: Function that changes the cell before the run, for instance puts objects on the table.
         observers: Functions that are called with each event.
+        visitors: Visitors of py_trees, which see every ticked node after each tick.
         timeout: Timeout on the run's clock, after which the run ends as a fault [s].
 
     Raises:
@@ -121,6 +125,8 @@ def run_mission(
         workcell.check_patterns([getattr(node, "path", node.name) for node in run.root.iterate()])
         _check_substitutes(run, skills)
         run.add_observer(workcell.on_event)
+        for visitor in visitors:
+            run.behaviour_tree.add_visitor(visitor)
         run_ended = run.execute()
         return MissionResult(
             **asdict(run_ended),

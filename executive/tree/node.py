@@ -52,7 +52,6 @@ class TreeNode(Behaviour):
         path: Unique path from the root of the tree.
         label: Label of the node in the mission, or "".
         blackboard: Variables of the run.
-        failure: The failure while the status is FAILURE; else None.
         subtree_names: Names of the subtrees with this node as root, the outermost first.
     """
 
@@ -61,8 +60,20 @@ class TreeNode(Behaviour):
     def __init__(self, context: NodeContext, name: str) -> None:
         super().__init__(context.label or name)
         self.path, self.label, self.blackboard = context.path, context.label, context.blackboard
-        self.failure: Failure | None = None
+        self._failure: Failure | None = None
+        self._visited_nodes: list[Behaviour] | None = None
+        """Nodes below this node that the current call of `tick` has ticked; None outside of `tick`."""
         self._emit = context.emit
+
+    @property
+    def failure(self) -> Failure | None:
+        """The failure while the status is FAILURE; else None. `feedback_message` contains its text."""
+        return self._failure
+
+    @failure.setter
+    def failure(self, failure: Failure | None) -> None:
+        self._failure = failure
+        self.feedback_message = f"{failure}: {failure.message}" if failure else ""
 
     def update(self) -> Status:
         """Continue by one tick and return the status."""
@@ -70,8 +81,14 @@ class TreeNode(Behaviour):
         return self.status
 
     def tick(self) -> Iterator[Behaviour]:
-        """Continue by one tick, then yield this node."""
-        self.tick_once()
+        """Continue by one tick, then yield the ticked nodes for visitors of py_trees, children first."""
+        visited_nodes: list[Behaviour] = []
+        self._visited_nodes = visited_nodes
+        try:
+            self.tick_once()
+        finally:
+            self._visited_nodes = None
+        yield from visited_nodes
         yield self
 
 
@@ -194,7 +211,10 @@ class ControlNode(KeyOwner, TreeNode):
 
     def tick_child(self, child: Child) -> Status:
         """Tick a child and return its status."""
-        child.tick_once()
+        if self._visited_nodes is None:
+            child.tick_once()
+        else:
+            self._visited_nodes.extend(child.tick())
         status = child.status
         if status is Status.INVALID:
             raise Fault(f"{child.name} was ticked but has no status", self.path)
