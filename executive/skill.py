@@ -8,6 +8,7 @@ documentation and the tree use the declarations in the class body.
 
 from __future__ import annotations
 
+import keyword
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -88,7 +89,7 @@ class Port:
     """A typed input or output of a skill.
 
     Attributes:
-        name: Name of the attribute of the skill, and by default also of the variable.
+        name: Name in the mission file, and by default also of the variable.
         type: Python type of the value.
         direction: IN or OUT.
         default: Value of an input whose variable is unwritten; `...` if the variable must be written.
@@ -139,6 +140,8 @@ class SkillFailed(Exception):
 class Skill:
     """Base class of skills; subclasses declare params and ports, and implement `run`.
 
+    A param or port whose name is a word of Python has an attribute with a final underscore: `not_` for `not`.
+
     Attributes:
         params: Declared params by name.
         ports: Declared ports by name.
@@ -174,12 +177,12 @@ class Skill:
                 # `get_type_hints` of Python 3.10 does not accept a ClassVar without a type.
                 del cls.__annotations__[name]
         hints = get_type_hints(cls, include_extras=True)
-        for name in cls.__annotations__:
-            hint = hints[name]
+        for attribute in cls.__annotations__:
+            hint, name = hints[attribute], _get_mission_name(attribute)
             if get_origin(hint) is ClassVar:
                 continue
             value_type, *metadata = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-            declaration = cls.__dict__.get(name)
+            declaration = cls.__dict__.get(attribute)
             direction = next((value for value in metadata if isinstance(value, Direction)), None)
             if direction is not None:
                 entry = declaration if isinstance(declaration, Param) else port()
@@ -188,11 +191,10 @@ class Skill:
                 unit = next((value for value in metadata if isinstance(value, str)), "")
                 params[name] = replace(declaration, name=name, type=value_type, unit=unit)
             else:
-                raise TypeError(
-                    f"{cls.__qualname__}.{name}: attributes of a skill are In[...], Out[...] or param(...)"
-                )
+                place = f"{cls.__qualname__}.{attribute}"
+                raise TypeError(f"{place}: attributes of a skill are In[...], Out[...] or param(...)")
             if isinstance(declaration, Param):
-                delattr(cls, name)
+                delattr(cls, attribute)
         cls.params, cls.ports = params, ports
 
     def __init__(self, **values: Any) -> None:
@@ -208,7 +210,7 @@ class Skill:
             value = values.get(name, setting.default)
             if value is ...:
                 raise InputError(f'{type(self).__name__} needs a value for "{name}"')
-            setattr(self, name, value)
+            setattr(self, get_attribute_name(name), value)
 
     def run(self, cell: Cell) -> Iterator[None] | None:
         """Execute the skill: `yield` ends a control step, `return` is success, `SkillFailed` is failure."""
@@ -237,6 +239,17 @@ class Skill:
                 f"it declares: {', '.join(self.reasons) or 'none'}"
             )
         return SkillFailed(reason, message)
+
+
+def get_attribute_name(name: str) -> str:
+    """Return the attribute of a skill for a param or port: `name`, or `name_` if it is a word of Python."""
+    return f"{name}_" if keyword.iskeyword(name) else name
+
+
+def _get_mission_name(attribute: str) -> str:
+    """Return the name of a param or port in missions, of which `get_attribute_name` returns `attribute`."""
+    name = attribute.removesuffix("_")
+    return name if get_attribute_name(name) == attribute else attribute
 
 
 def _require_annotations(skill: type[Skill]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 from executive.cell.objects import Item, Target
@@ -17,16 +18,25 @@ class SelectTarget(Skill):
 
     The skill selects only open items with a valid position and a class with a route. Enough looks must agree
     on the class of an item, given the error rates of the detector. `nearest` refers to the tool or, while the
-    arm moves, to the destination of the arm; `surest` refers to the confidence of the last detection.
+    arm moves, to the destination of the arm; `surest` refers to the confidence of the last detection;
+    `least_tried` selects the item with the fewest failed attempts, and of several the nearest. A deferred
+    item comes after all others (see `Defer`). With `among`, the skill fails with `no_candidate` as soon as
+    none of these items is open.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
     same: In[Item | None] = port(default=None, refers_to="item", doc="only this item")
     wanted: In[str | None] = port(default=None, refers_to="class", doc="only this class")
+    among: In[list[Item] | None] = port(default=None, refers_to="item", doc="only these items")
+    not_: In[list[Item] | None] = port(default=None, refers_to="item", doc="none of these items")
     target: Out[Target] = port(doc="the chosen target")
     item: Out[Item] = port(refers_to="item", doc="the item of the target")
     bin: Out[str] = port(refers_to="bin", doc="the bin with the fewest used slots, of the bins of the class")
-    prefer: str = param("nearest", choices=("nearest", "surest"), doc="the `nearest` or the `surest` target")
+    prefer: str = param(
+        "nearest",
+        choices=("nearest", "surest", "least_tried"),
+        doc="the `nearest`, the `surest` or the `least_tried` target",
+    )
     reasons: ClassVar = ("no_candidate", "unseen", "doubtful")
 
     def run(self, cell: Cell) -> None:
@@ -35,25 +45,47 @@ class SelectTarget(Skill):
         candidates = [target for target in pickable_targets if self._is_requested(cell, target.item)]
         if not candidates:
             raise self._explain_missing_candidate(cell)
-        best = candidates[0]
-        if self.prefer == "surest":
-            best = min(candidates, key=lambda target: (-target.confidence, target.item))
+        # The candidates are sorted by distance, and `min` returns the first of equal ones.
+        best = min(candidates, key=lambda target: self._rank(cell, target))
+        if (turn := cell.ledger.describe(best.item).turn) and (names := self._list_uncertain(cell, turn)):
+            message = f"{best.item} is deferred, and not enough looks agree on {names} yet; look again"
+            raise self.failure("doubtful", message)
         self.target, self.item = best, best.item
         bins = cell.routes[cell.ledger.get_label(best.item)]
         self.bin = min(bins, key=lambda bin: predict_object_count(cell, bin))
         cell.report_selection(best, self.bin)
 
+    def _rank(self, cell: Cell, target: Target) -> tuple[float | str, ...]:
+        """Return the sort key of a candidate; the smallest key comes first."""
+        known = cell.ledger.describe(target.item)
+        if self.prefer == "surest":
+            return known.turn, -target.confidence, target.item
+        return known.turn, known.attempts if self.prefer == "least_tried" else 0
+
     def _is_requested(self, cell: Cell, item: Item) -> bool:
         label = cell.ledger.get_label(item)
+        if item in (self.not_ or ()) or (self.among is not None and item not in self.among):
+            return False
         return label in cell.routes and self.same in (None, item) and self.wanted in (None, label)
+
+    def _list_uncertain(self, cell: Cell, turn: float = math.inf) -> str:
+        """Return the requested items before `turn` on which not enough looks agree, separated by commas."""
+        items = (item for item in cell.ledger.find_uncertain_items() if self._is_requested(cell, item))
+        return ", ".join(item for item in items if cell.ledger.describe(item).turn < turn)
+
+    def _is_nothing_left(self, cell: Cell) -> bool:
+        """Return True if no requested item is left, or if none of the items in `among` is open."""
+        if self.among is None:
+            return self.same is None and cell.ledger.is_table_empty(self.wanted, self.not_ or ())
+        known_items = [item for item in cell.ledger.list_known_items() if self._is_requested(cell, item.item)]
+        return not any(item.state in ("open", "deferred", "lost") for item in known_items)
 
     def _explain_missing_candidate(self, cell: Cell) -> SkillFailed:
         """Return the failure with the reason why there is no candidate."""
-        items = cell.ledger.find_uncertain_items()
-        if uncertain_items := ", ".join(item for item in items if self._is_requested(cell, item)):
-            return self.failure("doubtful", f"not enough looks agree on {uncertain_items} yet; look again")
+        if names := self._list_uncertain(cell):
+            return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
         name = self.same or self.wanted or "object to sort"
-        if self.same is None and cell.ledger.is_table_empty(self.wanted):
+        if self._is_nothing_left(cell):
             message = f"no {name} is left on the table, except rejected objects"
             unknown_labels = describe_unknown_labels(cell.ledger.unknown_labels)
             return self.failure("no_candidate", "; ".join(filter(None, (message, unknown_labels))))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
-from executive.skill import Skill, param, port
+from executive.cell.protocols import Cell
+from executive.skill import In, Out, Skill, param, port
+from executive.tree.skill_run import SkillRun
 
 
 @pytest.mark.parametrize(
@@ -34,3 +36,22 @@ def test_a_default_that_is_changed_needs_its_annotation_again() -> None:
 def test_the_former_name_of_an_attribute_is_an_error() -> None:
     with pytest.raises(TypeError, match=r"Old\.tool_left: the attribute is now tool_state_after_failure"):
         type("Old", (Skill,), {"__annotations__": {}, "tool_left": {}})
+
+
+class Choose(Skill):
+    """A skill whose inputs, outputs and params have names that are words of Python."""
+
+    not_: In[str] = port(doc="the excluded name")
+    class_: str = param("", doc="a class")
+    in_: Out[str] = port(doc="the place")
+
+    def run(self, cell: Cell) -> None:
+        """Join the names."""
+        self.in_ = self.not_ + self.class_
+
+
+def test_a_port_may_be_named_like_a_word_of_python() -> None:
+    assert (list(Choose.ports), list(Choose.params)) == (["not", "in"], ["class"])
+    run = SkillRun(Choose(**{"not": "here", "class": "!"}), cast("Cell", None))
+    assert run.step()
+    assert run.read_outputs() == {"in": "here!"}

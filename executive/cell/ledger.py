@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Protocol
 
 from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame
-from executive.cell.objects import Item, Target
+from executive.cell.objects import Item, KnownItem, Target
 from executive.geometry import Array
 
 
@@ -57,14 +57,21 @@ class Ledger(Protocol):
     def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough to pick it."""
 
-    def is_table_empty(self, label: str | None = None) -> bool:
+    def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
         """Return True if almost certainly no object with a route is visible on the table.
 
-        `label` restricts the check to objects of one class; None: all classes with a route.
+        `label` restricts the check to objects of one class; None: all classes with a route. The objects in
+        `ignored_items` may be on the table.
         """
 
     def get_label(self, item: Item) -> str:
         """Return the most probable class of an item."""
+
+    def describe(self, item: Item) -> KnownItem:
+        """Return the present knowledge about an item."""
+
+    def list_known_items(self) -> Sequence[KnownItem]:
+        """Return all items that exist with a probability of at least 0.5, in the order of detection."""
 
     def count_attempts(self, item: Item) -> int:
         """Return the number of failed attempts to pick an item."""
@@ -104,6 +111,9 @@ class Ledger(Protocol):
 
     def reject(self, item: Item, reason: str) -> None:
         """Reject an item: skills no longer select the item, and the result of the run lists the item."""
+
+    def defer(self, item: Item) -> None:
+        """Move an item behind all others: skills select it after every other candidate; it stays open."""
 
     def invalidate_positions(self) -> None:
         """Record that the robot may have moved any object on the table."""

@@ -34,6 +34,32 @@ class Target:
     stamp: float
 
 
+@dataclass(frozen=True, eq=False)
+class KnownItem:
+    """Present knowledge of the ledger about an item.
+
+    Attributes:
+        item: Id of the item.
+        label: Name of the most probable class.
+        state: `open`: still to be sorted; `deferred`: open, behind the other items; `held`; `placed`;
+            `rejected`; `skipped`: without a route; `lost`: dropped by the tool and not found since.
+        bin: Name of the bin that contains the item, or "".
+        position: Last known position of the centre `(3,)` [m] in the world.
+        attempts: Number of failed attempts to pick the item.
+        deferrals: Number of times that the item was deferred.
+        turn: Rank among the deferred items, the first deferred one first; 0 if the item is not deferred.
+    """
+
+    item: Item
+    label: str
+    state: str
+    bin: str
+    position: Array
+    attempts: int
+    deferrals: int
+    turn: int
+
+
 @dataclass(frozen=True)
 class ObjectClass:
     """Known properties of a class of objects.

@@ -12,7 +12,7 @@ import numpy as np
 from executive.cell.detection import Observation
 from executive.cell.frame import Frame
 from executive.cell.json_values import round_values
-from executive.cell.objects import Target
+from executive.cell.objects import KnownItem, Target
 from executive.events import ItemChanged
 from executive.geometry import Array
 from executive.ledger.belief import Belief
@@ -85,6 +85,8 @@ class ItemRecord:
         last_contradiction: Sentence with the last evidence of size or height against the class, or "".
         bin_log_odds: Log odds, by bin, that the dropped item lies in the bin.
         is_untracked: True if the tool may have moved the item while the journal was incomplete.
+        deferral_count: Number of times that the item was deferred.
+        turn: Rank among the deferred items; 0 if the item is not deferred.
     """
 
     item: str
@@ -113,6 +115,8 @@ class ItemRecord:
     last_contradiction: str = ""
     bin_log_odds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     is_untracked: bool = False
+    deferral_count: int = 0
+    turn: int = 0
 
     def __post_init__(self) -> None:
         self.position = self.first_position
@@ -136,6 +140,18 @@ class ItemRecord:
         return ItemChanged(
             self.item, self.label, self.state.value, round_values(self.position, 4),
             self.belief.look_count, self.attempt_count, self.bin, self.reason,
+        )  # fmt: skip
+
+    def describe(self, *, has_route: bool) -> KnownItem:
+        """Return the item for skills; `has_route` is True if the mission has a bin for the class."""
+        state = self.state.value
+        if self.state is State.DROPPED:
+            state = State.REJECTED.value if self.reason else State.LOST.value
+        elif self.state is State.SEEN:
+            state = "deferred" if self.turn else "open" if has_route else State.SKIPPED.value
+        return KnownItem(
+            self.item, self.label, state, self.bin, self.position, self.attempt_count, self.deferral_count,
+            self.turn,
         )  # fmt: skip
 
     def distance_to(self, position: Array) -> float:

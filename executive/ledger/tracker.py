@@ -12,7 +12,7 @@ from executive.cell.bins import Bin
 from executive.cell.config import LedgerConfig, TableConfig
 from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame, FrameCaptured
-from executive.cell.objects import Item, Target
+from executive.cell.objects import Item, KnownItem, Target
 from executive.cell.protocols import Routes
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
@@ -58,7 +58,7 @@ class Tracker:
         self._coverage, self._staleness = Coverage(table), Staleness()
         self._bin_recovery: BinRecovery | None = None
         """Recovery of the contents of the bins from `lose_track` to `record_bin_contents`; otherwise None."""
-        self._last_frame_id = 0
+        self._last_frame_id = self._last_turn = 0
         self.unknown_labels: Counter[str] = Counter()
         self.assumption_reasons: list[str] = []
 
@@ -127,14 +127,16 @@ class Tracker:
         """Return True if the existence, class and position of an item are certain enough to sort the item."""
         return self._certainty.is_certain(self._records.find(item))
 
-    def is_table_empty(self, label: str | None = None) -> bool:
+    def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
         """Return True if almost certainly no object with a route is visible on the table.
 
-        `label` restricts the check to objects of one class; None: all classes with a route.
+        `label` restricts the check to objects of one class; None: all classes with a route. The objects in
+        `ignored_items` may be on the table.
         """
         if self._coverage.max_object_probability > self._config.max_miss_probability:
             return False
-        possible_items = [record for record in self.records if self._certainty.may_be_on_table(record)]
+        records = (record for record in self.records if record.item not in ignored_items)
+        possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
         visible_items = [record for record in possible_items if self._coverage.is_visible(record.position)]
         labels = [routed_label for routed_label in self._routes if label in (None, routed_label)]
         # An item without a confident detection counts as an object of every class.
@@ -143,6 +145,15 @@ class Tracker:
     def get_label(self, item: Item) -> str:
         """Return the most probable class of an item."""
         return self._records.find(item).label
+
+    def describe(self, item: Item) -> KnownItem:
+        """Return the present knowledge about an item."""
+        return self._describe(self._records.find(item))
+
+    def list_known_items(self) -> Sequence[KnownItem]:
+        """Return all items that exist with a probability of at least 0.5, in the order of detection."""
+        records = (record for record in self._records if record.state is not State.PHANTOM)
+        return [self._describe(record) for record in records if record.belief.is_probable]
 
     def count_attempts(self, item: Item) -> int:
         """Return the number of failed attempts to pick an item."""
@@ -230,6 +241,13 @@ class Tracker:
         """
         self._records.reject(self._records.find(item), reason)
 
+    def defer(self, item: Item) -> None:
+        """Move an item behind all others; it stays open."""
+        record = self._records.find(item)
+        self._last_turn += 1
+        record.turn = self._last_turn
+        record.deferral_count += 1
+
     def invalidate_positions(self) -> None:
         """Record that any object on the table may have been moved."""
         self._invalidate_near(np.zeros(3), math.inf)
@@ -293,6 +311,9 @@ class Tracker:
             self._bin_recovery.add_look(detections, bin_names)
         elif detections.view == "full":
             self._records.emit(*self._bins.place_dropped_items(detections, bin_names))
+
+    def _describe(self, record: ItemRecord) -> KnownItem:
+        return record.describe(has_route=record.label in self._routes)
 
     def _mark_as_dropped(self, records: Collection[ItemRecord]) -> None:
         """Set items to DROPPED, so that later looks search for them on the table and in the bins."""

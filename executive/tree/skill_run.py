@@ -6,7 +6,7 @@ from collections.abc import Generator, Iterator
 from typing import TYPE_CHECKING
 
 from executive.errors import Fault
-from executive.skill import Direction, Skill, SkillFailed
+from executive.skill import Direction, Skill, SkillFailed, get_attribute_name
 
 if TYPE_CHECKING:
     from executive.cell.protocols import Cell
@@ -49,13 +49,13 @@ class SkillRun:
         if yielded is not self:
             name = type(yielded).__name__
             raise Fault(f'it yielded a {name}; to run the steps of another generator, write "yield from"')
-        if unset_outputs := [name for name in self._output_names if not hasattr(self._skill, name)]:
+        if unset_outputs := [name for name in self._outputs.values() if not hasattr(self._skill, name)]:
             raise Fault(f"it succeeded without setting its output {', '.join(unset_outputs)}")
         return True
 
     def read_outputs(self) -> dict[str, object]:
         """Return the values of all outputs by name; only allowed after success."""
-        return {name: getattr(self._skill, name) for name in self._output_names}
+        return {name: getattr(self._skill, attribute) for name, attribute in self._outputs.items()}
 
     def halt(self) -> None:
         """Close the generator, so that its `finally` runs.
@@ -74,8 +74,10 @@ class SkillRun:
             raise _make_fault(message, error) from error
 
     @property
-    def _output_names(self) -> list[str]:
-        return [name for name, port in self._skill.ports.items() if port.direction is Direction.OUT]
+    def _outputs(self) -> dict[str, str]:
+        """Attributes of the outputs, by the name of the output."""
+        ports = self._skill.ports.values()
+        return {port.name: get_attribute_name(port.name) for port in ports if port.direction is Direction.OUT}
 
 
 def _make_fault(message: str, error: Exception) -> Fault:

@@ -19,6 +19,7 @@ from click.testing import CliRunner, Result
 
 from executive.cli.main import main
 from executive.mission.text.file_search import list_shipped_missions
+from executive.plugins import load_skills
 
 MISSION = """\
 mission: small
@@ -67,11 +68,11 @@ CASES = {
         mission=("{attempts: 4}", "{attempts: 4"),
     ),
     "an unknown skill": Case(
-        """
+        f"""
         m.yaml:10:5: error[unknown-skill]: there is no skill "Localise"
           10 |   - Localise
              |     ^^^^^^^^
-          Did you mean "Localize"? Installed skills: Approach, AwaitRequest, Detect, Grasp, IsHolding, Localize, MoveToScan, PutDown, RejectTarget, Release, SelectTarget, Transit, Wait.
+          Did you mean "Localize"? Installed skills: {", ".join(load_skills())}.
         """,
         mission=("- Localize", "- Localise"),
     ),

@@ -17,6 +17,7 @@ from executive.cli import doctor
 from executive.cli.doctor import CheckResult
 from executive.cli.main import main
 from executive.errors import InputError
+from executive.plugins import load_skills
 from executive.run import versions
 
 INSTALLED = {
@@ -108,7 +109,8 @@ def test_an_environment_made_with_pip_is_corrected_with_pip(monkeypatch):
 def test_everything_registered_is_counted_and_loaded(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
-    assert shown(doctor.check_plugins()) == ["ok plugins: 13 skills, 2 kinds of cells, 4 kinds of detectors"]
+    counts = f"{len(load_skills())} skills, 2 kinds of cells, 4 kinds of detectors"
+    assert shown(doctor.check_plugins()) == [f"ok plugins: {counts}"]
     Path("pyproject.toml").write_text("[project]\n")
     assert shown(doctor.check_plugins())[0].endswith(
         f"detectors, including those of {tmp_path}/pyproject.toml"

@@ -99,7 +99,7 @@ def test_what_a_mission_says_cannot_break_the_picture(every_node):
 def test_ports_and_reasons_are_printed_on_demand(every_node):
     plain, full = shown(every_node).stdout, shown(every_node, "--ports", "--reasons").stdout
     assert "reads" not in plain and "may fail" not in plain
-    assert "reads $targets, $same?, wanted <- $kind?; writes $target, $item, $bin" in full
+    assert "reads $targets, $same?, wanted <- $kind?, $among?, $not?; writes $target, $item" in full
     assert "may fail: no_candidate, unseen" in full
     assert max(map(len, full.splitlines())) <= 100
     given = shown("sort_overhead", "--reasons", "--set", "attempts=9").stdout

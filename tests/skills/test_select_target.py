@@ -1,10 +1,14 @@
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
 from executive.cell.arm import Goal
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import SkillResult, run_skill
+from skills.defer import Defer
+from skills.list_items import ListItems
 from skills.select_target import SelectTarget
 
 
@@ -89,3 +93,104 @@ def test_a_table_with_only_rejected_items_ends_the_work(fake: FakeCell, look) ->
     look()
     fake.ledger.reject("cube-1", "slippery")
     assert select(fake, look("full")).reason == "no_candidate"
+
+
+def test_a_deferred_item_comes_after_the_others_in_the_order_of_deferral(fake: FakeCell, look) -> None:
+    put(fake, cube=(0.45, 0.0), duck=(0.5, 0.15), sphere=(0.6, -0.2))
+    targets = look()
+    for item in ("cube-1", "duck-1"):
+        assert run_skill(Defer(item=item), fake).commands == [f"ledger.defer {item}"]
+    chosen = []
+    while targets:
+        chosen.append(select(fake, targets).outputs["item"])
+        targets = [target for target in targets if target.item != chosen[-1]]
+    assert chosen == ["sphere-1", "cube-1", "duck-1"]
+
+
+def test_a_deferred_item_waits_until_looks_agree_on_the_others(
+    fake: FakeCell, look, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put(fake, cube=(0.45, 0.0), sphere=(0.6, -0.2))
+    targets = look()
+    fake.ledger.defer("cube-1")
+    monkeypatch.setattr(fake.ledger, "find_uncertain_items", lambda: ["sphere-1"])
+    result = select(fake, [target for target in targets if target.item == "cube-1"])
+    assert (result.reason, result.message) == (
+        "doubtful", "cube-1 is deferred, and not enough looks agree on sphere-1 yet; look again",
+    )  # fmt: skip
+
+
+def test_an_item_is_deferred_a_limited_number_of_times(fake: FakeCell, look) -> None:
+    put(fake, cube=(0.45, 0.0))
+    look()
+    results = [run_skill(Defer(item="cube-1", times=2), fake) for _ in range(3)]
+    assert [result.reason for result in results] == ["", "", "exhausted"]
+    assert results[-1].message == "cube-1 was deferred 2 times already"
+
+
+def test_the_least_tried_item_comes_first_and_of_equals_the_nearest(fake: FakeCell, look) -> None:
+    put(fake, cube=(0.45, 0.0), duck=(0.5, 0.15), sphere=(0.6, -0.2))
+    look()
+    fake.ledger.record_miss("duck-1")
+    targets = look()
+    assert select(fake, targets).outputs["item"] == "duck-1"
+    assert select(fake, targets, prefer="least_tried").outputs["item"] == "cube-1"
+
+
+def test_only_the_items_of_one_list_and_none_of_another_are_selected(fake: FakeCell, look) -> None:
+    put(fake, cube=(0.45, 0.0), duck=(0.5, 0.15), sphere=(0.6, -0.2))
+    targets = look()
+    assert select(fake, targets, among=["sphere-1", "duck-1"]).outputs["item"] == "duck-1"
+    assert select(fake, targets, **{"not": ["cube-1"]}).outputs["item"] == "duck-1"
+    both = {"among": ["cube-1", "duck-1"], "not": ["duck-1"]}
+    assert select(fake, targets, **both).outputs["item"] == "cube-1"
+
+
+def test_nothing_is_left_once_no_item_of_the_list_is_open(fake: FakeCell, look) -> None:
+    put(fake, cube=(0.45, 0.0), duck=(0.5, 0.15))
+    targets = look()
+    fake.ledger.reject("cube-1", "slippery")
+    assert select(fake, targets, among=["cube-1"]).reason == "no_candidate"
+    assert select(fake, [], among=["duck-1"]).reason == "unseen"
+
+
+def test_the_table_may_hold_excluded_items_when_nothing_is_left(fake: FakeCell, look) -> None:
+    put(fake, cube=(0.45, 0.0))
+    reasons = [select(fake, look("full"), **{"not": ["cube-1"]}).reason for _ in range(2)]
+    assert reasons == ["unseen", "no_candidate"]
+
+
+@pytest.mark.parametrize(
+    ("values", "items"),
+    [
+        ({}, ["cube-1", "duck-1", "sphere-1"]),
+        ({"class": "duck"}, ["duck-1"]),
+        ({"state": "deferred"}, ["duck-1"]),
+        ({"state": "rejected"}, ["cube-2"]),
+        ({"state": "placed"}, ["sphere-2"]),
+        ({"state": "placed", "bin": "red_bin"}, []),
+        ({"state": "lost"}, ["duck-2"]),
+        ({"state": "skipped"}, []),
+    ],
+)
+def test_items_are_listed_by_state_class_and_bin(
+    fake: FakeCell, look, values: dict[str, str], items: list[str]
+) -> None:
+    for x, label in itertools.product((0.4, 0.6), ("cube", "duck", "sphere")):
+        fake.world.put(label, x, {"cube": -0.2, "duck": 0.0, "sphere": 0.2}[label])
+    look()
+    fake.ledger.defer("duck-1")
+    fake.ledger.reject("cube-2", "slippery")
+    for item in ("sphere-2", "duck-2"):
+        fake.ledger.record_grasp(item)
+        if item == "sphere-2":
+            fake.ledger.record_placement(item, "blue_bin")
+    fake.ledger.record_drop("duck-2")
+    assert sorted(run_skill(ListItems(**values), fake).outputs["items"]) == items
+
+
+def test_an_item_of_a_class_without_a_route_is_skipped(fake: FakeCell, look) -> None:
+    put(fake, cube=(0.45, 0.0))
+    del fake.routes["cube"]
+    look()
+    assert run_skill(ListItems(state="skipped"), fake).outputs["items"] == ["cube-1"]

@@ -1,0 +1,28 @@
+"""Skill that puts an item back behind all others."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from executive.cell.objects import Item
+from executive.cell.protocols import Cell
+from executive.skill import In, Skill, param, port
+
+
+class Defer(Skill):
+    """Put an item back: `SelectTarget` selects the item only after every other candidate.
+
+    The item stays open, so no item is lost. Deferred items are selected in the order of their deferral. The
+    skill fails with `exhausted` if the item was deferred `times` times already.
+    """
+
+    item: In[Item] = port(refers_to="item", doc="the item to put back")
+    times: int = param(1, ge=1, doc="maximum number of times that the mission defers one item")
+    reasons: ClassVar = ("exhausted",)
+
+    def run(self, cell: Cell) -> None:
+        """Defer the item in the ledger."""
+        count = cell.ledger.describe(self.item).deferrals
+        if count >= self.times:
+            raise self.failure("exhausted", f"{self.item} was deferred {count} times already")
+        cell.ledger.defer(self.item)
