@@ -8,7 +8,7 @@ from typing import ClassVar
 from executive.cell.objects import Item, Target
 from executive.cell.protocols import Cell
 from executive.manipulation.obstacles import predict_object_count
-from executive.manipulation.tool_goals import sort_pickable_targets
+from executive.manipulation.tool_goals import list_free_bins, sort_pickable_targets
 from executive.perception.evidence import describe_unknown_labels
 from executive.skill import In, Out, Skill, SkillFailed, param, port
 
@@ -16,12 +16,12 @@ from executive.skill import In, Out, Skill, SkillFailed, param, port
 class SelectTarget(Skill):
     """Select the next target to pick, and its bin.
 
-    The skill selects only open items with a valid position and a class with a route. Enough looks must agree
-    on the class of an item, given the error rates of the detector. `nearest` refers to the tool or, while the
-    arm moves, to the destination of the arm; `surest` refers to the confidence of the last detection;
-    `least_tried` selects the item with the fewest failed attempts, and of several the nearest. A deferred
-    item comes after all others (see `Defer`). With `among`, the skill fails with `no_candidate` as soon as
-    none of these items is open.
+    The skill selects only open items with a valid position and a class with a bin below its quota. Bins with
+    a quota come before bins without one. Enough looks must agree on the class of an item, given the error
+    rates of the detector. `nearest` refers to the tool or, while the arm moves, to the destination of the
+    arm; `surest` refers to the confidence of the last detection; `least_tried` selects the item with the
+    fewest failed attempts, and of several the nearest. A deferred item comes after all others (see `Defer`).
+    With `among`, the skill fails with `no_candidate` as soon as none of these items is open.
     """
 
     targets: In[list[Target]] = port(doc="the known targets")
@@ -51,8 +51,11 @@ class SelectTarget(Skill):
             message = f"{best.item} is deferred, and not enough looks agree on {names} yet; look again"
             raise self.failure("doubtful", message)
         self.target, self.item = best, best.item
-        bins = cell.routes[cell.ledger.get_label(best.item)]
-        self.bin = min(bins, key=lambda bin: predict_object_count(cell, bin))
+        label = cell.ledger.get_label(best.item)
+        self.bin = min(
+            list_free_bins(cell, label),
+            key=lambda bin: (not cell.quotas.is_limited(bin, label), predict_object_count(cell, bin)),
+        )
         cell.report_selection(best, self.bin)
 
     def _rank(self, cell: Cell, target: Target) -> tuple[float | str, ...]:
@@ -66,7 +69,8 @@ class SelectTarget(Skill):
         label = cell.ledger.get_label(item)
         if item in (self.not_ or ()) or (self.among is not None and item not in self.among):
             return False
-        return label in cell.routes and self.same in (None, item) and self.wanted in (None, label)
+        has_bin = bool(list_free_bins(cell, label))
+        return has_bin and self.same in (None, item) and self.wanted in (None, label)
 
     def _list_uncertain(self, cell: Cell, turn: float = math.inf) -> str:
         """Return the requested items before `turn` on which not enough looks agree, separated by commas."""
@@ -86,7 +90,11 @@ class SelectTarget(Skill):
             return self.failure("doubtful", f"not enough looks agree on {names} yet; look again")
         name = self.same or self.wanted or "object to sort"
         if self._is_nothing_left(cell):
-            message = f"no {name} is left on the table, except rejected objects"
+            labels = (label for label in cell.routes if self.wanted in (None, label))
+            exemptions = sorted({cell.ledger.explain_exemption(label) for label in labels} - {""})
+            surplus = " and surplus objects" if exemptions else ""
+            message = f"no {name} is left on the table, except rejected objects{surplus}"
             unknown_labels = describe_unknown_labels(cell.ledger.unknown_labels)
-            return self.failure("no_candidate", "; ".join(filter(None, (message, unknown_labels))))
+            details = (message, *exemptions, unknown_labels)
+            return self.failure("no_candidate", "; ".join(filter(None, details)))
         return self.failure("unseen", f"no {name} is in sight, but it is not certain that the table is empty")

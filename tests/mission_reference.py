@@ -49,6 +49,7 @@ KINDS = {
     "node": "node", "number": "number", "text": "text", "name": "name", "names": "name, or list of names",
     "list": "list", "value": "any value", "values": "names with values", "variables": "names with `$name`",
     "paths": "file, or list of files", "params": "names with params", "routes": "classes with bins",
+    "quotas": "bins with numbers, or with numbers by class",
     "trees": "names with subtrees", "args": "list of names, or names with values", "label": "name",
     KeyKind.NODE: "node", KeyKind.NODES: "list of nodes", KeyKind.REASONS: "reason, or list of reasons",
     KeyKind.VARIABLE: "name of a variable", KeyKind.ELEMENTS: "list, or `$name`",

@@ -58,10 +58,11 @@ class Ledger(Protocol):
         """Return True if the existence, class and position of an item are certain enough to pick it."""
 
     def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
-        """Return True if almost certainly no object with a route is visible on the table.
+        """Return True if almost certainly no object that the mission still sorts is visible on the table.
 
-        `label` restricts the check to objects of one class; None: all classes with a route. The objects in
-        `ignored_items` may be on the table.
+        An object is sorted if its class has a route to a bin below its quota. `label` restricts the check to
+        objects of one class; None: all classes with a route. The objects in `ignored_items` may be on the
+        table.
         """
 
     def get_label(self, item: Item) -> str:
@@ -76,8 +77,17 @@ class Ledger(Protocol):
     def count_attempts(self, item: Item) -> int:
         """Return the number of failed attempts to pick an item."""
 
-    def count_objects_in(self, bin: str) -> int:
-        """Return the number of objects in a bin, which is also the index of the next free slot."""
+    def count_objects_in(self, bin: str, label: str | None = None) -> int:
+        """Return the number of objects in a bin, which is also the index of the next free slot.
+
+        `label` restricts the count to one class.
+        """
+
+    def explain_exemption(self, label: str) -> str:
+        """Return the reason why the mission does not sort further objects of a class, or "".
+
+        The class has no route, or the quotas of all its bins are reached.
+        """
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
         """Record a touch of an item, and return False if the touch contradicts the class of the item.

@@ -7,7 +7,7 @@ hardware. No call blocks: a skill sends a request, yields, and reads the result 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from executive.cell.arm import Arm
@@ -16,6 +16,7 @@ from executive.cell.detection import Answer, Detection, Detections, Observation
 from executive.cell.frame import Box, Frame
 from executive.cell.ledger import Ledger
 from executive.cell.objects import ObjectClass, Target
+from executive.cell.quotas import Quotas
 from executive.geometry import Array
 
 Steps = Iterator[None]
@@ -183,6 +184,7 @@ class Cell:
         descent: Height above the expected surface at which the guarded descent of an approach starts [m].
         descent_speed: Tool speed of the guarded descent [m/s].
         report_selection: Function that reports a selected target and the name of its bin to the run.
+        quotas: Maximum numbers of objects in the bins, from the mission.
     """
 
     clock: Clock
@@ -200,3 +202,4 @@ class Cell:
     descent: float
     descent_speed: float
     report_selection: Callable[[Target, str], None]
+    quotas: Quotas = field(default_factory=Quotas)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
 from executive.cell.protocols import Cell, MinTimes, Operator, Routes
+from executive.cell.quotas import Quotas
 from executive.cell.visuals import Visuals
 from executive.events import Emit, ItemChanged
 
@@ -109,6 +110,7 @@ class CellOptions:
         gui: True to show the simulated world in a window.
         resume: State of the cell at the interruption of a resumed run; None for a new run.
         scene: Scene file with differences of the simulated world from the cell file; None: no differences.
+        quotas: Maximum numbers of objects in the bins, from the mission.
     """
 
     operator: Operator
@@ -116,6 +118,7 @@ class CellOptions:
     gui: bool = False
     resume: ResumePoint | None = None
     scene: Path | None = None
+    quotas: Quotas = field(default_factory=Quotas)
 
 
 KeyPath = tuple[str | int, ...]

@@ -49,7 +49,9 @@ class CellWithoutHardware:
         self.config, self.routes = config, dict(routes)
         self.steps = self.last_command_step = 0
         bins, distinct_classes = build_bins(config), find_classes_distinct_by_touch(config)
-        self.accounts = Tracker(config.ledger, config.table, bins, self.routes, emit, distinct_classes)
+        self.accounts = Tracker(
+            config.ledger, config.table, bins, self.routes, emit, distinct_classes, options.quotas
+        )
         no_device: Any = None
 
         def emit_selection(target: Target, bin: str) -> None:
@@ -71,6 +73,7 @@ class CellWithoutHardware:
             descent=config.motion.descent,
             descent_speed=config.motion.descent_speed,
             report_selection=emit_selection,
+            quotas=options.quotas,
         )
 
     def log_to(self, path: Path) -> None:

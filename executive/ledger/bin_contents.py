@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from executive.cell.config import LedgerConfig
 from executive.cell.detection import Detections, Observation
 from executive.cell.error_rates import ErrorRates
 from executive.cell.protocols import Routes
+from executive.cell.quotas import Quotas
 from executive.geometry import Array
 from executive.ledger.association import MAX_STANDARD_DEVIATIONS
 from executive.ledger.item import ItemRecord, State
@@ -41,16 +42,32 @@ class BinContents:
         bins: Bins by name.
         routes: Names of the permitted bins by class.
         records: All items.
+        quotas: Maximum numbers of objects in the bins.
     """
 
     config: LedgerConfig
     bins: Mapping[str, Bin]
     routes: Routes
     records: ItemRecords
+    quotas: Quotas = field(default_factory=Quotas)
 
-    def count_objects_in(self, bin_name: str) -> int:
-        """Return the number of items that were released in a bin or have probably fallen into the bin."""
-        return sum(bin_name in (record.bin, find_probable_bin(record)) for record in self.records)
+    def count_objects_in(self, bin_name: str, label: str | None = None) -> int:
+        """Return the number of items that were released in a bin or have probably fallen into the bin.
+
+        `label` restricts the count to one class.
+        """
+        items = (record for record in self.records if label in (None, record.label))
+        return sum(bin_name in (record.bin, find_probable_bin(record)) for record in items)
+
+    def explain_exemption(self, label: str) -> str:
+        """Return the reason why the mission does not sort objects of a class, or ""."""
+        bin_names = self.routes.get(label, ())
+        if not all(self.quotas.is_reached(name, label, self.count_objects_in) for name in bin_names):
+            return ""
+        if not bin_names:
+            return "the mission has no route for it"
+        subject, verb = ("quota", "is") if len(bin_names) == 1 else ("quotas", "are")
+        return f"the {subject} of {', '.join(bin_names)} {verb} reached"
 
     def find_bin_name(self, observation: Observation, bias_std: float) -> str | None:
         """Return the name of the bin in which an observed object lies, or None.

@@ -17,7 +17,7 @@ FINAL_STATES = (State.PLACED, State.REJECTED, State.SKIPPED, State.LOST)
 
 
 def find_final_state(
-    record: ItemRecord, certainty: Certainty, *, has_route: bool, is_completed: bool, has_touched_item: bool
+    record: ItemRecord, certainty: Certainty, *, exemption: str, is_completed: bool, has_touched_item: bool
 ) -> tuple[State, str] | None:
     """Return the final state of an item and the reason, or None if the current state is final.
 
@@ -31,7 +31,7 @@ def find_final_state(
     5. A dropped item that the tool may have moved while the journal was incomplete is rejected.
     6. An item is lost if it was dropped, or if its position on the table is now empty.
     7. An item that is already rejected stays rejected.
-    8. An item without a route is skipped.
+    8. An item whose class has no route, or no bin below its quota, is skipped.
     9. If the mission was completed, an item with sufficient evidence (`certainty`), no failed attempt and no
        evidence against its class is skipped, because a quota was reached or the operator quit.
     10. Any other item is rejected.
@@ -39,7 +39,7 @@ def find_final_state(
     Args:
         record: The item.
         certainty: Criteria for an item with sufficient evidence.
-        has_route: True if the mission has a bin for the item's class.
+        exemption: Reason why the mission does not sort objects of the item's class, or "".
         is_completed: True if the behaviour tree succeeded.
         has_touched_item: True if the tool has touched any item at the height of its class.
     """
@@ -61,8 +61,8 @@ def find_final_state(
         return State.LOST, "known to exist, not found again"
     if record.state is State.REJECTED:
         return None
-    if not has_route:
-        return State.SKIPPED, "the mission has no route for it"
+    if exemption:
+        return State.SKIPPED, exemption
     had_problem = record.attempt_count or record.last_contradiction
     if is_completed and certainty.is_certain(record) and not had_problem:
         return State.SKIPPED, "the mission was completed without it"

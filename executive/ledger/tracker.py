@@ -14,6 +14,7 @@ from executive.cell.detection import Detections, Observation
 from executive.cell.frame import Frame, FrameCaptured
 from executive.cell.objects import Item, KnownItem, Target
 from executive.cell.protocols import Routes
+from executive.cell.quotas import Quotas
 from executive.errors import Fault
 from executive.events import Emit, ItemChanged
 from executive.geometry import Array
@@ -41,6 +42,7 @@ class Tracker:
         routes: Names of the permitted bins by class.
         emit: Function that receives the events.
         labels_with_unique_height: Classes whose height distinguishes them from all others.
+        quotas: Maximum numbers of objects in the bins; None: no quotas.
 
     Attributes:
         unknown_labels: Labels that are not in the cell file, each with its maximum number of boxes per frame.
@@ -49,12 +51,12 @@ class Tracker:
 
     def __init__(
         self, config: LedgerConfig, table: TableConfig, bins: Mapping[str, Bin], routes: Routes, emit: Emit,
-        labels_with_unique_height: Collection[str] = (),
+        labels_with_unique_height: Collection[str] = (), quotas: Quotas | None = None,
     ) -> None:  # fmt: skip
         self._config, self._routes, self._emit = config, routes, emit
         self._records = ItemRecords(emit)
         self._certainty = Certainty(config, labels_with_unique_height)
-        self._bins = BinContents(config, bins, routes, self._records)
+        self._bins = BinContents(config, bins, routes, self._records, quotas or Quotas())
         self._coverage, self._staleness = Coverage(table), Staleness()
         self._bin_recovery: BinRecovery | None = None
         """Recovery of the contents of the bins from `lose_track` to `record_bin_contents`; otherwise None."""
@@ -128,17 +130,20 @@ class Tracker:
         return self._certainty.is_certain(self._records.find(item))
 
     def is_table_empty(self, label: str | None = None, ignored_items: Collection[Item] = ()) -> bool:
-        """Return True if almost certainly no object with a route is visible on the table.
+        """Return True if almost certainly no object that the mission still sorts is visible on the table.
 
         `label` restricts the check to objects of one class; None: all classes with a route. The objects in
         `ignored_items` may be on the table.
         """
+        routed_labels = [routed_label for routed_label in self._routes if label in (None, routed_label)]
+        labels = [entry for entry in routed_labels if not self._bins.explain_exemption(entry)]
+        if routed_labels and not labels:
+            return True
         if self._coverage.max_object_probability > self._config.max_miss_probability:
             return False
         records = (record for record in self.records if record.item not in ignored_items)
         possible_items = [record for record in records if self._certainty.may_be_on_table(record)]
         visible_items = [record for record in possible_items if self._coverage.is_visible(record.position)]
-        labels = [routed_label for routed_label in self._routes if label in (None, routed_label)]
         # An item without a confident detection counts as an object of every class.
         return not any(item.label in labels or not item.belief.look_count for item in visible_items)
 
@@ -159,9 +164,13 @@ class Tracker:
         """Return the number of failed attempts to pick an item."""
         return self._records.find(item).attempt_count
 
-    def count_objects_in(self, bin: str) -> int:
-        """Return the number of objects in a bin."""
-        return self._bins.count_objects_in(bin)
+    def count_objects_in(self, bin: str, label: str | None = None) -> int:
+        """Return the number of objects in a bin; `label` restricts the count to one class."""
+        return self._bins.count_objects_in(bin, label)
+
+    def explain_exemption(self, label: str) -> str:
+        """Return the reason why the mission does not sort further objects of a class, or ""."""
+        return self._bins.explain_exemption(label)
 
     def record_touch(self, item: Item, contradiction: str = "", *, may_miss_top: bool = False) -> bool:
         """Record a touch, and return False if the touch contradicts the class of the item.
@@ -274,8 +283,8 @@ class Tracker:
         dropped_items = self._records.filter_by_state(State.DROPPED)
         for record in self.records:
             final_state = outcomes.find_final_state(
-                record, self._certainty, has_route=record.label in self._routes, is_completed=completed,
-                has_touched_item=has_touched_item,
+                record, self._certainty, exemption=self._bins.explain_exemption(record.label),
+                is_completed=completed, has_touched_item=has_touched_item,
             )  # fmt: skip
             if bin := find_probable_bin(record):
                 record.bin, final_state = bin, (State.PLACED, "it probably fell into the bin")

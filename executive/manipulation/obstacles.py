@@ -31,16 +31,21 @@ def is_detection_in_bin(cell: Cell, detection: Detection, frame: Frame) -> bool:
     return any(bin.contains(position, BIN_THICKNESS) for bin in cell.bins.values())
 
 
-def predict_object_count(cell: Cell, bin_name: str, excluded_item: Item | None = None) -> int:
+def predict_object_count(
+    cell: Cell, bin_name: str, excluded_item: Item | None = None, *, label: str | None = None
+) -> int:
     """Return the number of objects in a bin, including an item that the arm is moving into the bin.
 
-    A plan with this number remains valid after the release. A moving `excluded_item` is not counted.
+    A plan with this number remains valid after the release. A moving `excluded_item` is not counted. `label`
+    restricts the count to one class.
     """
     held_item = cell.ledger.find_held_item()
-    is_counted = held_item not in (None, excluded_item)
+    is_counted = held_item is not None and held_item != excluded_item
+    if held_item is not None and label is not None:
+        is_counted = is_counted and cell.ledger.get_label(held_item) == label
     # Without a moving item, the destination is not read, because each reading of the cell is recorded.
     arriving_count = 1 if is_counted and cell.bins[bin_name].contains(cell.arm.destination) else 0
-    return cell.ledger.count_objects_in(bin_name) + arriving_count
+    return cell.ledger.count_objects_in(bin_name, label) + arriving_count
 
 
 def make_obstacle(cell: Cell, target: Target) -> Obstacle:

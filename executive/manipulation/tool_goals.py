@@ -104,8 +104,8 @@ def compute_min_contact_height(object_class: ObjectClass, centre_height: float, 
 def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]:
     """Return the targets that can be picked, sorted by their distance from the destination of the arm.
 
-    A target can be picked if its item is unsorted and certain, its class has a route, and its position is
-    still valid.
+    A target can be picked if its item is unsorted and certain, its class has a bin below its quota, and its
+    position is still valid.
     """
     ledger, destination = cell.ledger, cell.arm.destination[:2]
     pickable_targets = [
@@ -114,10 +114,23 @@ def sort_pickable_targets(cell: Cell, targets: Sequence[Target]) -> list[Target]
         if ledger.is_open(target.item)
         and ledger.is_fresh(target)
         and ledger.is_certain(target.item)
-        and ledger.get_label(target.item) in cell.routes
+        and list_free_bins(cell, ledger.get_label(target.item))
     ]
     offsets = {target.item: target.position[:2] - destination for target in pickable_targets}
     return sorted(pickable_targets, key=lambda target: (np.linalg.norm(offsets[target.item]), target.item))
+
+
+def list_free_bins(cell: Cell, label: str) -> list[str]:
+    """Return the names of the permitted bins of a class whose quota is not reached.
+
+    An item that the arm is moving into a bin counts as an object in the bin.
+    """
+
+    def count_objects(bin_name: str, counted_label: str | None) -> int:
+        return predict_object_count(cell, bin_name, label=counted_label)
+
+    bin_names = cell.routes.get(label, ())
+    return [name for name in bin_names if not cell.quotas.is_reached(name, label, count_objects)]
 
 
 def make_bin_goal(cell: Cell, bin_name: str, item: Item, drop_height: float = DROP_HEIGHT) -> Goal:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import cast
 
 from pydantic import JsonValue
 
 from executive.cell.config import CellConfig
+from executive.cell.quotas import Quotas
 from executive.cell.workcell import CellKind
 from executive.errors import InputError
 from executive.mission.check.checks import run_checks
@@ -68,6 +70,13 @@ class LoadedMission:
     def routes(self) -> dict[str, tuple[str, ...]]:
         """Names of the permitted bins by class."""
         return {route.label: tuple(bin.name for bin in route.bins) for route in self.mission.routes}
+
+    @property
+    def quotas(self) -> Quotas:
+        """Maximum numbers of objects in the bins."""
+        quotas = self.mission.quotas
+        limits = {(quota.bin.name, quota.label and quota.label.name): quota.limit.value for quota in quotas}
+        return Quotas(cast("dict[tuple[str, str | None], int]", limits))
 
 
 def load_mission(

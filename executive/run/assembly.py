@@ -166,7 +166,9 @@ class _RunBuilder:
         else:
             operator = ScriptedOperator(options.requests, tuple(loaded.routes), emit, request_count)
         config, base = loaded.cell_config, loaded.cell_path.parent
-        cell_options = CellOptions(operator, base, options.gui, resume=resume_point, scene=options.scene)
+        cell_options = CellOptions(
+            operator, base, options.gui, resume=resume_point, scene=options.scene, quotas=loaded.quotas
+        )
         make_cell = options.make_cell or load_cell_kind(config.kind)
         return make_cell(config, seed=options.seed, routes=loaded.routes, emit=emit, options=cell_options)
 

@@ -13,7 +13,7 @@ class GrammarKey:
     Attributes:
         kind: Kind of the value: `node`, `number`, `text`, `name`, `label`, `list`, `value` (any YAML value),
             or a list or mapping of such values: `names`, `values`, `variables`, `paths`, `params`, `routes`,
-            `trees`, `args`.
+            `quotas`, `trees`, `args`.
         doc: Meaning of the key, one sentence.
         is_required: True if the key is mandatory.
     """
@@ -59,6 +59,7 @@ MISSION_KEYS: GrammarKeys = {
     "library": GrammarKey("paths", "Library files: paths relative to this or the shipped folder."),
     "params": GrammarKey("params", "Constants, read as `$name`; `--set name=value` replaces a value."),
     "routes": GrammarKey("routes", "Bin, or list of permitted bins, for each class of objects."),
+    "quotas": GrammarKey("quotas", "Maximum number of objects in a bin, in all or of each class."),
     "tree": GrammarKey("node", "Root node of the tree.", is_required=True),
     "trees": GrammarKey("trees", "Subtrees by name."),
 }

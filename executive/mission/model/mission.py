@@ -74,6 +74,15 @@ class Route:
 
 
 @dataclass(frozen=True)
+class Quota:
+    """Maximum number of objects of a class in a bin; of all classes if `label` is None."""
+
+    bin: LocatedName
+    label: LocatedName | None
+    limit: Literal
+
+
+@dataclass(frozen=True)
 class Mission:
     """Content of a mission file.
 
@@ -82,6 +91,7 @@ class Mission:
         cell: Path of the cell file, relative to the folder of the mission.
         libraries: Paths of the library files, relative to the folder of the mission.
         params: Constants by name, with the values of `--set`.
+        quotas: Maximum numbers of objects in the bins, with valid numbers.
         tree: Root node of the tree; None if the key is missing.
         subtrees: Subtrees of the mission and of its libraries, by name.
         is_complete: False if a library could not be read, so that `subtrees` may lack subtrees.
@@ -93,6 +103,7 @@ class Mission:
     libraries: tuple[LocatedName, ...] = ()
     params: Mapping[str, MissionParam] = field(default_factory=dict)
     routes: tuple[Route, ...] = ()
+    quotas: tuple[Quota, ...] = ()
     tree: Node | None = None
     subtrees: Mapping[str, Subtree] = field(default_factory=dict)
     is_complete: bool = True

@@ -13,6 +13,7 @@ from executive.mission.model.values import LocatedName
 from executive.mission.parse.mapping_reader import NAME_PATTERN, MappingReader, is_empty, read_value
 from executive.mission.parse.node_parser import NodeParser
 from executive.mission.parse.params import parse_params
+from executive.mission.parse.quota_parser import read_quotas
 from executive.mission.source import Span
 from executive.mission.text.yaml_text import YamlMapping, YamlNode, YamlScalar, YamlSequence, describe_node
 
@@ -24,6 +25,7 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
     """Return the valid content of a mission file; add errors to the findings of `parser`."""
     reader = _make_file_reader("the mission", root, grammar.MISSION_KEYS, parser)
     tree = reader.get("tree")
+    params = parse_params(reader, overrides)
     return Mission(
         name=_read_name(reader),
         description=reader.read_text("description"),
@@ -31,8 +33,9 @@ def parse_mission(root: YamlNode, overrides: Mapping[str, str], parser: NodePars
         libraries=_read_names(
             reader, reader.list_items("library"), "library must be the path of a file or a list of paths"
         ),
-        params=parse_params(reader, overrides),
+        params=params,
         routes=_read_routes(reader),
+        quotas=tuple(read_quotas(reader, params)),
         tree=None if tree is None else parser.read_node(tree, reader.get_key_span("tree")),
         subtrees=_read_subtrees(reader, parser),
     )

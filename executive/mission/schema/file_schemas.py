@@ -211,6 +211,10 @@ def _allow_list(text_schema: Schema) -> Schema:
 _ANY_NAME: Schema = {"pattern": "^[A-Za-z_][A-Za-z0-9_-]*$"}
 """Schema of a name that may contain hyphens."""
 
+_QUOTA: Schema = make_value_or_reference_schema({"type": "integer", "minimum": 1})
+_QUOTAS_BY_CLASS: Schema = {"type": "object", "additionalProperties": _QUOTA, "minProperties": 1}
+_BIN_QUOTA: Schema = {"anyOf": [*_QUOTA["anyOf"], _QUOTAS_BY_CLASS]}
+
 _SCHEMAS_BY_KIND: Mapping[str, Schema] = {
     "node": _make_reference("node"),
     "nodes": {"type": "array", "items": _make_reference("node"), "minItems": 1},
@@ -225,6 +229,7 @@ _SCHEMAS_BY_KIND: Mapping[str, Schema] = {
     "paths": _allow_list({}),
     "params": _map_names(_make_reference("param")),
     "routes": {"type": ["object", "null"], "additionalProperties": _allow_list({})},
+    "quotas": {"type": ["object", "null"], "additionalProperties": _BIN_QUOTA},
     "trees": _map_names(_make_reference("tree")),
     "args": {**_map_names({}), "type": ["object", "array", "null"], "items": {"type": "string", **_ANY_NAME}},
 }

@@ -1,0 +1,45 @@
+"""Shipped missions that count objects or limit their number per bin."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+
+from executive.cells.fake.cell import FakeCell
+from executive.testing.run_mission import MissionResult, run_mission
+
+
+def run_with(mission: str, *labels: str, **settings: str) -> MissionResult:
+    """Run a mission with these objects on the table."""
+
+    def arrange(fake: FakeCell) -> None:
+        fake.world.objects.clear()
+        for index, label in enumerate(labels):
+            fake.world.put(label, 0.44 + 0.09 * (index % 3), -0.15 + 0.1 * (index // 3))
+
+    return run_mission(mission, arrange=arrange, set=settings)
+
+
+def count_by_bin(result: MissionResult) -> dict[str, Counter[str]]:
+    """Return the number of placed objects by bin and class."""
+    counts: dict[str, Counter[str]] = {}
+    for row in result.cell.accounts.list_items():
+        counts.setdefault(row.bin, Counter())[row.label] += 1
+    return counts
+
+
+def test_two_cubes_fill_each_bin_with_a_quota_and_the_rest_goes_elsewhere() -> None:
+    result = run_with("fill_by_quota", *["cube"] * 6, "sphere", "duck")
+    assert (result.status, result.agrees) == ("SUCCESS", True)
+    assert count_by_bin(result) == {
+        "red_bin": {"cube": 2},
+        "blue_bin": {"cube": 2},
+        "yellow_bin": {"cube": 2, "sphere": 1, "duck": 1},
+    }
+
+
+@pytest.mark.parametrize("most", [1, 3])
+def test_set_changes_a_quota(most: int) -> None:
+    counts = count_by_bin(run_with("fill_by_quota", *["cube"] * 6, most=str(most)))
+    assert [counts[name]["cube"] for name in ("red_bin", "blue_bin")] == [most, most]

@@ -1,0 +1,98 @@
+"""The bins that SelectTarget chooses, and the final states of items, if bins have quotas."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from at_hand import look
+
+from executive.cell.arm import Goal
+from executive.cell.quotas import Quotas
+from executive.cell.workcell import CellOptions
+from executive.cells.fake.cell import FakeCell, SilentOperator
+from executive.testing.run_skill import SkillResult, run_skill
+from skills.select_target import SelectTarget
+
+ALL_BINS = ("red_bin", "blue_bin", "yellow_bin")
+
+
+def make_cell(limits: dict[tuple[str, str | None], int], *labels: str) -> FakeCell:
+    """Return a cell with a row of objects, whose cubes may go into all bins."""
+    options = CellOptions(SilentOperator(), cell_folder=Path(), quotas=Quotas(limits))
+    fake = FakeCell(routes={"cube": ALL_BINS, "sphere": ("red_bin",)}, options=options)
+    for index, label in enumerate(labels):
+        fake.world.put(label, 0.44 + 0.1 * (index % 3), 0.12 * (index // 3))
+    return fake
+
+
+def select(fake: FakeCell, targets, **values) -> SkillResult:
+    return run_skill(SelectTarget(targets=targets, **values), fake)
+
+
+def place_all(fake: FakeCell, targets) -> list[str]:
+    """Place one target after the other where SelectTarget says; return the bins, and then the reason."""
+    results = []
+    for _ in range(len(targets) + 1):
+        result = select(fake, targets)
+        results.append(result.outputs.get("bin", result.reason))
+        if result.status == "FAILURE":
+            break
+        fake.ledger.record_placement(result.outputs["item"], results[-1])
+    return results
+
+
+def test_bins_with_a_quota_are_filled_before_the_bin_without_one() -> None:
+    fake = make_cell({("red_bin", "cube"): 2, ("blue_bin", "cube"): 1}, *["cube"] * 5)
+    bins = ["red_bin", "blue_bin", "red_bin", "yellow_bin", "yellow_bin"]
+    assert place_all(fake, look(fake))[:5] == bins
+
+
+@pytest.mark.parametrize("counted_label", [None, "cube"])
+def test_a_quota_counts_all_objects_or_those_of_a_class(counted_label: str | None) -> None:
+    fake = make_cell({("red_bin", counted_label): 1}, "sphere", "cube")
+    cube, sphere = sorted(look(fake), key=lambda target: target.label)
+    fake.ledger.record_placement(sphere.item, "red_bin")
+    expected_bin = "blue_bin" if counted_label is None else "red_bin"
+    assert select(fake, [cube]).outputs["bin"] == expected_bin
+
+
+def test_an_item_on_its_way_into_a_bin_counts_as_an_object_in_the_bin() -> None:
+    fake = make_cell({("red_bin", None): 1, ("blue_bin", None): 1}, "cube", "cube")
+    first, second = look(fake)
+    fake.ledger.record_grasp(first.item)
+    assert select(fake, [second]).outputs["bin"] == "red_bin"
+    fake.arm.start(fake.arm.plan(Goal((0.24, -0.48, 0.3))).result())
+    assert select(fake, [second]).outputs["bin"] == "blue_bin"
+
+
+def test_a_rejected_item_does_not_use_the_quota() -> None:
+    fake = make_cell({("red_bin", None): 1, ("blue_bin", None): 1, ("yellow_bin", None): 1}, "cube", "cube")
+    first, second = look(fake)
+    fake.ledger.record_grasp(first.item)
+    fake.ledger.reject(first.item, "it slips")
+    assert select(fake, [second]).outputs["bin"] == "red_bin"
+
+
+def test_without_a_free_quota_no_candidate_is_left_at_once() -> None:
+    fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere")
+    place_all(fake, look(fake))
+    result = select(fake, look(fake), wanted="sphere")
+    assert (result.reason, result.message) == (
+        "no_candidate",
+        "no sphere is left on the table, except rejected objects and surplus objects; "
+        "the quota of red_bin is reached",
+    )
+
+
+def test_the_end_of_one_class_does_not_hide_another() -> None:
+    fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere", "cube")
+    assert place_all(fake, look(fake))[-1] == "unseen", "a hidden cube may be left"
+
+
+def test_surplus_items_are_skipped_at_the_end_also_if_the_mission_failed() -> None:
+    fake = make_cell({("red_bin", "sphere"): 1}, "sphere", "sphere")
+    place_all(fake, look(fake))
+    fake.ledger.close(completed=False)
+    states = {event.item: (event.state, event.reason) for event in fake.ledger.list_items()}
+    assert sorted(states.values()) == [("placed", ""), ("skipped", "the quota of red_bin is reached")]
