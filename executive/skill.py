@@ -149,6 +149,9 @@ class Skill:
         uses: Devices that no concurrent branch may use at the same time: `arm`, `tool`, `camera`.
         senses: True if the skill gets new information: an image, or a request of the operator.
         moves: True if the skill moves the arm.
+        is_condition: True if the skill is a condition, which decides in one tick, writes no output, uses no
+            device, and changes nothing. Its `tool_state` then is a statement about the tool: the state in
+            which alone the condition can succeed.
         tool_state: Required state of the tool (ANY: no requirement); state after success (ANY: unchanged).
         tool_state_after_failure: State of the tool after a failure, by reason, and after a halt, by the key
             `halt`; ANY if unknown. A failure or halt without a key leaves the state unchanged.
@@ -161,6 +164,7 @@ class Skill:
     uses: ClassVar[tuple[str, ...]] = ()
     senses: ClassVar[bool] = False
     moves: ClassVar[bool] = False
+    is_condition: ClassVar[bool] = False
     tool_state: ClassVar[tuple[ToolState, ToolState]] = (ANY, ANY)
     tool_state_after_failure: ClassVar[Mapping[str, ToolState]] = {}
     waits: ClassVar[str] = ""

@@ -1,37 +1,31 @@
-"""Skill that checks if the tool holds an item."""
+"""Condition that the tool holds an item."""
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-from executive.cell.objects import Item
 from executive.cell.protocols import Cell
-from executive.skill import ANY, EMPTY, HOLDING, Out, Skill, port
+from executive.skill import ANY, HOLDING, Skill
 
 
 class IsHolding(Skill):
-    """Check with the sensor of the tool whether the tool holds an item.
+    """Succeed if the sensor of the tool and the ledger both report an item in the tool.
 
-    Unless sensor and ledger both report an item, the skill opens the tool and fails; it also records a drop
-    if only the ledger reports an item. After a failed transit, a mission can thus decide how to continue.
+    The condition changes nothing: after a failure, the ledger may still report a lost item, and the tool may
+    still hold an unknown object. `ConfirmGrasp` corrects both.
     """
 
-    held: Out[Item] = port(refers_to="item", doc="the item in the tool")
+    is_condition: ClassVar = True
     reasons: ClassVar = ("empty",)
-    uses: ClassVar = ("tool",)
     senses: ClassVar = True
     tool_state: ClassVar = (ANY, HOLDING)
-    tool_state_after_failure: ClassVar = {"empty": EMPTY}
+    tool_state_after_failure: ClassVar = {"empty": ANY}
 
     def run(self, cell: Cell) -> None:
-        """Compare the vacuum sensor with the ledger; unless both report an item, open the tool and fail."""
+        """Compare the vacuum sensor with the ledger."""
         item, is_sealed = cell.ledger.find_held_item(), cell.tool.holding
-        if is_sealed and item is not None:
-            self.held = item
-            return
-        cell.tool.open()
-        if item is not None:
-            cell.ledger.record_drop(item)
-            raise self.failure("empty", f"the sensor detects no seal; {item} was dropped")
-        seal = "a seal, but the ledger knows no held item; the tool was opened" if is_sealed else "no seal"
-        raise self.failure("empty", f"the sensor detects {seal}")
+        if not is_sealed:
+            known = f", but the ledger reports {item} in the tool" if item else ""
+            raise self.failure("empty", f"the sensor detects no seal{known}")
+        if item is None:
+            raise self.failure("empty", "the sensor detects a seal, but the ledger knows no held item")

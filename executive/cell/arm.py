@@ -96,6 +96,9 @@ class Arm(Protocol):
     def collision(self) -> str | None:
         """Description of the collision that ended the last motion, or None."""
 
+    def describe_unreachable(self, goal: Goal) -> str:
+        """Return a sentence if no joint configuration within the limits reaches a goal, else ""."""
+
     def plan(self, goal: Goal | str, task: Task = Task()) -> Planning:
         """Start to plan a motion from the current position to a goal, or to a named pose of the cell file.
 

@@ -54,6 +54,9 @@ class Ledger(Protocol):
     def is_open(self, item: Item) -> bool:
         """Return True if an item still has to be sorted: it is on the table or dropped, but not rejected."""
 
+    def is_placed(self, item: Item) -> bool:
+        """Return True if an item is in a bin."""
+
     def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough to pick it."""
 

@@ -102,6 +102,7 @@ def collect_declarations(name: str, skill: type[Skill]) -> Declaration:
         "uses": skill.uses,
         "senses": skill.senses,
         "moves": skill.moves,
+        "is_condition": skill.is_condition,
         "tool": {"before": state_before, "after": state_after, "left": skill.tool_state_after_failure},
     }
     return cast(Declaration, json.loads(to_json(values, inf_nan_mode="strings", fallback=str)))
@@ -147,6 +148,8 @@ def _describe_skill(skill: Declaration) -> str:
     lines.append(f"may fail with: {', '.join(skill['reasons']) or 'nothing'}")
     effects_text = ("; senses" if skill["senses"] else "") + ("; moves the arm" if skill["moves"] else "")
     lines.append(f"uses: {', '.join(skill['uses']) or 'nothing'}{effects_text}")
+    if skill["is_condition"]:
+        lines.append("condition: decides in one tick and changes nothing")
     tool = skill["tool"]
     exceptions_text = "".join(f", {state} after {ending}" for ending, state in tool["left"].items())
     lines.append(f"tool: {tool['before']} before, {tool['after']} after{exceptions_text}")

@@ -125,6 +125,10 @@ class Tracker:
         record = self._records.find(item)
         return record.state in (State.SEEN, State.DROPPED) and not record.reason
 
+    def is_placed(self, item: Item) -> bool:
+        """Return True if an item is in a bin."""
+        return self._records.find(item).state is State.PLACED
+
     def is_certain(self, item: Item) -> bool:
         """Return True if the existence, class and position of an item are certain enough to sort the item."""
         return self._certainty.is_certain(self._records.find(item))

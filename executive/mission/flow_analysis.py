@@ -88,6 +88,15 @@ class FlowAnalysis:
         if skill is None:
             return make_unknown_flow(node.skill, node.path)
         precondition, postcondition = skill.tool_state
+        if skill.is_condition:
+            failure_states = skill.tool_state_after_failure
+            failures = {
+                PossibleFailure(node.skill, reason, node.path): state.apply_failure(
+                    failure_states.get(reason), node.path
+                )
+                for reason in skill.reasons
+            }
+            return Flow(state.apply_observation(postcondition, node.path), failures, None)
         state = state.apply_precondition(precondition, node.path)
         outputs = [wire.variable for wire in find_wires(node, skill, Direction.OUT)]
         final_state = state.with_arm_moved() if skill.moves else state

@@ -51,6 +51,7 @@ class Planner:
         self.kinematics = kinematics
         self._config = config
         self._check_collision = check_collision
+        self._reach_problems: dict[Goal, str] = {}
 
     def plan(self, q_start: ArrayLike, goal: Goal | ArrayLike, task: Task = Task()) -> Trajectory:
         """Return a fast motion from rest at `q_start` `(n,)` [rad] to a goal or to joint positions `(n,)`.
@@ -74,6 +75,20 @@ class Planner:
         """
         approach_height = max(0.0, compute_travel_height(self._config) - goal.position[2])
         find_configuration_pairs(self.kinematics, goal, approach_height, np.zeros(self.limits.joint_count))
+
+    def describe_unreachable(self, goal: Goal) -> str:
+        """Return a sentence if no configuration reaches a goal and the start of its descent, else "".
+
+        The answer is computed once per goal, because a guard may ask in every control step.
+        """
+        if goal not in self._reach_problems:
+            try:
+                q_start = np.zeros(self.limits.joint_count)
+                find_configuration_pairs(self.kinematics, goal, goal.guarded_length, q_start)
+                self._reach_problems[goal] = ""
+            except Unreachable as error:
+                self._reach_problems[goal] = str(error)
+        return self._reach_problems[goal]
 
     def _find_motion(self, start: Array, end: Goal | Array, task: Task) -> Trajectory:
         """Return the first motion of the search that passes all checks."""

@@ -42,6 +42,7 @@ INPUT_FORMATS: Mapping[str, InputFormat] = {
     "arm.destination": InputFormat("arm.destination", codecs.ARRAY),
     "arm.at_rest": InputFormat("arm.at_rest"),
     "arm.collision": InputFormat("arm.met"),
+    "arm.describe_unreachable": InputFormat("arm.unreachable"),
     "plan.ready": InputFormat("plan.ready"),
     "plan.result": InputFormat("plan", codecs.MOTION),
     "tool.touching": InputFormat("tool.touching"),

@@ -107,6 +107,16 @@ class FlowState:
             return self
         return self.with_tool_states(frozenset({PossibleToolState(declared_state, path)}))
 
+    def apply_observation(self, observed_state: ToolState, path: str) -> FlowState | None:
+        """Return the state after success of the condition at `path`, which can succeed in one state only.
+
+        `observed_state` ANY changes nothing; None if the tool cannot be in the observed state.
+        """
+        if observed_state is ANY or self.tool_states is None:
+            return self.apply_success(observed_state, path)
+        remaining = frozenset(state for state in self.tool_states if state.state is observed_state)
+        return self.with_tool_states(remaining) if remaining else None
+
     def apply_failure(self, declared_state: ToolState | None, path: str) -> FlowState:
         """Return the state after a failure or a halt of the skill at `path`.
 

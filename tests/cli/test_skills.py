@@ -62,6 +62,7 @@ def test_json_tells_everything_of_one_skill_as_one_object_and_of_all_as_one_arra
         "name": "PlaceNeatly",
         "doc": "Put the item down in line with the others.\n\nSucceeds when the tool is empty.",
         "reasons": ["full", "stuck"], "uses": ["arm", "tool"], "senses": True, "moves": True,
+        "is_condition": False,
         "tool": {"before": "holding", "after": "empty", "left": {"halt": "any"}},
     }  # fmt: skip
     assert params[0] == {

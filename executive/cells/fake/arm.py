@@ -102,6 +102,14 @@ class FakeArm:
         """True while no motion runs."""
         return not self._path
 
+    def describe_unreachable(self, goal: Goal) -> str:
+        """Return a sentence if a goal is farther than `MAX_REACH` from the base, else ""."""
+        try:
+            check_reachable(np.array(goal.position))
+        except Unreachable as error:
+            return str(error)
+        return ""
+
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[FakeMotion]:
         """Begin to plan a motion to a goal or a named pose; a plan from `plan_ahead` is complete at once.
 

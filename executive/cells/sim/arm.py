@@ -114,6 +114,10 @@ class SimArm:
         self._raise_fault()
         return self._motion is None
 
+    def describe_unreachable(self, goal: Goal) -> str:
+        """Return a sentence if no joint configuration within the limits reaches a goal, else ""."""
+        return self.planner.describe_unreachable(goal)
+
     def plan(self, goal: Goal | str, task: Task = Task()) -> Plan[Trajectory]:
         """Begin to plan a motion from the current position to a goal, or to a named pose of the cell file.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from executive.mission.check.context import CheckContext
+from executive.mission.check.variables import list_skills_with_output
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, suggest_choice, suggest_word
 from executive.mission.model.conversion import WrongType, convert_value, find_input_problem
@@ -30,6 +31,8 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
         for name, setting in node.settings.items():
             if name not in declarations:
                 hint = suggest_choice(name, declarations, f"Params and ports of {node.skill}")
+                if writers := list_skills_with_output(context, name) if skill.is_condition else "":
+                    hint = f"A condition writes no output. ${name} is written by: {writers}."
                 message = f'{node.skill} has no param or port "{name}"'
                 yield make_error(setting.name_span, "unknown-param", message, hint)
             elif isinstance(setting.value, Literal):

@@ -143,7 +143,7 @@ def _suggest_writers(context: CheckContext, variable: str, span: Span) -> str:
     """Return the skills that write a variable in the file of `span`, otherwise all skills that can."""
     all_writers = _list_writers(context, variable, span)
     writers_in_file = [writer for writer in all_writers if " in line " in writer]
-    return " and ".join(writers_in_file) or _list_skills_with_output(context, variable) or "no skill"
+    return " and ".join(writers_in_file) or list_skills_with_output(context, variable) or "no skill"
 
 
 def _make_unwritten_hint(context: CheckContext, variable: str) -> str:
@@ -152,7 +152,7 @@ def _make_unwritten_hint(context: CheckContext, variable: str) -> str:
     if local_names:
         subtree = min(name.rpartition(".")[0] for name in local_names)
         return f'The subtree "{subtree}" writes a local variable {variable}: add {variable} to its returns.'
-    if skills := _list_skills_with_output(context, variable):
+    if skills := list_skills_with_output(context, variable):
         return f"It is written by: {skills}."
     global_names = sorted(name for name in context.written_variables if "." not in name)
     similar = find_similar_word(variable, global_names)
@@ -160,7 +160,7 @@ def _make_unwritten_hint(context: CheckContext, variable: str) -> str:
     return (f'Did you mean "${similar}"? ' if similar else "") + f"Variables that are written: {names}."
 
 
-def _list_skills_with_output(context: CheckContext, name: str) -> str:
+def list_skills_with_output(context: CheckContext, name: str) -> str:
     """Return the names of the skills that have an output `name`, separated by commas."""
     outputs = {skill: context.skills[skill].ports.get(name) for skill in context.skills}
     return ", ".join(skill for skill, port in outputs.items() if port and port.direction is Direction.OUT)

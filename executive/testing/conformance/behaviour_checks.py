@@ -11,7 +11,7 @@ from functools import partial
 from typing import Any, Union, get_args, get_origin
 
 from executive.mission.model.port_types import describe_type, find_element_type
-from executive.skill import ANY, EMPTY, HOLDING, Skill, ToolState
+from executive.skill import ANY, EMPTY, HOLDING, Direction, Skill, ToolState
 from executive.testing.conformance.declaration_checks import HALT
 from executive.testing.conformance.situations import ArrangementFailed
 from executive.testing.conformance.skill_runs import SkillRuns, TickNotReturned
@@ -24,16 +24,19 @@ _ACTIONS = ("arm.start", "arm.stop", "tool.open", "tool.close", "camera.capture"
 """Commands to parts of the cell; the part must be in `uses` of the skill."""
 _MEASUREMENTS = ("camera.capture", "operator.ask")
 """Calls that return new information; they require `senses` of the skill."""
+_QUERY_PREFIXES = ("is_", "find_", "get_", "count_", "describe_", "sees_")
+"""First letters of the methods of the cell that change nothing, so that a condition may call them."""
 
 
 def can_succeed(runs: SkillRuns) -> Iterator[str]:
-    """The skill can be tested, and succeeds in at least one situation."""
+    """The skill can be tested, and succeeds in at least one situation; a condition may always fail."""
     try:
         _ = runs.situations  # Generates the values of all params and inputs.
     except ArrangementFailed as error:
         yield f"{runs.name} cannot be tested: {error}"
         return
-    if not any(test_run.status == "SUCCESS" for test_run in runs.unhalted_runs):
+    has_succeeded = any(test_run.status == "SUCCESS" for test_run in runs.unhalted_runs)
+    if not (has_succeeded or runs.skill.is_condition):
         yield (
             f"{runs.name} never succeeded; {runs.unhalted_runs[0].result_description}. "
             "Set up a scene in which it succeeds: "
@@ -131,6 +134,28 @@ def is_deterministic(runs: SkillRuns) -> Iterator[str]:
                 f"{run.description}, in two equal runs, {difference}. "
                 "The skill may not depend on chance, wall time or earlier runs; a seed may be a param."
             )
+
+
+def decides_without_effect(runs: SkillRuns) -> Iterator[str]:
+    """A skill with `is_condition` decides in one tick, has no output, uses no device, and changes nothing."""
+    skill, name = runs.skill, runs.name
+    if not skill.is_condition:
+        return
+    declarations = {
+        "an output": any(port.direction is Direction.OUT for port in skill.ports.values()),
+        "a device in uses": bool(skill.uses),
+        "moves": skill.moves,
+        "a required state of the tool": skill.tool_state[0] is not ANY,
+    }
+    for text, is_declared in declarations.items():
+        if is_declared:
+            yield f"{name} declares {text}, and is_condition. Remove one of the two."
+    calls = [call.name for test_run in runs.unhalted_runs for call in test_run.cell_calls]
+    for call in dict.fromkeys(calls):
+        if not call.partition(".")[2].startswith(_QUERY_PREFIXES):
+            yield f"{name} calls cell.{call}, and declares is_condition. A condition may only read the cell."
+    if longest := max((test_run.ticks for test_run in runs.unhalted_runs), default=0):
+        yield f"{name} took {longest + 1} ticks, and declares is_condition. Decide without a yield."
 
 
 def has_short_ticks(runs: SkillRuns) -> Iterator[str]:

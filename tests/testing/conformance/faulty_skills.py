@@ -310,3 +310,20 @@ class ComputesTooLong(Skill):
     def run(self, cell: Cell) -> Steps:
         yield
         sys.modules["time"].sleep(self.work)
+
+
+class BusyCondition(Pause):
+    """Count the boxes in a new image, and call this a condition."""
+
+    count: Out[int] = port(doc="number of boxes")
+    is_condition: ClassVar = True
+    uses: ClassVar = ("camera",)
+    senses: ClassVar = True
+    tool_state: ClassVar = (EMPTY, EMPTY)
+
+    def run(self, cell: Cell) -> Steps:
+        cell.ledger.is_table_empty()
+        cell.camera.capture()
+        yield
+        cell.ledger.invalidate_positions()
+        self.count = 1

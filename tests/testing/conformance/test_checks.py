@@ -70,6 +70,14 @@ FAULTY: list[tuple[str, type[Skill], list[str]]] = [
         unmade("follow"), unmade("follow"), unmade("cell.clock.sleep"), unmade("self._rest"), unmade("_wait"),
         unraised("self._tire"), unraised("self.failure"), unmade("follow"), unmade("cell.clock.sleep"),
     ]),
+    ("decides_without_effect", faulty.BusyCondition, [
+        *(f"BusyCondition declares {text}, and is_condition. Remove one of the two." for text in (
+            "an output", "a device in uses", "a required state of the tool",
+        )),
+        *(f"BusyCondition calls cell.{call}, and declares is_condition. A condition may only read the cell."
+          for call in ("camera.capture", "ledger.invalidate_positions")),
+        "BusyCondition took 2 ticks, and declares is_condition. Decide without a yield.",
+    ]),
     ("can_succeed", faulty.AlwaysFails, [
         f'AlwaysFails never succeeded; {EMPTY} it failed with "tired" (after 1 step). Set up a scene in '
         f"which it succeeds: list_conformance_checks(AlwaysFails, lambda scene: ...); {ARRANGE}",

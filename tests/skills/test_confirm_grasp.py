@@ -1,26 +1,26 @@
-"""IsHolding: the sensor decides."""
+"""ConfirmGrasp: the sensor decides."""
 
 from __future__ import annotations
 
 from executive.cells.fake.cell import FakeCell
 from executive.testing.run_skill import run_skill
-from skills.is_holding import IsHolding
+from skills.confirm_grasp import ConfirmGrasp
 
 
 def test_it_names_what_the_tool_holds(fake: FakeCell, held: str) -> None:
-    result = run_skill(IsHolding(), fake)
+    result = run_skill(ConfirmGrasp(), fake)
     assert (result.status, result.outputs) == ("SUCCESS", {"held": held})
 
 
 def test_an_empty_tool_is_a_failure(fake: FakeCell) -> None:
-    result = run_skill(IsHolding(), fake)
+    result = run_skill(ConfirmGrasp(), fake)
     assert (result.status, result.reason) == ("FAILURE", "empty")
     assert result.message == "the sensor detects no seal"
 
 
 def test_an_object_that_the_ledger_does_not_know_is_released(fake: FakeCell, held: str) -> None:
     fake.ledger.record_drop(held)
-    result = run_skill(IsHolding(), fake)
+    result = run_skill(ConfirmGrasp(), fake)
     assert (result.status, result.reason, fake.tool.holding) == ("FAILURE", "empty", False)
     assert (
         result.message == "the sensor detects a seal, but the ledger knows no held item; the tool was opened"
@@ -29,6 +29,6 @@ def test_an_object_that_the_ledger_does_not_know_is_released(fake: FakeCell, hel
 
 def test_what_should_be_in_the_tool_and_is_not_was_dropped(fake: FakeCell, held: str) -> None:
     fake.tool.open()
-    assert run_skill(IsHolding(), fake).message == f"the sensor detects no seal; {held} was dropped"
+    assert run_skill(ConfirmGrasp(), fake).message == f"the sensor detects no seal; {held} was dropped"
     ledger = fake.ledger
     assert (ledger.find_held_item(), ledger.is_open(held), ledger.count_attempts(held)) == (None, True, 1)

@@ -1,0 +1,38 @@
+"""Skill that makes tool and ledger agree whether the tool holds an item."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from executive.cell.objects import Item
+from executive.cell.protocols import Cell
+from executive.skill import ANY, EMPTY, HOLDING, Out, Skill, port
+
+
+class ConfirmGrasp(Skill):
+    """Confirm with the sensor of the tool that the tool holds an item; otherwise leave an empty tool.
+
+    Unless sensor and ledger both report an item, the skill opens the tool and fails; it also records a drop
+    if only the ledger reports an item. After an interrupted transit, a mission can thus decide how to
+    continue. To ask the sensor without an effect, use the condition `IsHolding`.
+    """
+
+    held: Out[Item] = port(refers_to="item", doc="the item in the tool")
+    reasons: ClassVar = ("empty",)
+    uses: ClassVar = ("tool",)
+    senses: ClassVar = True
+    tool_state: ClassVar = (ANY, HOLDING)
+    tool_state_after_failure: ClassVar = {"empty": EMPTY}
+
+    def run(self, cell: Cell) -> None:
+        """Compare the vacuum sensor with the ledger; unless both report an item, open the tool and fail."""
+        item, is_sealed = cell.ledger.find_held_item(), cell.tool.holding
+        if is_sealed and item is not None:
+            self.held = item
+            return
+        cell.tool.open()
+        if item is not None:
+            cell.ledger.record_drop(item)
+            raise self.failure("empty", f"the sensor detects no seal; {item} was dropped")
+        seal = "a seal, but the ledger knows no held item; the tool was opened" if is_sealed else "no seal"
+        raise self.failure("empty", f"the sensor detects {seal}")
