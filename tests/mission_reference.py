@@ -100,8 +100,15 @@ def _mission_files() -> Iterator[str]:
 
 
 def _control_nodes() -> Iterator[str]:
+    yield (
+        "The last lines about each node name its counterparts in other libraries, and the differences. "
+        "`executive tree MISSION --format btcpp` writes the nodes of BehaviorTree.CPP."
+    )
     for word, node in load_control_nodes().items():
-        yield f"### `{word}`\n\n{inspect.getdoc(node)}"
+        comparisons = {"BehaviorTree.CPP": f"custom node `{word}`", "py_trees": "no counterpart"}
+        doc = inspect.getdoc(node) or ""
+        missing = [f"* {name}: {text}." for name, text in comparisons.items() if f"* {name}: " not in doc]
+        yield "\n".join([f"### `{word}`\n\n{doc}", *(["", *missing] if missing else [])])
         if node.any_of:
             yield f"At least one of {_listed(node.any_of)} is required."
         if node.reasons:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import compress
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
@@ -15,7 +15,9 @@ from executive.cli.streams import keep_stdout_clean, print_json
 
 if TYPE_CHECKING:
     from executive.cell.protocols import Cell
+    from executive.mission.load import LoadedMission
     from executive.mission.outline import OutlineNode
+    from executive.skill import Skill
 
 
 @click.command(name="tree")
@@ -29,41 +31,54 @@ if TYPE_CHECKING:
 @click.option("--fold", is_flag=True, help="Expand each subtree only at its first use.")
 @click.option("--svg", "as_svg", is_flag=True, help="Print the tree as an SVG image.")
 @click.option("--dot", "as_dot", is_flag=True, help="Print the tree in the DOT language of Graphviz.")
+@click.option(
+    "--format", "format_name", type=click.Choice(("svg", "dot", "json", "btcpp")),
+    help="The same as --svg, --dot or --json; btcpp: XML for BehaviorTree.CPP 4 and its editor Groot2.",
+)  # fmt: skip
 @json_option
 def command(
     mission: str, overrides: dict[str, str], ports: bool, reasons: bool, fold: bool, as_svg: bool,
-    as_dot: bool, as_json: bool,
+    as_dot: bool, format_name: str | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Print the behaviour tree of a mission.
 
-    MISSION is a file or the name of a shipped mission. All subtrees are expanded.
+    MISSION is a file or the name of a shipped mission. All subtrees are expanded, except in the format btcpp,
+    in which each subtree is a tree of its own.
     """
-    formats = list(compress(("--svg", "--dot", "--json"), (as_svg, as_dot, as_json)))
+    flags = {"svg": as_svg, "dot": as_dot, "json": as_json}
+    formats = [f"--{name}" for name, is_given in flags.items() if is_given]
+    formats += [f"--format {format_name}"] if format_name else []
     details = list(compress(("--ports", "--reasons"), (ports, reasons)))
     conflict_message = f"{' and '.join(formats)} exclude each other; give one of them"
     redundancy_message = f"{''.join(formats)} always contains ports and reasons; omit {' and '.join(details)}"
     check_usage((len(formats) > 1, conflict_message), (formats and details, redundancy_message))
     with keep_stdout_clean():
         from executive.record.recorded_mission import format_tree
+        from executive.view.tree.btcpp import format_btcpp
         from executive.view.tree.dot import format_dot
         from executive.view.tree.svg import make_svg
         from executive.view.tree.tree_text import draw_text, fold_subtrees
 
-        name, nodes = _load_outline(mission, overrides)
+        loaded, skills, nodes = _load_outline(mission, overrides)
         nodes = fold_subtrees(nodes) if fold else nodes
-        if as_svg:
-            output = make_svg(nodes, name)
-        elif as_dot:
-            output = format_dot(nodes, name)
-        elif as_json:
-            output = json.loads(format_tree(nodes))
-        else:
-            output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
+        match next((name for name, is_given in flags.items() if is_given), format_name):
+            case "svg":
+                output = make_svg(nodes, loaded.mission.name)
+            case "dot":
+                output = format_dot(nodes, loaded.mission.name)
+            case "json":
+                output, as_json = json.loads(format_tree(nodes)), True
+            case "btcpp":
+                output = format_btcpp(loaded.mission, skills)
+            case _:
+                output = draw_text(nodes, shows_ports=ports, shows_reasons=reasons)
     print_json(output) if as_json else click.echo(output)
 
 
-def _load_outline(mission: str, overrides: dict[str, str]) -> tuple[str, Sequence[OutlineNode]]:
-    """Return the name of a mission and the nodes of its tree."""
+def _load_outline(
+    mission: str, overrides: dict[str, str]
+) -> tuple[LoadedMission, Mapping[str, type[Skill]], Sequence[OutlineNode]]:
+    """Return a mission, the installed skills, and the nodes of the expanded tree."""
     from executive.events import discard_event
     from executive.mission.build import build_tree
     from executive.mission.load import load_mission
@@ -76,4 +91,4 @@ def _load_outline(mission: str, overrides: dict[str, str]) -> tuple[str, Sequenc
     # Building the tree without running it requires only the clock of a cell.
     placeholder_cell = cast("Cell", SimpleNamespace(clock=SimpleNamespace(now=0.0)))
     tree = build_tree(loaded_mission, skills, placeholder_cell, Blackboard(), discard_event)
-    return loaded_mission.mission.name, make_outline(tree)
+    return loaded_mission, skills, make_outline(tree)

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
+from executive.tree.counterpart import Counterpart
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure
 from executive.tree.keys import Child, Children, key
@@ -17,11 +18,15 @@ class Fallback(ControlNode):
     """Run the children in order until a child succeeds; fail with the failure of the last child.
 
     The node has memory: a child that failed is not run again.
+
+    * BehaviorTree.CPP: `Fallback`.
+    * py_trees: `Selector(memory=True)`, which may be empty.
     """
 
     keyword = "fallback"
     keyword_hints: ClassVar = {"selector": "Write fallback."}
     symbol, shape = "?", "octagon"
+    counterpart = Counterpart("Fallback")
 
     do: Children = key(shorthand=True, doc="Alternatives, in order.")
 

@@ -19,6 +19,10 @@ class ForEach(Loop):
 
     The node reads the list at its start; with an empty list, the node succeeds at once. A failure of the body
     ends the loop and is passed on. At its end, the node removes the variable `each`.
+
+    * BehaviorTree.CPP: custom node `for_each`. `LoopString` and the other loops begin each element in a new
+      tick, need one more tick at the end, and keep the variable.
+    * py_trees: `decorators.ForEach`, which runs the body once for an empty list, and ends at an element None.
     """
 
     keyword = "for_each"

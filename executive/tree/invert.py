@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
+from executive.tree.counterpart import Counterpart
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
 
 class Invert(ControlNode):
-    """Succeed if the body fails; fail with `inverted` if the body succeeds."""
+    """Succeed if the body fails; fail with `inverted` if the body succeeds.
+
+    * BehaviorTree.CPP: `Inverter`.
+    * py_trees: `decorators.Inverter`.
+    """
 
     keyword = "invert"
     reasons = ("inverted",)
     symbol = "¬"
+    counterpart = Counterpart("Inverter")
 
     do: Child = key(shorthand=True, doc="Body.")
 

@@ -19,6 +19,7 @@ from executive.cell.protocols import Clock
 from executive.errors import Fault, InputError
 from executive.events import BranchChosen, Emit, NodeEnded, NodeStarted, discard_event
 from executive.tree.blackboard import Blackboard
+from executive.tree.counterpart import Counterpart
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState
 from executive.tree.halting import halt
@@ -206,6 +207,13 @@ class ControlNode(KeyOwner, TreeNode):
     def list_contingencies(self) -> Iterator[tuple[str, Child]]:
         """Yield each child that runs only after a failure or at the end, after its name for reports."""
         yield from ()
+
+    # Property for the export.
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """Node of BehaviorTree.CPP with the same semantics; None if there is none."""
+        return None
 
     # Methods that subclasses call.
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 from py_trees.common import Status
 
+from executive.tree.counterpart import Counterpart
 from executive.tree.failure import Failure
 from executive.tree.flow import (
     Flow,
@@ -39,6 +40,12 @@ class Parallel(ControlNode):
 
     With `wait_for: lead`, the first child is the lead: the node ends in the same tick as the lead, with the
     status of the lead, and halts the other children.
+
+    * BehaviorTree.CPP: `ParallelAll` for `all`; `Parallel` for `any`, and with `halt`. `Parallel` ends as
+      soon as the result is known, so that later children may miss the last tick. The custom node `parallel`
+      represents `lead`, and other numbers without `halt`.
+    * py_trees: `Parallel` with the policy `SuccessOnAll` or `SuccessOnOne`. With both policies, the first
+      failure of a child ends the node.
     """
 
     keyword = "parallel"
@@ -186,6 +193,16 @@ class Parallel(ControlNode):
         # The handled failures may include the first failure, which the node passed on later.
         other_names = ", ".join(name for name in failure.handled_counts if name != failure.name)
         return f"needs {count} branches" + (f"; also failed: {other_names}" if other_names else "")
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`ParallelAll` or `Parallel` of BehaviorTree.CPP; None if no node ends under the same conditions."""
+        child_count, required_count = len(self.do), self._required_count
+        if not self._has_lead and (self.halt or required_count == 1):
+            failure_count = child_count - required_count + 1
+            return Counterpart("Parallel", {"success_count": required_count, "failure_count": failure_count})
+        is_all = not self._has_lead and required_count == child_count
+        return Counterpart("ParallelAll", {"max_failures": 1}) if is_all else None
 
 
 def _with_siblings(entry: FlowState, end: FlowState, siblings: Iterable[ToolStates]) -> FlowState:

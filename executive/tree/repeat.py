@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from py_trees.common import Status
 
+from executive.tree.counterpart import Counterpart
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure, format_reasons
 from executive.tree.keys import Child, Reasons, key
@@ -16,6 +17,9 @@ class Repeat(Loop):
     """Run the body repeatedly, up to a maximum number of iterations or until an expected failure.
 
     The loop succeeds in both cases. Any other failure of the body ends the loop and is passed on.
+
+    * BehaviorTree.CPP: `Repeat`; with `until`, a custom node `repeat`, because failures have no reasons.
+    * py_trees: `decorators.Repeat`. Each iteration begins in a new tick, and there is no `until`.
     """
 
     keyword = "repeat"
@@ -83,3 +87,8 @@ class Repeat(Loop):
         if self.until:
             return f"succeeds only with {format_reasons(self.until)}"
         return f"a failure ends the loop before its {self.times} iterations are complete"
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`Repeat` of BehaviorTree.CPP; None with `until`."""
+        return None if self.until else Counterpart("Repeat", {"num_cycles": "times"})

@@ -10,6 +10,7 @@ from py_trees.common import Status
 
 from executive.cell.protocols import Steps
 from executive.skill import Seconds
+from executive.tree.counterpart import Counterpart
 from executive.tree.failure import Failure
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, find_fixed_point, join_states
 from executive.tree.inspection import (
@@ -50,6 +51,10 @@ class Retry(Loop):
     Failures that `on` does not list, and the failure of the last attempt, are passed on. Before every further
     attempt, the node waits for the delay `backoff` on the clock of the run and then runs `recover`; if
     `recover` fails, the node fails with the failure of the last attempt.
+
+    * BehaviorTree.CPP: `RetryUntilSuccessful`; with `on`, `recover` or `backoff`, a custom node `retry`.
+    * py_trees: `decorators.Retry`. Each attempt begins in a new tick, and there is no `on`, `recover` or
+      `backoff`.
     """
 
     keyword = "retry"
@@ -198,6 +203,13 @@ class Retry(Loop):
         """Yield `recover` as the name and the node of the recovery, if there is a recovery."""
         if self.recover is not None:
             yield "recover", self.recover
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`RetryUntilSuccessful` of BehaviorTree.CPP; None with `on`, `recover` or `backoff`."""
+        if self.on or self.recover or self.backoff:
+            return None
+        return Counterpart("RetryUntilSuccessful", {"num_attempts": "attempts"})
 
     def _has_recovery_failed(self, failure: PropagatedFailure) -> bool:
         return self.recover is not None and failure.has_child_failed(self.recover)

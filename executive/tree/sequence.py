@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
+from executive.tree.counterpart import Counterpart
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure, join_states
 from executive.tree.inspection import MinTimeFunction
 from executive.tree.keys import Child, Children, key
@@ -11,10 +12,15 @@ from executive.tree.node import ControlNode
 
 
 class Sequence(ControlNode):
-    """Run the children in order; fail with the first failure."""
+    """Run the children in order; fail with the first failure.
+
+    * BehaviorTree.CPP: `Sequence`.
+    * py_trees: `Sequence(memory=True)`, which may be empty.
+    """
 
     keyword = "sequence"
     symbol, shape = "→", "box"
+    counterpart = Counterpart("Sequence")
 
     do: Children = key(shorthand=True, doc="Nodes to run, in order.")
 

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from py_trees.common import Status
 
+from executive.tree.counterpart import Counterpart
 from executive.tree.flow import Flow, FlowFunction, FlowState, join_states
 from executive.tree.keys import Child, key
 from executive.tree.node import ControlNode
 
 
 class Succeed(ControlNode):
-    """Succeed after success and failure of the body; without a body, succeed at once."""
+    """Succeed after success and failure of the body; without a body, succeed at once.
+
+    * BehaviorTree.CPP: `ForceSuccess`; without a body, `AlwaysSuccess`.
+    * py_trees: `decorators.FailureIsSuccess`; without a body, `behaviours.Success`.
+    """
 
     keyword = "succeed"
     symbol = "✓"
@@ -32,3 +37,8 @@ class Succeed(ControlNode):
             return Flow(state, {}, None)
         flow = get_flow(self.do, state)
         return Flow(join_states((flow.success, *flow.failures.values())), {}, flow.halted)
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`ForceSuccess` of BehaviorTree.CPP; without a body, `AlwaysSuccess`."""
+        return Counterpart("ForceSuccess" if self.do else "AlwaysSuccess")

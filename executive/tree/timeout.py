@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from py_trees.common import Status
 
 from executive.skill import Seconds
+from executive.tree.counterpart import Counterpart
 from executive.tree.flow import Flow, FlowFunction, FlowState, PossibleFailure
 from executive.tree.inspection import Advice, MinTimeFunction, NodeAnalysis, NodeFinding, PropagatedFailure
 from executive.tree.keys import Child, key
@@ -20,6 +21,10 @@ class Timeout(ControlNode):
     """Fail with the reason `timeout` if the body takes longer than a limit on the clock of the run.
 
     A body that ends in the same tick in which the clock reaches the limit is in time.
+
+    * BehaviorTree.CPP: `Timeout`. A timer thread halts the body when the wall clock reaches the limit, and
+      the node fails in the next tick.
+    * py_trees: `decorators.Timeout`, with the limit on the wall clock.
     """
 
     keyword = "timeout"
@@ -86,3 +91,8 @@ class Timeout(ControlNode):
         """Yield the advice to increase the limit after a timeout."""
         if failure.child is None:
             yield Advice(f"allow more than {self.seconds:g} s", "seconds")
+
+    @property
+    def counterpart(self) -> Counterpart | None:
+        """`Timeout` of BehaviorTree.CPP, with the limit in whole milliseconds."""
+        return Counterpart("Timeout", {"msec": max(1, int(1000 * min(self.seconds, 1e6)))})

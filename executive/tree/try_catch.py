@@ -33,6 +33,10 @@ class TryCatch(ControlNode):
 
     The node succeeds if the body or the handler succeeds. `finally` runs after success and failure, but not
     after a halt or a fault. A failure of `finally` is passed on unless the body or the handler failed too.
+
+    * BehaviorTree.CPP: custom node `try`. `TryCatch` has one handler for all failures, and fails after the
+      handler has succeeded.
+    * py_trees: no counterpart.
     """
 
     keyword = "try"

@@ -16,6 +16,10 @@ class While(Loop):
     """Run the body as long as a condition succeeds; the condition runs before every iteration.
 
     The loop succeeds when the condition fails; a failure of the body is passed on.
+
+    * BehaviorTree.CPP: custom node `while`. `WhileDoElse` runs its body once, and checks the condition again
+      at every tick.
+    * py_trees: no counterpart.
     """
 
     keyword = "while"

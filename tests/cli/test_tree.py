@@ -116,9 +116,22 @@ def test_json_tells_what_a_skill_reads_writes_and_fails_with(every_node):
     assert {wire["port"]: wire["variable"] for wire in select["reads"]}["wanted"] == "kind"
 
 
+def test_the_format_has_the_same_names_as_the_flags(every_node):
+    for name in ("svg", "dot", "json"):
+        assert shown(every_node, "--format", name).stdout == shown(every_node, f"--{name}").stdout
+
+
+def test_behavior_tree_cpp_gets_a_tree_for_each_subtree(every_node):
+    root = ElementTree.fromstring(shown(every_node, "--format", "btcpp").stdout.encode())
+    assert root.attrib == {"BTCPP_format": "4", "main_tree_to_execute": "every_node"}
+    assert [tree.attrib["ID"] for tree in root.iter("BehaviorTree")] == ["every_node", "look"]
+    assert root.find(".//RejectTarget").attrib["why"] == "<b>&\"'\ufffd ü"
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
+        (("--format", "btcpp", "--dot"), "--dot and --format btcpp exclude each other"),
         (("--svg", "--dot"), "--svg and --dot exclude each other"),
         (("--svg", "--json"), "--svg and --json exclude each other"),
         (("--json", "--dot", "--svg"), "--svg and --dot and --json exclude each other"),

@@ -157,6 +157,12 @@ def test_it_is_drawn(project: Path) -> None:
     assert "⚑" in call("tree", path, "--svg").stdout
 
 
+def test_it_is_a_custom_node_in_behavior_tree_cpp(project: Path) -> None:
+    path = str(write("{race: {head_start: 0.5, do: [Wait: {seconds: 1}, Wait: {seconds: 2}]}}"))
+    xml = call("tree", path, "--format", "btcpp").stdout
+    assert '<race head_start="0.5">' in xml and '<Control ID="race">' in xml
+
+
 def test_the_first_branch_that_succeeds_halts_the_others(project: Path) -> None:
     result = run("{race: {head_start: $pause, do: [Wait: {seconds: 2}, Wait: {seconds: 0.5}]}}")
     assert (result.status, round(result.robot_time, 1)) == ("SUCCESS", 0.8)
