@@ -97,9 +97,8 @@ class _Exporter:
         skill = self._skills[node.skill]
         values = {name: _format_pointer(name) for name in skill.ports}
         values |= {name: self._format(setting.value) for name, setting in node.settings.items()}
-        return self._add(
-            parent, "Action", node.skill, (*skill.params.values(), *skill.ports.values()), values
-        )
+        kind = "Condition" if skill.is_condition else "Action"
+        return self._add(parent, kind, node.skill, (*skill.params.values(), *skill.ports.values()), values)
 
     def _add_use(self, parent: Element, node: nodes.SubtreeNode) -> Element:
         subtree, ports, values = self._mission.subtrees[node.name], [], {}

@@ -288,8 +288,8 @@ def test_the_models_are_the_nodes_that_behavior_tree_cpp_does_not_have(name: str
     used = {node.get("ID", "") if node.tag == "SubTree" else node.tag for node in file.nodes()}
     assert set(file.models) == used - BUILT_IN
     for model_id, model in file.models.items():
-        if model.tag == "Action":
-            skill = SKILLS[model_id]
+        if skill := SKILLS.get(model_id):
+            assert model.tag == ("Condition" if skill.is_condition else "Action")
             outputs = {name for name, port in skill.ports.items() if port.direction is Direction.OUT}
             assert {port.attrib["name"] for port in model.iter("output_port")} == outputs
             inputs = {*skill.params, *skill.ports} - outputs
