@@ -66,6 +66,7 @@ class Param:
         choices: Allowed values, or None for any value.
         refers_to: Kind of the name (`bin`, `detector`, `pose`, `class`) if the value is a name; otherwise "".
         doc: Description of the param.
+        same_as: Unused; see `Port`.
     """
 
     name: str
@@ -77,11 +78,17 @@ class Param:
     choices: tuple[Any, ...] | None
     refers_to: str
     doc: str
+    same_as: str = ""
 
     @property
     def is_required(self) -> bool:
         """True if the mission must set a value."""
         return self.default is ...
+
+    @property
+    def is_name(self) -> bool:
+        """True if the value is a name in the cell or one of `choices`; a variable may then give the value."""
+        return bool(self.refers_to or self.choices)
 
 
 @dataclass(frozen=True)
@@ -95,6 +102,7 @@ class Port:
         default: Value of an input whose variable is unwritten; `...` if the variable must be written.
         refers_to: Kind of the name (`item`, `bin`, `class`) if the value is a name; otherwise "".
         doc: Description of the port.
+        same_as: Name of another input; a constant must be a possible value of the variable of that input.
     """
 
     name: str
@@ -103,6 +111,7 @@ class Port:
     default: Any
     refers_to: str
     doc: str
+    same_as: str = ""
 
     @property
     def is_required(self) -> bool:
@@ -124,9 +133,9 @@ def param(
     return Param("", None, "", default, ge, le, choices, refers_to, doc)
 
 
-def port(*, default: Any = ..., refers_to: str = "", doc: str = "") -> Any:
+def port(*, default: Any = ..., refers_to: str = "", doc: str = "", same_as: str = "") -> Any:
     """Declare a port of a skill; `Port` describes the arguments."""
-    return param(default, refers_to=refers_to, doc=doc)
+    return replace(param(default, refers_to=refers_to, doc=doc), same_as=same_as)
 
 
 class SkillFailed(Exception):
@@ -190,7 +199,8 @@ class Skill:
             direction = next((value for value in metadata if isinstance(value, Direction)), None)
             if direction is not None:
                 entry = declaration if isinstance(declaration, Param) else port()
-                ports[name] = Port(name, value_type, direction, entry.default, entry.refers_to, entry.doc)
+                settings = entry.default, entry.refers_to, entry.doc, entry.same_as
+                ports[name] = Port(name, value_type, direction, *settings)
             elif isinstance(declaration, Param):
                 unit = next((value for value in metadata if isinstance(value, str)), "")
                 params[name] = replace(declaration, name=name, type=value_type, unit=unit)

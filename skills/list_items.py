@@ -28,9 +28,10 @@ class ListItems(Skill):
 
     def run(self, cell: Cell) -> None:
         """Read the items from the ledger."""
-        states = ("open", "deferred") if self.state == "open" else (self.state,)
         self.items = [
             known.item
             for known in cell.ledger.list_known_items()
-            if known.state in states and self.class_ in ("", known.label) and self.bin in ("", known.bin)
+            if (known.is_open if self.state == "open" else known.state == self.state)
+            and self.class_ in ("", known.label)
+            and self.bin in ("", known.bin)
         ]

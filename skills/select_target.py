@@ -82,7 +82,7 @@ class SelectTarget(Skill):
         if self.among is None:
             return self.same is None and cell.ledger.is_table_empty(self.wanted, self.not_ or ())
         known_items = [item for item in cell.ledger.list_known_items() if self._is_requested(cell, item.item)]
-        return not any(item.state in ("open", "deferred", "lost") for item in known_items)
+        return not any(item.is_open or item.state == "lost" for item in known_items)
 
     def _explain_missing_candidate(self, cell: Cell) -> SkillFailed:
         """Return the failure with the reason why there is no candidate."""

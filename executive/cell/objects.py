@@ -4,11 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 from executive.geometry import Array
 
 Item = str
 """Id of one physical object in the ledger, for instance `cube-2`."""
+
+
+@dataclass(frozen=True)
+class RefersTo:
+    """Marker in the type of a field: the field contains the name of an `item`, a `class` or a `bin`."""
+
+    kind: str
+
+
+ItemName = Annotated[Item, RefersTo("item")]
+ClassName = Annotated[str, RefersTo("class")]
+BinName = Annotated[str, RefersTo("bin")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +38,8 @@ class Target:
         stamp: Capture time of the last frame that showed the item [s].
     """
 
-    item: Item
-    label: str
+    item: ItemName
+    label: ClassName
     position: Array
     confidence: float
     frame: int
@@ -36,7 +49,7 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class KnownItem:
-    """Present knowledge of the ledger about an item.
+    """Present knowledge of the ledger about an item; a mission reads the fields as `$item.attempts`.
 
     Attributes:
         item: Id of the item.
@@ -50,14 +63,19 @@ class KnownItem:
         turn: Rank among the deferred items, the first deferred one first; 0 if the item is not deferred.
     """
 
-    item: Item
-    label: str
+    item: ItemName
+    label: ClassName
     state: str
-    bin: str
+    bin: BinName
     position: Array
     attempts: int
     deferrals: int
     turn: int
+
+    @property
+    def is_open(self) -> bool:
+        """True if the item still has to be sorted and is not lost."""
+        return self.state in ("open", "deferred")
 
 
 @dataclass(frozen=True)

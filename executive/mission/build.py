@@ -64,7 +64,9 @@ class TreeBuilder:
 
     def build_node(self, node: Node) -> TreeNode:
         """Return the behaviour for a node of the mission, with the behaviours of all nodes below it."""
-        context = NodeContext(node.path, self.cell.clock, self.blackboard, node.label, self.emit)
+        context = NodeContext(
+            node.path, self.cell.clock, self.blackboard, node.label, self.emit, self._list_open_items
+        )
         match node:
             case SkillNode():
                 return self._build_skill_leaf(context, node)
@@ -78,13 +80,18 @@ class TreeBuilder:
                 return root
         raise AssertionError(f"a checked mission contains no {type(node).__name__}")
 
+    def _list_open_items(self) -> list[str]:
+        return [known.item for known in self.cell.ledger.list_known_items() if known.is_open]
+
     def _build_skill_leaf(self, context: NodeContext, node: SkillNode) -> TreeNode:
         skill = self.skills[node.skill]
         declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
         types = {name: declaration.type for name, declaration in declarations.items()}
+        input_wires = list(find_wires(node, skill, Direction.IN))
         wiring = Wiring(
             constants={name: convert_value(value.value, types[name]) for name, value in find_literals(node)},
-            inputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.IN)},
+            inputs={wire.port.name: wire.variable for wire in input_wires},
+            fields={wire.port.name: wire.field for wire in input_wires if wire.field},
             outputs={wire.port.name: wire.variable for wire in find_wires(node, skill, Direction.OUT)},
         )
         patterns = (pattern for pattern in self.substitutes if fnmatchcase(node.path, pattern))

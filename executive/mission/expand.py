@@ -6,18 +6,27 @@ The checks and the tree builder get only the expanded tree, in which every refer
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TypeVar, cast
 
 from executive.mission.findings import Finding, find_similar_word, make_error, make_warning, suggest_choice
 from executive.mission.model.mission import Mission, Subtree
 from executive.mission.model.node_paths import get_type_name
-from executive.mission.model.nodes import InvalidNode, Node, NodeSection, SkillNode, SubtreeNode
-from executive.mission.model.values import LocatedName, Reference, Setting, Value
+from executive.mission.model.nodes import (
+    InnerNode,
+    InvalidNode,
+    Node,
+    NodeSection,
+    SkillNode,
+    SubtreeNode,
+    iterate_keys,
+)
+from executive.mission.model.values import Literal, LocatedName, Reference, Setting, Value
 from executive.mission.model.wiring import find_control_node_outputs, find_written_variables
 from executive.mission.source import Span
 from executive.skill import Direction, Skill
+from executive.tree.keys import KeyKind
 
 _MAX_DEPTH = 40
 """Maximum depth of an expanded tree."""
@@ -48,9 +57,14 @@ class ExpandedMission:
     findings: tuple[Finding, ...]
 
 
-def expand(mission: Mission, skills: Mapping[str, type[Skill]]) -> ExpandedMission:
-    """Return the mission with expanded subtrees, params and arguments."""
-    expander = _Expander(mission, skills)
+def expand(
+    mission: Mission, skills: Mapping[str, type[Skill]], names_by_word: Mapping[str, Sequence[str]]
+) -> ExpandedMission:
+    """Return the mission with expanded subtrees, params, arguments and words for lists.
+
+    `names_by_word` contains the names for which an `ElementWord` stands; without an entry, a word remains.
+    """
+    expander = _Expander(mission, skills, names_by_word)
     tree = None if mission.tree is None else expander.expand_tree(mission.tree, expander.params)
     unused_subtrees = []
     subtree_nodes = [node for subtree in mission.subtrees.values() for node in subtree.body.walk()]
@@ -81,8 +95,10 @@ class _Expander:
         used_names: Names of used subtrees; for a misspelt name, also the most similar name.
     """
 
-    def __init__(self, mission: Mission, skills: Mapping[str, type[Skill]]) -> None:
-        self.mission, self.skills = mission, skills
+    def __init__(
+        self, mission: Mission, skills: Mapping[str, type[Skill]], names_by_word: Mapping[str, Sequence[str]]
+    ) -> None:
+        self.mission, self.skills, self._names_by_word = mission, skills, names_by_word
         self.params: ValuesByName = {name: param.value for name, param in mission.params.items()}
         self.findings: list[Finding] = []
         self.used_names: set[str] = set()
@@ -131,8 +147,19 @@ class _Expander:
             return _map_parts(part, expand_part)
 
         self.findings += self._find_shadowed_names(node, values)
-        expanded = _map_parts(node, expand_part)
+        expanded = self._expand_words(_map_parts(node, expand_part))
         return self._expand_use(expanded, callers, depth) if isinstance(expanded, SubtreeNode) else expanded
+
+    def _expand_words(self, node: Node) -> Node:
+        """Return a control node with lists of names in place of words such as `bins`."""
+        if not isinstance(node, InnerNode):
+            return node
+        values = dict(node.values)
+        for key, value in iterate_keys(node):
+            if key.kind is KeyKind.ELEMENTS and isinstance(value, Literal) and isinstance(value.value, str):
+                names = self._names_by_word.get(value.value)
+                values[key.name] = value if names is None else replace(value, value=list(names))
+        return replace(node, values=values)
 
     def _find_shadowed_names(self, node: Node, values: ValuesByName) -> Iterator[Finding]:
         """Yield an error for every output variable of a node that has the name of a param or argument."""
@@ -159,8 +186,16 @@ class _Expander:
         name = reference.name if value is not None else find_similar_word(reference.name, values)
         is_argument = bool(callers) and name in self.mission.subtrees[callers[-1]].arguments
         self._referenced_names.add((callers[-1] if is_argument else "", name or ""))
-        if value is None or isinstance(value, Reference):
-            return value or reference
+        if value is None:
+            return reference
+        if reference.field and (isinstance(value, Literal) or value.field):
+            text = f"the field {value}" if isinstance(value, Reference) else "a constant"
+            message = f"${reference.name} is {text}, which has no field {reference.field}"
+            self._add_error(reference.span, "unknown-field", message)
+        elif isinstance(value, Reference):
+            return replace(value, field=reference.field or value.field)
+        if isinstance(value, Reference):
+            return value
         # A finding about the value is located at the value, so the message must contain the reference.
         origin = f"${reference.name} in {reference.span.describe_place(value.span.source)}"
         return replace(value, origin=origin, reference_span=reference.span)
@@ -231,7 +266,7 @@ class _Expander:
                 hint = suggest_choice(name, returned_names, "Returned variables")
                 message = f'the subtree "{subtree.name}" does not return "{name}"'
                 self._add_error(setting.name_span, "unknown-return", message, hint)
-            elif isinstance(setting.value, Reference):
+            elif isinstance(setting.value, Reference) and not setting.value.field:
                 variables[name] = setting.value.name
             else:
                 message = f"returns.{name} must be a variable, for example $mine"

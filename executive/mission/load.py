@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
@@ -27,6 +27,7 @@ from executive.mission.parse.validate import find_span
 from executive.mission.text.file_search import find_mission, get_shipped_folder
 from executive.perception.envelope.rated_detectors import find_unmeasured_detectors
 from executive.skill import Skill
+from executive.tree.keys import ElementWord
 from executive.tree.node_registry import load_control_nodes
 
 CellKindFinder = Callable[[str], CellKind]
@@ -116,7 +117,7 @@ def load_mission(
             findings += cell_findings
             classes_by_detector = dict(cell_kind.labels(config, folder))
             min_times = None if cell_findings else cell_kind.min_times(config)
-    expansion = expand(mission, skills)
+    expansion = expand(mission, skills, _list_names_by_word(mission, config) if config else {})
     tree = assign_paths(expansion.tree or InvalidNode(files.source.make_span(), label=""))
     context = CheckContext(
         mission, tree, expansion.unused_subtrees, skills, node_classes, config, classes_by_detector, min_times
@@ -132,6 +133,15 @@ def load_mission(
         find_unhandled_failures(context.flow_analysis), sort_findings(findings, files.source.path),
         dict(overrides or {}),
     )  # fmt: skip
+
+
+def _list_names_by_word(mission: Mission, config: CellConfig) -> dict[str, Sequence[str]]:
+    """Return the names for which each word for a constant list stands."""
+    return {
+        ElementWord.POSES.value: next(iter(config.cameras.values())).scan_poses,
+        ElementWord.BINS.value: list(config.bins),
+        ElementWord.CLASSES.value: [route.label for route in mission.routes],
+    }
 
 
 def _warn_about_unmeasured_detectors(cell: CellFile) -> Iterator[Finding]:

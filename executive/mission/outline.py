@@ -167,8 +167,11 @@ def _describe_skill(node: OutlineNode, leaf: SkillLeaf) -> OutlineNode:
     skill, wiring, ports = leaf.skill_type, leaf.wiring, leaf.skill_type.ports
 
     def make_connections(variables_by_port: Mapping[str, str]) -> tuple[Connection, ...]:
-        pairs = variables_by_port.items()
-        return tuple(Connection(port, variable, ports[port].default is ...) for port, variable in pairs)
+        pairs = ((name, name in ports and ports[name].default is not ...) for name in variables_by_port)
+        return tuple(
+            Connection(name, variables_by_port[name] + wiring.make_field_suffix(name), not has_default)
+            for name, has_default in pairs
+        )
 
     return replace(
         node,

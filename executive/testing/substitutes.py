@@ -14,7 +14,7 @@ from typing import Any, cast
 
 from executive.cell.protocols import Cell, Steps
 from executive.errors import InputError
-from executive.skill import Direction, Skill
+from executive.skill import Direction, Skill, get_attribute_name
 
 RunMethod = Callable[[Skill, Cell], Steps | None]
 """Type of the method `run` of a skill."""
@@ -60,7 +60,7 @@ def make_succeeding(
         for _ in range(delay_steps):
             yield
         for name, value in values.items():
-            setattr(self, name, value)
+            setattr(self, get_attribute_name(name), value)
 
     return make_substitute(skill, "Succeeding", run)
 

@@ -10,7 +10,7 @@ from executive.cell.objects import Target
 from executive.errors import Fault
 from executive.tree.flow import Flow, FlowFunction, FlowState, find_fixed_point, join_states
 from executive.tree.inspection import MinTimeFunction, PropagatedFailure
-from executive.tree.keys import Child, Elements, VariableName, key
+from executive.tree.keys import Child, Elements, ElementWord, VariableName, key
 from executive.tree.loop import Loop
 
 
@@ -30,14 +30,17 @@ class ForEach(Loop):
     symbol = "∀"
 
     each: VariableName = key(list_key="in", doc="Variable that holds the current element.")
-    in_: Elements = key(doc="List, or variable that holds a list.")
+    in_: Elements = key(doc="List, variable that holds a list, or `poses`, `bins`, `classes` or `items`.")
     do: Child = key(doc="Body of the loop.")
 
     @property
     def detail(self) -> str:
         """The variable of the current element and the list, as a text."""
+        if isinstance(self.in_, ElementWord):
+            return f"${self.each} in {self.in_.value}"
         if isinstance(self.in_, VariableName):
-            return f"${self.each} in ${self.in_}"
+            field = f".{self.in_.field}" if self.in_.field else ""
+            return f"${self.each} in ${self.in_}{field}"
         return f"${self.each} in [{', '.join(map(str, self.in_))}]"
 
     def start(self) -> None:
@@ -79,9 +82,13 @@ class ForEach(Loop):
 
     def _read_list(self) -> tuple[object, ...]:
         variable = self.in_
+        if isinstance(variable, ElementWord):
+            return tuple(self.list_open_items())
         if not isinstance(variable, VariableName):
             return variable
         value = self.blackboard.get(variable)
+        if variable.field and value is not None:
+            value = getattr(value, variable.field)
         if isinstance(value, list | tuple):
             return tuple(value)
         problem = f"it reads {self.blackboard.describe_missing(variable)}"
@@ -96,8 +103,8 @@ class ForEach(Loop):
             return Flow(state, {}, None)
         entry = state.with_variables([self.each])
         body, entry = find_fixed_point(get_flow, self.do, entry, lambda body: body.success)
-        # A list in a variable may be empty.
-        success = join_states((body.success, state if isinstance(self.in_, VariableName) else None))
+        # A list that is unknown before the run may be empty.
+        success = join_states((body.success, None if isinstance(self.in_, tuple) else state))
         # A halt is also possible between two iterations.
         halted = join_states((body.halted, entry))
         return Flow(
@@ -108,7 +115,7 @@ class ForEach(Loop):
 
     def min_time(self, get_min_time: MinTimeFunction) -> float:
         """Return the minimum time of all iterations [s]; 0 if the number of iterations is unknown."""
-        return 0.0 if isinstance(self.in_, VariableName) else len(self.in_) * get_min_time(self.do)
+        return len(self.in_) * get_min_time(self.do) if isinstance(self.in_, tuple) else 0.0
 
     def explain_unreachable(self, child: Child) -> str:
         """Return a text that explains why the body never runs: the list is empty."""

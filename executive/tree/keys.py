@@ -19,15 +19,40 @@ Child: TypeAlias = Behaviour
 
 
 class VariableName(str):
-    """Name of a variable of the mission."""
+    """Name of a variable of the mission.
+
+    Attributes:
+        field: Name of a field of the value; "" for the whole value.
+    """
+
+    field: str
+
+    def __new__(cls, name: str, field: str = "") -> VariableName:
+        """Return the name of a variable or of a field of its value."""
+        variable = super().__new__(cls, name)
+        variable.field = field
+        return variable
+
+
+class ElementWord(Enum):
+    """Word that stands for a list of names."""
+
+    POSES = "poses"
+    """The scan poses of the camera."""
+    BINS = "bins"
+    """The bins of the cell."""
+    CLASSES = "classes"
+    """The classes with a route."""
+    ITEMS = "items"
+    """The items that still have to be sorted at the start of the node; all other words are constant lists."""
 
 
 Children: TypeAlias = tuple[Child, ...]
 """Type of a key with a list of nodes."""
 Reasons: TypeAlias = tuple[Reason, ...]
 """Type of a key with a list of reasons."""
-Elements: TypeAlias = tuple[object, ...] | VariableName
-"""Type of a key with a list of values, or with the name of a variable that holds a list."""
+Elements: TypeAlias = tuple[object, ...] | VariableName | ElementWord
+"""Type of a key with a list of values, the name of a variable that holds a list, or a word for a list."""
 
 
 class KeyKind(Enum):

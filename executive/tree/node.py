@@ -7,7 +7,7 @@ and `explain` for the diagnosis.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -37,6 +37,7 @@ class NodeContext:
         blackboard: Variables of the run.
         label: Label of the node in the mission, or "".
         emit: Function that emits the events of the node.
+        list_open_items: Function that returns the names of the items that still have to be sorted.
     """
 
     path: str
@@ -44,6 +45,7 @@ class NodeContext:
     blackboard: Blackboard
     label: str = ""
     emit: Emit = discard_event
+    list_open_items: Callable[[], Sequence[str]] = tuple
 
 
 class TreeNode(Behaviour):
@@ -105,6 +107,7 @@ class ControlNode(KeyOwner, TreeNode):
             follows. "" if this node handles no failures.
         keyword_hints: Hints for authors, by the wrong keyword that an author writes instead of `keyword`.
         clock: Clock of the run.
+        list_open_items: Function that returns the names of the items that still have to be sorted.
     """
 
     keyword: ClassVar[str] = ""
@@ -116,7 +119,7 @@ class ControlNode(KeyOwner, TreeNode):
 
     def __init__(self, context: NodeContext, **values: object) -> None:
         super().__init__(context, self.keyword)
-        self.clock = context.clock
+        self.clock, self.list_open_items = context.clock, context.list_open_items
         self.set_key_values(values)
         self.children = [child for key in self.keys for child in self.list_children(key)]
         for child in self.children:

@@ -27,11 +27,17 @@ class Wiring:
         constants: Values of params and inputs from the mission file, by the name of the param or input.
         inputs: Names of the variables from which inputs are read, by the name of the input.
         outputs: Names of the variables to which outputs are written, by the name of the output.
+        fields: Fields of the variables that inputs read, by the name of the input; without whole values.
     """
 
     constants: Mapping[str, object] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)
     outputs: Mapping[str, str] = field(default_factory=dict)
+    fields: Mapping[str, str] = field(default_factory=dict)
+
+    def make_field_suffix(self, name: str) -> str:
+        """Return `.label` for a port that reads the field `label` of its variable; "" for the whole value."""
+        return f".{self.fields[name]}" if name in self.fields else ""
 
 
 class SkillLeaf(TreeNode):
@@ -62,7 +68,7 @@ class SkillLeaf(TreeNode):
         texts += [f"{name}: {_format_value(value)}" for name, value in self.wiring.constants.items()]
         for port, variable in {**self.wiring.inputs, **self.wiring.outputs}.items():
             # A variable of a subtree has the name of the subtree as a prefix: `pick.target`.
-            name = variable.rpartition(".")[2]
+            name = variable.rpartition(".")[2] + self.wiring.make_field_suffix(port)
             if name != port:
                 texts.append(f"{port}: ${name}")
         return ", ".join(texts)
@@ -117,10 +123,16 @@ class SkillLeaf(TreeNode):
         inputs = {}
         for port, variable in self.wiring.inputs.items():
             if variable in self.blackboard:
-                inputs[port] = self.blackboard[variable]
-            elif self.skill_type.ports[port].is_required:
+                inputs[port] = self._read_value(self.blackboard[variable], self.wiring.fields.get(port))
+            elif port not in self.skill_type.ports or self.skill_type.ports[port].is_required:
                 raise Fault(f'the input "{port}" reads {self.blackboard.describe_missing(variable)}')
         return inputs
+
+    def _read_value(self, value: object, field_name: str | None) -> object:
+        """Return a value, or a field of the value; the fields of an item are those in the ledger now."""
+        if field_name is None:
+            return value
+        return getattr(self._cell.ledger.describe(value) if isinstance(value, str) else value, field_name)
 
     def _find_item(self, values: Mapping[str, object]) -> str:
         """Return the item on which the skill acts, from the values of its ports; "" for no item."""

@@ -199,7 +199,7 @@ def sound(tree: Tree) -> CheckContext | None:
     assert root is not None
     parser = NodeParser([], SKILLS, load_control_nodes())
     mission, malformed = parse_mission(root, {}, parser), parser.findings
-    expanded = expand(mission, SKILLS)
+    expanded = expand(mission, SKILLS, {})
     assert expanded.tree is not None
     case = CheckContext(
         mission, assign_paths(expanded.tree), (), SKILLS, load_control_nodes(), None, {}, None

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from executive.cell.objects import Item
 from executive.mission.check.context import CheckContext
+from executive.mission.check.skill_settings import find_param_problem, find_unknown_names
 from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, suggest_choice
 from executive.mission.model.conversion import find_input_problem
 from executive.mission.model.node_paths import get_type_name
-from executive.mission.model.nodes import InnerNode, Node
-from executive.mission.model.port_types import describe_type, find_element_type, is_assignable
+from executive.mission.model.nodes import InnerNode, Node, SkillNode
+from executive.mission.model.port_types import describe_type, find_element_type, find_fields, is_assignable
 from executive.mission.model.values import Literal, Reference
-from executive.mission.model.wiring import Wire, find_control_node_outputs
+from executive.mission.model.wiring import Wire, find_control_node_outputs, find_literals
 from executive.mission.source import Span
-from executive.skill import Direction
+from executive.skill import Direction, Param
+from executive.tree.keys import ElementWord
 
 
 @dataclass(frozen=True)
@@ -56,13 +59,19 @@ def check_port_types(context: CheckContext) -> Iterator[Finding]:
 
     def check_below(node: Node, loop_writers: WritersByVariable) -> Iterator[Finding]:
         for loop in _find_element_loops(node):
-            list_writers = loop.find_list_writers({**skill_writers, **loop_writers})
+            all_writers = {**skill_writers, **loop_writers}
+            if isinstance(reference := loop.elements, Reference):
+                yield from _check_field(loop.keyword, reference, all_writers.get(reference.name, ()))
+            list_writers = loop.find_list_writers(all_writers)
             yield from loop.check_lists(list_writers)
-            writers = [element for writer in list_writers for element in loop.make_element_writers(writer)]
-            loop_writers = {**loop_writers, loop.variable: writers}
+            elements = [element for writer in list_writers for element in loop.make_element_writers(writer)]
+            loop_writers = {**loop_writers, loop.variable: elements}
         for wire in context.find_wires(node, Direction.IN):
-            for writer in loop_writers.get(wire.variable, skill_writers.get(wire.variable, ())):
+            writers = loop_writers.get(wire.variable, skill_writers.get(wire.variable, ()))
+            yield from _check_field(str(wire), wire.reference, writers)
+            for writer in _select_field(writers, wire.field):
                 yield from _check_connection(context, wire, writer)
+                yield from _check_compared_constants(context, node, wire, writer)
         for child in node.children:
             yield from check_below(child, loop_writers)
 
@@ -90,9 +99,11 @@ class ElementLoop:
     def find_list_writers(self, writers: WritersByVariable) -> Sequence[Writer]:
         """Return the writers of the list; the control node itself counts as the writer of a constant list."""
         if isinstance(self.elements, Literal):
+            if self.elements.value == ElementWord.ITEMS.value:
+                return [Writer(self.keyword, self.span, list[Item], "item")]
             values = ((self.elements.value, self.elements.span),)
             return [Writer(self.keyword, self.span, list[Any], "", values)]
-        return writers.get(self.elements.name, ())
+        return list(_select_field(writers.get(self.elements.name, ()), self.elements.field))
 
     def check_lists(self, list_writers: Iterable[Writer]) -> Iterator[Finding]:
         """Yield an error for each writer that writes another value than a list to the variable `elements`."""
@@ -131,30 +142,77 @@ def _find_element_loops(node: Node) -> Iterator[ElementLoop]:
             yield ElementLoop(get_type_name(node), node.span, variable.name, key.list_key, elements)
 
 
+def _check_field(reader: str, reference: Reference, writers: Iterable[Writer]) -> Iterator[Finding]:
+    """Yield an error for each writer whose values lack the field that `reader` reads."""
+    for writer in writers if reference.field else ():
+        fields = find_fields(writer.type, writer.refers_to)
+        if reference.field not in fields:
+            is_constant = writer.values is not None
+            values = "a constant" if is_constant else describe_values(writer.type, writer.refers_to)
+            message = f"{reader} reads {reference}, but ${reference.local_name} holds {values}"
+            fields_hint = suggest_choice(reference.field, fields, "Fields") if fields else "It has no fields."
+            hint = f"{fields_hint} It is written by {writer.describe(reference.span)}."
+            yield make_error(reference.span, "unknown-field", message, hint)
+
+
+def _select_field(writers: Iterable[Writer], field: str) -> Iterator[Writer]:
+    """Yield a writer of a field for each writer of values that have the field; "" for the whole value."""
+    for writer in writers:
+        if not field:
+            yield writer
+        elif found := find_fields(writer.type, writer.refers_to).get(field):
+            yield replace(writer, type=found.type, refers_to=found.refers_to)
+
+
 def _check_connection(context: CheckContext, wire: Wire, writer: Writer) -> Iterator[Finding]:
     """Yield an error for each value or type of a writer that does not fit the input `wire`."""
-    port = wire.port
-    port_type = f"the name of {_add_article(port.refers_to)}" if port.refers_to else describe_type(port.type)
+    port, choices = wire.port, (wire.port.choices or ()) if isinstance(wire.port, Param) else ()
+    port_type = describe_values(port.type, port.refers_to)
+    if choices and not port.refers_to:
+        port_type = " or ".join(map(str, choices))
     for value, span in writer.values or ():
         names = context.names_in_cell_by_kind.get(port.refers_to)
-        if find_input_problem(value, port):
+        if find_param_problem(port, value)[0] if isinstance(port, Param) else find_input_problem(value, port):
             message = f"{wire} takes {port_type}, but ${wire.variable} gets {describe_value(value)} here"
             hint = f"{wire} reads ${wire.variable} in {wire.span.describe_place(span.source)}."
             yield make_error(span, "port-type", message, hint)
-        elif names is not None and isinstance(value, str) and value not in names:
+        elif names is not None and isinstance(value, str) and value not in (*names, *choices):
             message = f'the cell has no {port.refers_to} "{value}" for {wire}'
-            hint = suggest_choice(value, names, "Allowed names")
+            hint = suggest_choice(value, [*names, *choices], "Allowed names")
             yield make_error(span, f"unknown-{port.refers_to}", message, hint)
     if writer.values is not None:
         return
-    if not is_assignable(writer.type, port.type):
-        written_type = describe_type(writer.type)
-    elif port.refers_to and writer.refers_to != port.refers_to:
-        written_type = f"the name of {_add_article(writer.refers_to)}" if writer.refers_to else "any text"
-    else:
+    has_type = is_assignable(writer.type, port.type)
+    if has_type and (writer.refers_to == port.refers_to if port.refers_to else not choices):
         return
-    message = f"{wire} takes {port_type}, but ${wire.variable} holds {written_type}"
+    is_any_text = has_type and not writer.refers_to
+    written_type = "any text" if is_any_text else describe_values(writer.type, writer.refers_to)
+    message = f"{wire} takes {port_type}, but {wire.reference} holds {written_type}"
     yield make_error(wire.span, "port-type", message, f"It is written by {writer.describe(wire.span)}.")
+
+
+def _check_compared_constants(
+    context: CheckContext, node: Node, wire: Wire, writer: Writer
+) -> Iterator[Finding]:
+    """Yield an error for each constant that a node compares with an input, and that can never be equal."""
+    for name, value in find_literals(node) if isinstance(node, SkillNode) and writer.values is None else ():
+        port = context.skills[wire.skill].ports.get(name)
+        if port is None or port.same_as != wire.port.name:
+            continue
+        expected = replace(port, type=writer.type, refers_to=writer.refers_to)
+        yield from find_unknown_names(context, wire.skill, expected, value)
+        if not is_assignable(type(value.value), expected.type):
+            kind = describe_values(expected.type, expected.refers_to)
+            message = f"{wire.reference} is {kind}, and never {describe_value(value.value)}"
+            yield make_error(value.span, "port-type", message, f"{wire.skill} compares both.")
+
+
+def describe_values(declared_type: object, refers_to: str) -> str:
+    """Return a description of the values of a type, of which texts name things of the kind `refers_to`."""
+    if not refers_to:
+        return describe_type(declared_type)
+    is_list = not is_assignable(str, declared_type)
+    return f"a list of names of {refers_to}s" if is_list else f"the name of {_add_article(refers_to)}"
 
 
 def _add_article(noun: str) -> str:

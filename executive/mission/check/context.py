@@ -17,7 +17,7 @@ from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNod
 from executive.mission.model.values import Reference
 from executive.mission.model.wiring import Wire, find_control_node_inputs, find_wires, find_written_variables
 from executive.mission.source import Span
-from executive.skill import Direction, Skill
+from executive.skill import Direction, Port, Skill
 from executive.tree.node_registry import ControlNodes
 
 
@@ -147,4 +147,7 @@ class CheckContext:
     def find_wires(self, node: Node, direction: Direction) -> Iterator[Wire]:
         """Yield the connections of the ports of a node; none if the node is no installed skill."""
         if isinstance(node, SkillNode) and node.skill in self.skills:
-            yield from find_wires(node, self.skills[node.skill], direction)
+            for wire in find_wires(node, self.skills[node.skill], direction):
+                # `check_settings` reports a param with a variable that no node writes.
+                if isinstance(wire.port, Port) or wire.variable in self.written_variables:
+                    yield wire

@@ -8,7 +8,7 @@ from typing import cast
 from executive.mission.check.context import CheckContext
 from executive.mission.check.node_min_times import compute_min_time
 from executive.mission.descriptions import describe_value
-from executive.mission.findings import Finding, make_error, make_warning
+from executive.mission.findings import Finding, find_similar_word, make_error, make_warning
 from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.instance import find_upper_bound, get_mission_node, make_inspection_instance
 from executive.mission.model.node_paths import get_path_name
@@ -18,7 +18,10 @@ from executive.skill import Skill
 from executive.tree.failure import Reason
 from executive.tree.flow import Flow
 from executive.tree.inspection import NodeFinding
-from executive.tree.keys import Child, Key, KeyKind
+from executive.tree.keys import Child, ElementWord, Key, KeyKind
+
+ELEMENT_WORDS = tuple(word.value for word in ElementWord)
+"""Words that stand for a list of names."""
 
 
 def check_constants(context: CheckContext) -> Iterator[Finding]:
@@ -36,13 +39,18 @@ def _check_keys(context: CheckContext, owner: InnerNode | NodeSection, name: str
             max_value = find_upper_bound(owner, key)
             yield from _check_constant(context, f"{name}.{key.name}", key, value, max_value)
         elif (
-            key.kind is KeyKind.ELEMENTS and isinstance(value, Literal) and not isinstance(value.value, list)
+            key.kind is KeyKind.ELEMENTS
+            and isinstance(value, Literal)
+            and not isinstance(value.value, list)
+            and value.value not in ELEMENT_WORDS
         ):
             description = f"{describe_value(value.value)}{value.origin_note}"
-            message = f"{name}.{key.name} must be a list or a variable, not {description}"
+            words = ", ".join(ELEMENT_WORDS)
+            message = f"{name}.{key.name} must be a list, a variable, or one of {words}, not {description}"
             is_text_at_key = isinstance(value.value, str) and not value.origin
-            hint = f"Write a list: [{value.value}]." if is_text_at_key else ""
-            yield make_error(value.span, "wrong-type", message, hint)
+            similar_word = find_similar_word(str(value.value), ELEMENT_WORDS)
+            hint = f'Did you mean "{similar_word}"?' if similar_word else f"Write a list: [{value.value}]."
+            yield make_error(value.span, "wrong-type", message, hint if is_text_at_key else "")
 
 
 def _check_constant(

@@ -10,7 +10,7 @@ from executive.mission.model.conversion import WrongType, convert_value
 from executive.mission.model.instance import get_mission_node, has_valid_constants, make_inspection_instance
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, SubtreeNode
 from executive.mission.model.wiring import find_literals
-from executive.skill import HOLDING, Param, Port
+from executive.skill import HOLDING, Direction, Param, Port
 
 
 def compute_min_time(context: CheckContext, node: Node) -> float:
@@ -31,6 +31,8 @@ def _compute_min_time_of_skill(context: CheckContext, node: SkillNode) -> float:
     if skill is None or context.min_times is None:
         return 0.0
     declarations: Mapping[str, Param | Port] = {**skill.params, **skill.ports}
+    if any(isinstance(wire.port, Param) for wire in context.find_wires(node, Direction.IN)):
+        return 0.0  # a variable gives the value of a param
     values = {name: param.default for name, param in skill.params.items() if not param.is_required}
     for name, literal in find_literals(node):
         try:

@@ -10,7 +10,7 @@ from executive.mission.descriptions import describe_value
 from executive.mission.findings import Finding, make_error, suggest_choice, suggest_word
 from executive.mission.model.conversion import WrongType, convert_value, find_input_problem
 from executive.mission.model.nodes import SkillNode
-from executive.mission.model.values import Literal
+from executive.mission.model.values import Literal, Reference
 from executive.mission.model.wiring import find_literals
 from executive.mission.source import Span
 from executive.skill import Direction, Param, Port
@@ -37,17 +37,28 @@ def check_settings(context: CheckContext) -> Iterator[Finding]:
                 yield make_error(setting.name_span, "unknown-param", message, hint)
             elif isinstance(setting.value, Literal):
                 yield from _check_value(context, node, declarations[name], setting.value)
-                yield from _find_unknown_names(context, node, declarations[name], setting.value)
-            elif name in skill.params:
-                reference = setting.value
-                problem = f"must be a constant, but ${reference.name} is neither a param nor an argument"
-                hint = context.make_unknown_param_hint(reference)
-                yield make_error(reference.span, "unknown-param", f"{node.skill}.{name} {problem}", hint)
+                yield from find_unknown_names(context, node.skill, declarations[name], setting.value)
+            else:
+                yield from _check_reference(context, node.skill, declarations[name], setting.value)
         for param in skill.params.values():
             if param.is_required and param.name not in node.settings:
                 message = f'{node.skill} needs the param "{param.name}"'
                 hint = param.doc and f"{param.name}: {param.doc}."
                 yield make_error(node.span, "missing-param", message, hint)
+
+
+def _check_reference(
+    context: CheckContext, skill: str, declaration: Param | Port, reference: Reference
+) -> Iterator[Finding]:
+    """Yield an error for a variable that gives the value of a constant, and for an output to a field."""
+    name = f"{skill}.{declaration.name}"
+    if isinstance(declaration, Port):
+        if declaration.direction is Direction.OUT and reference.field:
+            message = f"{name} is an output: it writes a whole variable, not the field {reference.field}"
+            yield make_error(reference.span, "wrong-type", message, f"Write ${reference.local_name}.")
+    elif not declaration.is_name or reference.name not in context.written_variables:
+        message = f"{name} must be a constant, but ${reference.name} is neither a param nor an argument"
+        yield make_error(reference.span, "unknown-param", message, context.make_unknown_param_hint(reference))
 
 
 def _check_value(
@@ -69,8 +80,8 @@ def _check_value(
         yield make_error(value.span, code, f"{name} {problem}{value.origin_note}", hint)
 
 
-def _find_unknown_names(
-    context: CheckContext, node: SkillNode, declaration: Param | Port, value: Literal
+def find_unknown_names(
+    context: CheckContext, skill: str, declaration: Param | Port, value: Literal
 ) -> Iterator[Finding]:
     """Yield an error for each constant that names a bin, class, pose or detector that the cell lacks."""
     if declaration.refers_to not in context.names_in_cell_by_kind or value.value == declaration.default:
@@ -79,7 +90,7 @@ def _find_unknown_names(
     allowed_names = [*context.names_in_cell_by_kind[declaration.refers_to], *(choices or ())]
     for index, name in enumerate(value.value if isinstance(value.value, list) else [value.value]):
         if isinstance(name, str) and name not in allowed_names:
-            message = f'the cell has no {declaration.refers_to} "{name}" for {node.skill}.{declaration.name}'
+            message = f'the cell has no {declaration.refers_to} "{name}" for {skill}.{declaration.name}'
             hint = context.make_variable_hint(name) or suggest_choice(name, allowed_names, "Allowed names")
             yield make_error(value.get_element_span(index), f"unknown-{declaration.refers_to}", message, hint)
 
@@ -96,7 +107,7 @@ def find_param_problem(param: Param, value: object) -> tuple[str, str]:
         return "out-of-range", f"must be at least {param.ge:g}{unit}, not {describe_value(value)}"
     if number is not None and param.le is not None and number > param.le:
         return "out-of-range", f"must be at most {param.le:g}{unit}, not {describe_value(value)}"
-    # If a param refers to names of the cell, `choices` allows more values; `_find_unknown_names` checks both.
+    # If a param refers to names of the cell, `choices` allows more values; `find_unknown_names` checks both.
     if param.choices is not None and not param.refers_to and converted not in param.choices:
         allowed = " or ".join(
             f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in param.choices

@@ -13,9 +13,9 @@ from py_trees.common import Status
 from executive.cell.protocols import Clock
 from executive.mission.model.conversion import WrongType, convert_constant
 from executive.mission.model.nodes import InnerNode, KeyValue, Node, NodeOrSection, NodeSection, list_nodes
-from executive.mission.model.values import FailureName, Literal, LocatedName
+from executive.mission.model.values import FailureName, Literal, LocatedName, Reference
 from executive.tree.blackboard import Blackboard
-from executive.tree.keys import Child, Key, KeyKind, VariableName
+from executive.tree.keys import Child, ElementWord, Key, KeyKind, VariableName
 from executive.tree.node import ControlNode, NodeContext
 
 BuildChild = Callable[[Node], Child]
@@ -91,8 +91,11 @@ def _make_value(owner: NodeOrSection, key: Key, value: KeyValue | None, build_ch
     if isinstance(value, LocatedName):
         return VariableName(value.name)
     if key.kind is KeyKind.ELEMENTS:
+        if isinstance(value, Reference):
+            return VariableName(value.name, value.field)
         elements = value.value if isinstance(value, Literal) else None
-        return tuple(elements) if isinstance(elements, list) else VariableName(getattr(value, "name", ""))
+        # `check_constants` reports other values.
+        return tuple(elements) if isinstance(elements, list) else ElementWord.ITEMS
     if key.kind is not KeyKind.CONSTANT:
         return ()
     try:

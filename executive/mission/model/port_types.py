@@ -1,10 +1,13 @@
-"""Types of ports: assignability, types of list elements, and descriptions for messages."""
+"""Types of ports: assignability, types of list elements and fields, and descriptions for messages."""
 
 from __future__ import annotations
 
 import types
 from collections.abc import Sequence
-from typing import Any, NoReturn, Union, get_args, get_origin
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Annotated, Any, NoReturn, Union, get_args, get_origin, get_type_hints
+
+from executive.cell.objects import KnownItem, RefersTo
 
 _DESCRIPTIONS = {
     str: "a text",
@@ -40,6 +43,30 @@ def find_element_type(declared_type: object) -> object:
         return None
     arguments = [argument for argument in get_args(declared_type) if argument is not ...]
     return Union[tuple(arguments)] if arguments else Any  # noqa: UP007 - the number of types varies
+
+
+@dataclass(frozen=True)
+class FieldType:
+    """Type of a field, and the kind of names that the field contains; "" if the field contains no names."""
+
+    type: object
+    refers_to: str
+
+
+def find_fields(declared_type: object, refers_to: str) -> dict[str, FieldType]:
+    """Return the fields of the values of a type by name; an item has the fields of `KnownItem`."""
+    value_type = KnownItem if refers_to == "item" and declared_type is str else declared_type
+    if not (isinstance(value_type, type) and is_dataclass(value_type)):
+        return {}
+    hints = get_type_hints(value_type, include_extras=True)
+    return {field.name: _make_field_type(hints[field.name]) for field in fields(value_type)}
+
+
+def _make_field_type(annotation: object) -> FieldType:
+    if get_origin(annotation) is not Annotated:
+        return FieldType(annotation, "")
+    field_type, *markers = get_args(annotation)
+    return FieldType(field_type, next((mark.kind for mark in markers if isinstance(mark, RefersTo)), ""))
 
 
 def describe_type(declared_type: object) -> str:

@@ -40,10 +40,23 @@ class Literal:
 
 @dataclass(frozen=True)
 class Reference:
-    """`$name`: a param, an argument or a variable; after expansion always a variable."""
+    """`$name` or `$name.field`: a param, an argument or a variable; after expansion always a variable.
+
+    Attributes:
+        field: Name of a field of the value; "" for the whole value.
+    """
 
     name: str
     span: Span
+    field: str = ""
+
+    @property
+    def local_name(self) -> str:
+        """The name without the prefix that expansion adds to a local variable of a subtree."""
+        return self.name.rpartition(".")[2]
+
+    def __str__(self) -> str:
+        return f"${self.local_name}.{self.field}" if self.field else f"${self.local_name}"
 
 
 Value = Literal | Reference

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from executive.mission.model.nodes import InnerNode, Node, SkillNode, iterate_keys
 from executive.mission.model.values import Literal, LocatedName, Reference
 from executive.mission.source import Span
-from executive.skill import Direction, Port, Skill
+from executive.skill import Direction, Param, Port, Skill
 from executive.tree.keys import Key, KeyKind
 
 
@@ -18,34 +18,49 @@ class Wire:
 
     Attributes:
         skill: Name of the skill.
-        port: Port of the skill.
+        port: Port of the skill, or param whose value a variable gives.
         variable: Name of the variable.
         span: Position of the variable, or of the skill if the mission does not name the variable.
         is_explicit: True if the mission names the variable; otherwise, the variable has the port's name.
+        field: Field of the variable that an input reads; "" for the whole value.
     """
 
     skill: str
-    port: Port
+    port: Port | Param
     variable: str
     span: Span
     is_explicit: bool
+    field: str = ""
+
+    @property
+    def reference(self) -> Reference:
+        """The variable and the field that an input reads."""
+        return Reference(self.variable, self.span, self.field)
 
     def __str__(self) -> str:
         return f"{self.skill}.{self.port.name}"
 
 
 def find_wires(node: SkillNode, skill: type[Skill], direction: Direction) -> Iterator[Wire]:
-    """Yield the connection of every port of a direction, except inputs with a constant."""
+    """Yield the connection of every port of a direction, except inputs with a constant.
+
+    A param with a name as its value counts as an input if the mission gives a variable.
+    """
+    if direction is Direction.IN:
+        for name, setting in node.settings.items():
+            value, param = setting.value, skill.params.get(name)
+            if isinstance(value, Reference) and param is not None and param.is_name:
+                yield Wire(node.skill, param, value.name, value.span, is_explicit=True, field=value.field)
     for port in skill.ports.values():
         if port.direction is not direction:
             continue
-        setting = node.settings.get(port.name)
-        if setting is None or (direction is Direction.OUT and isinstance(setting.value, Literal)):
+        port_setting = node.settings.get(port.name)
+        if port_setting is None or (direction is Direction.OUT and isinstance(port_setting.value, Literal)):
             # `check_settings` reports a constant for an output.
             variable = node.variables_by_port.get(port.name, port.name)
             yield Wire(node.skill, port, variable, node.span, is_explicit=False)
-        elif isinstance(setting.value, Reference):
-            yield Wire(node.skill, port, setting.value.name, setting.value.span, is_explicit=True)
+        elif isinstance(value := port_setting.value, Reference):
+            yield Wire(node.skill, port, value.name, value.span, is_explicit=True, field=value.field)
 
 
 def find_literals(node: SkillNode) -> Iterator[tuple[str, Literal]]:

@@ -23,6 +23,8 @@ from executive.mission.text.yaml_text import (
 
 NAME_PATTERN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 """Matches the names of params, arguments, variables and subtrees."""
+REFERENCE_PATTERN = re.compile(rf"\$({NAME_PATTERN.pattern})(?:\.({NAME_PATTERN.pattern}))?")
+"""Matches `$name` and `$name.field`."""
 _REFERENCE_START = re.compile(r"^\$|\$(?=[A-Za-z_])")
 """Matches `$` at the start of a text, or before a letter."""
 _FAILURE_PATTERN = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)\.([A-Za-z_][A-Za-z0-9_]*)")
@@ -155,11 +157,10 @@ def read_settings(
 
 
 def read_value(node: YamlNode, findings: list[Finding]) -> Value | None:
-    """Return a reference for `$name`, or a constant in which `$$` is `$`; None after errors."""
-    if isinstance(node, YamlScalar) and isinstance(node.value, str) and node.value.startswith("$"):
-        name = node.value[1:]
-        if NAME_PATTERN.fullmatch(name):
-            return Reference(name, node.span)
+    """Return a reference for `$name` or `$name.field`, or a constant with `$` for `$$`; None after errors."""
+    text = node.value if isinstance(node, YamlScalar) else None
+    if isinstance(text, str) and (match := REFERENCE_PATTERN.fullmatch(text)):
+        return Reference(match[1], node.span, match[2] or "")
     errors = list(_find_misplaced_dollars(node))
     findings += errors
     literal = make_literal(node)
@@ -176,7 +177,8 @@ def _find_misplaced_dollars(node: YamlNode) -> Iterator[Finding]:
     """Yield an error for each text with a `$`, not escaped as `$$`, at the start or before a letter."""
     for scalar in iterate_scalars(node):
         if isinstance(scalar.value, str) and _REFERENCE_START.search(scalar.value.replace("$$", "")):
-            message = f'"{scalar.text}" is no reference: a reference is a whole value, as in key: $name'
+            rule = "a reference is a whole value, as in key: $name or key: $name.field"
+            message = f'"{scalar.text}" is no reference: {rule}'
             hint = f'For the character $, write $$: "{scalar.text.replace("$", "$$")}".'
             yield make_error(scalar.span, "bad-reference", message, hint)
 

@@ -20,7 +20,7 @@ from executive.mission.schema.types import (
     make_settings_schema,
     make_value_or_reference_schema,
 )
-from executive.tree.keys import Key, KeyKind
+from executive.tree.keys import ElementWord, Key, KeyKind
 from executive.tree.node import ControlNode
 from executive.tree.node_registry import ControlNodes
 
@@ -53,7 +53,7 @@ def _make_file_schema(title: str, keys: GrammarKeys, skills: Skills, node_classe
             "library": _make_mapping_schema(grammar.LIBRARY_KEYS),
             "reasons": _make_reasons_schema(skills),
             "label": {"type": "string", "pattern": f"^{grammar.LABEL_PATTERN}$"},
-            "reference": {"title": "$name", "type": "string", "pattern": rf"^\${_NAME}$"},
+            "reference": {"title": "$name", "type": "string", "pattern": rf"^\${_NAME}(\.{_NAME})?$"},
             **{name: make_settings_schema(name, skill) for name, skill in skills.items()},
             **control_nodes,
             grammar.USE_KEYWORD: use,
@@ -139,7 +139,8 @@ def _make_value_schema(key: Key | GrammarKey) -> Schema:
         case KeyKind.VARIABLE:
             return _SCHEMAS_BY_KIND["name"]
         case KeyKind.ELEMENTS:
-            return _SCHEMAS_BY_KIND["list"]
+            words = {"enum": [word.value for word in ElementWord]}
+            return make_value_or_reference_schema({"type": "array"}, words)
         case KeyKind.SECTIONS:
             section = _make_mapping_schema(key.section.keys)
             return {**section, "type": ["array", "object"], "items": section}

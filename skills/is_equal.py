@@ -1,0 +1,26 @@
+"""Skill that compares two values."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from executive.cell.protocols import Cell
+from executive.skill import In, Skill, port
+
+
+class IsEqual(Skill):
+    """Check that a value, for instance a field of a variable, is equal to another value.
+
+    The skill fails with `different` if the values are not equal.
+    """
+
+    value: In[str | int | float | bool] = port(doc="the value to compare, for example `$target.label`")
+    to: In[str | int | float | bool] = port(same_as="value", doc="the expected value, for example `cube`")
+    reasons: ClassVar = ("different",)
+    is_condition: ClassVar = True
+
+    def run(self, cell: Cell) -> None:
+        """Compare the values."""
+        del cell
+        if self.value != self.to:
+            raise self.failure("different", f"the value is {self.value}, not {self.to}")
