@@ -12,8 +12,8 @@ class Counterpart:
 
     Attributes:
         name: Name of the node type.
-        ports: Value of each port: the name of the key of the control node whose value the port has, or a
-            number that the control node computed from its constants.
+        ports: Value of each port: the name of a key that the mission sets and whose value the port has, or
+            a number that the control node has computed from its constants.
     """
 
     name: str

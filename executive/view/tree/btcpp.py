@@ -146,9 +146,7 @@ class _Exporter:
         keys = owner.declaring_class.keys.values()
         ports, node_keys = [key for key in keys if not _has_nodes(key)], list(filter(_has_nodes, keys))
         values = {key.name: self._format(value) for key, value in nodes.iterate_keys(owner) if key in ports}
-        has_single_child = (
-            len(node_keys) == 1 and node_keys[0].kind is KeyKind.NODE and node_keys[0].is_required
-        )
+        has_single_child = [(key.kind, key.is_required) for key in node_keys] == [(KeyKind.NODE, True)]
         element = self._add(parent, "Decorator" if has_single_child else "Control", name, ports, values)
         for key, value in nodes.iterate_keys(owner):
             key_element = element
@@ -187,24 +185,20 @@ class _Exporter:
             case Reference(name=name) | LocatedName(name=name):
                 return _format_pointer(name)
             case nodes.NodeSection() as section:
-                return ",".join(
-                    f"{key.name}={self._format(item)}" for key, item in nodes.iterate_keys(section)
-                )
+                return ",".join(f"{key.name}={self._format(one)}" for key, one in nodes.iterate_keys(section))
             case tuple() as items:
                 return ";".join(str(one) if isinstance(one, Reason) else self._format(one) for one in items)
         raise TypeError(f"{value} has no text")
 
 
 def _make_port_model(port: _Port) -> Element:
-    is_output = (
-        getattr(port, "direction", None) is Direction.OUT or getattr(port, "kind", None) is KeyKind.VARIABLE
-    )
-    value_type = port.value_type if isinstance(port, Key) else port.type
+    if isinstance(port, Key):
+        value_type, is_output = port.value_type, port.kind is KeyKind.VARIABLE
+    else:
+        value_type, is_output = port.type, getattr(port, "direction", None) is Direction.OUT
+    model = Element("output_port" if is_output else "input_port", name=_escape(port.name))
     attributes = {"type": _TYPE_NAMES.get(value_type), "default": _format_constant(port.default)}
-    tag = "output_port" if is_output else "input_port"
-    model = Element(
-        tag, {"name": _escape(port.name)} | {key: text for key, text in attributes.items() if text}
-    )
+    model.attrib |= {name: text for name, text in attributes.items() if text}
     model.text = port.doc
     return model
 
