@@ -182,6 +182,8 @@ class _Exporter:
         match self._resolve(value):
             case Literal(value=constant):
                 return _format_constant(constant)
+            case Reference(name=name, field=field) if field:
+                return _format_pointer(f"{name}.{field}")
             case Reference(name=name) | LocatedName(name=name):
                 return _format_pointer(name)
             case nodes.NodeSection() as section:

@@ -341,6 +341,8 @@ CASES: tuple[tuple[str, list[str]], ...] = (
     (f"{{parallel: {{wait_for: lead, do: [{WAIT}, Fail]}}}}", ["parallel wait_for=lead", "Fail"]),
     (f"{{while: {{condition: Fail, do: {WAIT}}}}}", ["while", "while-condition", "Fail"]),
     (f"{{for_each: {{each: x, in: [1, 2], do: {WAIT}}}}}", ["for_each each={x} in=1;2"]),
+    (f"{{for_each: {{each: y, in: items, do: {WAIT}}}}}", ["for_each each={y} in=items"]),
+    ("{Read: {value: $item.attempts}}", ["Read value={item.attempts}"]),
     (f"{{try: Fail, catch: [{{on: Fail.late, do: {WAIT}}}, {{on: Fail.failed, do: succeed}}], "
      "finally: Fail}",
      ["try", "Fail", "try-catch on=Fail.late", "try-catch on=Fail.failed", "AlwaysSuccess", "try-finally",
